@@ -17,6 +17,7 @@ from islands.io.result_text.statements import (
     describe_excess,
     describe_insignificant,
     describe_unexplained_error,
+    describe_wide_band,
     list_insignificant,
     typical_half_width,
     write_percent,
@@ -191,6 +192,11 @@ OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (
             f"the {100 * LEVEL:g} % prediction band of {output.name} contains "
             f"{write_percent(output.coverage or 0.0)} of the validation samples"
         ),
+    ),
+    Statement(
+        "wide-band",
+        lambda output: output.is_vague,
+        lambda output: f"{output.name}: {describe_wide_band()}",
     ),
     Statement(
         "error-ratio",

@@ -141,6 +141,12 @@ class RunFacts:
         return self.coverage is None or self.coverage >= _LEAST_COVERAGE
 
     @property
+    def is_vague(self) -> bool:
+        """Whether the band is wider than the range of the output, so that it says nothing about it."""
+        output_range = self.data.get("output_range")
+        return bool(self.bands and output_range and 2.0 * typical_half_width(self.bands) > output_range)
+
+    @property
     def verdict(self) -> str | None:
         """Verdict on the residual of the free run. Results of earlier versions have none."""
         found: str | None = self.residual.get("verdict")
@@ -601,6 +607,14 @@ def describe_estimation_error(facts: RunFacts) -> str:
     return f"the free-run error on the estimation data is {ratio:.2g} times that on the validation data"
 
 
+def describe_wide_band() -> str:
+    """State that the models that the data do not exclude disagree by more than the output moves."""
+    return (
+        f"the {100 * LEVEL:g} % prediction band is wider than the output range: the free runs of models that the "
+        "data do not exclude are far apart"
+    )
+
+
 def describe_excess(facts: RunFacts) -> str:
     """State how much larger the free-run error on the validation data is than that on the estimation data."""
     ratio = f"{facts.error_ratio:.2g}"
@@ -894,6 +908,7 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
             "the validation samples"
         ),
     ),
+    Statement("wide-band", lambda facts: facts.is_vague, lambda _: describe_wide_band()),
     Statement("error-ratio", lambda facts: facts.generalises_poorly, describe_excess),
     Statement("estimation-error", lambda facts: facts.fits_poorly, describe_estimation_error),
     EXTRAPOLATION,

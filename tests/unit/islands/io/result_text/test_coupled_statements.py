@@ -11,7 +11,7 @@ from support.coupled_systems import TWO_MASSES, make_coupled_record
 
 @pytest.fixture(scope="module")
 def found():
-    data = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
+    data = make_coupled_record(TWO_MASSES, samples=400, noise=0.01)
     return islands.fit_coupled(data, library="polynomial", degree=1, max_terms=4, certificate=0, average=1)
 
 
@@ -74,8 +74,10 @@ def test_an_extrapolating_validation_and_a_growing_error_are_failures(document):
 
 def test_a_band_that_misses_the_validation_data_and_a_poor_output_are_failures(document):
     document["outputs"][0]["bands"]["coverage"] = 0.5
+    document["outputs"][0]["bands"]["width"] = 10.0 * document["outputs"][0]["data"]["output_range"]
     document["outputs"][1]["metrics"]["validation"]["free_run"]["r2"] = 0.3
     found = said(document)
     assert "the 90 % prediction band of y1 contains 50 % of the validation samples" in found["Fails at"]
+    assert "y1: the 90 % prediction band is wider than the output range" in found["Fails at"]
     assert "simulation from the inputs alone: R2 0.300 of y2" in found["Fails at"]
     assert found["As a simulation"].startswith("As a simulation: unsuitable")

@@ -271,6 +271,16 @@ def test_a_band_that_misses_the_validation_data_is_a_failure(findings):
     assert "prediction band" not in said(findings)["Fails at"]
 
 
+def test_a_band_that_is_wider_than_the_output_range_is_a_failure(findings):
+    bands, output_range = findings.recommended.bands, findings.record.output_range
+    half = bands.typical_half_width()
+    found = said(findings, bands=replace(bands, width=bands.width * 0.51 * output_range / half))
+    assert "the 90 % prediction band is wider than the output range" in found["Fails at"]
+    assert found["As a simulation"].startswith("As a simulation: usable, with limits")
+    found = said(findings, bands=replace(bands, width=bands.width * 0.49 * output_range / half))
+    assert "wider than" not in found["Fails at"]
+
+
 def test_an_extrapolating_validation_is_a_failure(findings):
     parts = findings.split
     wide = replace(parts.validation, u=3.0 * parts.validation.u)
