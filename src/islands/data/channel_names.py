@@ -18,7 +18,7 @@ _PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 
 
 #: Units without a prefix, and symbols that may have one of `_PREFIXES`.
 PLAIN_UNITS = tuple("% min h d deg ° °C degC °F degF rpm psi dB".split())  # noqa: SIM905
-SYMBOLS = tuple("m g s A K mol cd Hz N Pa J W C V F ohm S Wb T H L l bar eV rad".split())  # noqa: SIM905
+SYMBOLS = tuple("m g s A K mol cd Hz N Pa J W C V F ohm S Wb T H L l bar eV rad Ah Wh".split())  # noqa: SIM905
 
 _UNIT = re.compile(f"(?:{'|'.join(PLAIN_UNITS)})|([{''.join(_PREFIXES)}]?)({'|'.join(SYMBOLS)})")
 
@@ -115,8 +115,8 @@ def parse_channel_name(name: str) -> ChannelName:
 def parse_unit(name: str) -> str:
     """Return the unit in a column's name, empty if it has none: ``V`` for ``u_est_V``, ``u [V]`` and ``u/V``.
 
-    The unit is the text in brackets, behind a slash, or after the last underscore. A time after another unit
-    divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
+    The unit is the text in brackets, behind a slash, after the last underscore, or, if it begins with a degree
+    sign, behind a blank (``Soll °C``). A time after another unit divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
     ``oven_temperature``, ``speed (measured)``, ``level_min``.
     """
     return _split_unit(name)[1]
@@ -128,6 +128,9 @@ def _split_unit(name: str) -> tuple[str, str]:
         return bracketed[1], unit
     if (quotient := _match_quotient(name)) is not None:
         return quotient[1], quotient[2]
+    words, _, degrees = name.rpartition(" ")
+    if words.strip() and degrees.startswith("°") and is_unit(degrees):
+        return words.rstrip(), degrees
     stem, _, last = name.rpartition("_")
     if not (stem and is_unit(last)):
         return name, ""

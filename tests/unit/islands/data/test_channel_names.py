@@ -28,6 +28,9 @@ from islands.data.channel_names import (
         ("a_m_s2", "a", "m/s2"),
         ("n [1/min]", "n", "1/min"),
         ("t_s", "t", "s"),
+        ("Soll °C", "Soll", "°C"),
+        ("Charge_Capacity(Ah)", "Charge_Capacity", "Ah"),
+        ("E/kWh", "E", "kWh"),
     ],
 )
 def test_a_unit_is_the_end_of_a_name(name, stem, unit):
@@ -38,7 +41,20 @@ def test_a_unit_is_the_end_of_a_name(name, stem, unit):
 
 
 @pytest.mark.parametrize(
-    "name", ["oven_temperature", "u_est", "u_1", "speed (measured)", "h", "V", "_V", "km/h", "valve"]
+    "name",
+    [
+        "oven_temperature",
+        "u_est",
+        "u_1",
+        "speed (measured)",
+        "h",
+        "V",
+        "_V",
+        "km/h",
+        "valve",
+        "°C",
+        "Phase A",
+    ],
 )
 def test_text_that_is_not_a_unit_is_a_part_of_the_name(name):
     assert parse_unit(name) == ""

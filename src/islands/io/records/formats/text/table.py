@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from islands.errors import RecordError
 from islands.io.records.column_names import append_unit, find_column, time_column
 from islands.io.records.formats.text.encoding import decode
+from islands.io.records.formats.text.long_table import describe_long_table
 from islands.io.records.formats.text.missing_words import MissingWords, is_missing, parse_words
 from islands.io.records.formats.text.number_parsing import describe_numbers, parse_numbers
 from islands.io.records.formats.text.other_rows import describe_left_out, keep_samples
@@ -129,6 +130,8 @@ class DelimitedText:
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
         """Return what was inferred: of the file, and how numbers are written, or that it is uncertain."""
+        long = describe_long_table(self.names, self.cells, _find_time(self), self._missing.texts)
+        notes = (*self.notes, *([long] if long else []))
         numeric = [name for name in names if name not in self.clocks]
         try:
             note = describe_numbers(
@@ -140,8 +143,8 @@ class DelimitedText:
                 self.units,
             )
         except RecordError as error:
-            return (*self.notes, str(error))
-        return (*self.notes, *([note] if note else []))
+            return (*notes, str(error))
+        return (*notes, *([note] if note else []))
 
     @property
     def _missing(self) -> MissingWords:
@@ -262,23 +265,27 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
     return _order_rows(table) if _has_newest_first(table) else table
 
 
+def _find_time(table: DelimitedText) -> str | None:
+    """Return the time column; None if there is none, or several may be the time."""
+    given = table.options.time
+    if given is not None:
+        found = find_column(given, table.names)
+        return found if found in table.names else None
+    try:
+        return time_column(table.names, table.rows.file, clocks=table.clocks)
+    except RecordError:
+        return None  # it is raised when the columns are read
+
+
 def _has_newest_first(table: DelimitedText) -> bool:
     """Return whether the time decreases in the first and in the last rows.
 
     Times of day without a date that decrease are read as those of the days before midnight.
     """
-    count, file = len(table.cells), table.rows.file
-    if table.starts or count < _LEAST_DECREASING:
+    count, time = len(table.cells), _find_time(table)
+    if table.starts or count < _LEAST_DECREASING or time is None:
         return False
     try:
-        given = table.options.time
-        time = (
-            time_column(table.names, file, clocks=table.clocks)
-            if given is None
-            else find_column(given, table.names)
-        )
-        if time is None or time not in table.names:
-            return False
         parts = [slice(0, min(count, _DECIDING)), slice(max(0, count - _DECIDING), count)]
         steps = np.concatenate([np.diff(table.read((time,), part).numbers[time]) for part in parts])
     except RecordError:
