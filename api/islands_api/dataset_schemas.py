@@ -21,7 +21,7 @@ class Column(ResponseModel):
     deviation: float | None = Field(default=None, description="Standard deviation.")
     missing: int = Field(
         default=0,
-        description="Samples without a value. Those of an output are skipped; an input needs the option `gaps`.",
+        description="Samples without a value. Those of an output are skipped; an input needs `gaps`.",
     )
     problem: str = Field(
         default="", description="Why the column can be neither input nor output. Empty if it can."

@@ -193,8 +193,8 @@ def _measure(
 ) -> tuple[dict[str, Any] | None, tuple[str, ...], tuple[str, ...]]:
     """Return the choice of columns with the facts about the record, how it was read, and notes about it.
 
-    There are no facts without a choice or a sampling; the reason of the choice then says why. All are empty if
-    the file has no record.
+    There are no facts without a choice or a sampling; the reason of the choice then says why. All are empty
+    if the file has no record.
     """
     from islands.facade.inspect_record import inspect_table  # noqa: PLC0415
     from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415

@@ -115,9 +115,10 @@ def parse_channel_name(name: str) -> ChannelName:
 def parse_unit(name: str) -> str:
     """Return the unit in a column's name, empty if it has none: ``V`` for ``u_est_V``, ``u [V]`` and ``u/V``.
 
-    The unit is the text in brackets, behind a slash, after the last underscore, or, if it begins with a degree
-    sign, behind a blank (``Soll °C``). A time after another unit divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
-    ``oven_temperature``, ``speed (measured)``, ``level_min``.
+    The unit is the text in brackets, behind a slash, after the last underscore, or, if it begins with a
+    degree sign, behind a blank (``Soll °C``). A time after another unit divides it: ``omega_rad_s`` is in
+    ``rad/s``. Text that is not a unit is a part of the name: ``oven_temperature``, ``speed (measured)``,
+    ``level_min``.
     """
     return _split_unit(name)[1]
 

@@ -117,8 +117,8 @@ def measure_input_ranges(record: Dataset) -> list[tuple[float, float]]:
 def describe_extrapolation(parts: Split) -> list[str]:
     """State every input of the validation data that leaves the range of the estimation data."""
     record = parts.estimation
-    ranges = map(measure_input_ranges, (parts.estimation, parts.validation))
-    return compare_input_ranges(record.input_names, record.input_units, *ranges)
+    estimated, validated = map(measure_input_ranges, (parts.estimation, parts.validation))
+    return compare_input_ranges(record.input_names, record.input_units, estimated, validated)
 
 
 def describe_search_extrapolation(

@@ -143,8 +143,8 @@ def _describe_too_few(signals: Sequence[str]) -> str:
     """Return why no columns can be chosen among less than two signals."""
     found = f"Only {signals[0]} is a signal" if signals else "No column is a signal"
     return (
-        f"{found}, which is a column of numbers that vary and do not only count: a record has an input and an "
-        "output, each in its column."
+        f"{found}, which is a column of numbers that vary and do not only count: a record has an input and "
+        "an output, each in its column."
     )
 
 

@@ -2,10 +2,10 @@
 
 Delays, time constants and integrators make loops, too, but those of the first two close as the input becomes
 slower. Three regressions predict the output of other parts of the record: one from the input, its low-pass
-filtered copies and their powers; one also from the integral of the input; one also from play operators of the input, whose loops do not depend on time. If the latter predicts
-clearly better, the loop remains at low frequency. A record of one repeated loop does not separate them in
-this way: there, the output of a hysteresis turns together with the input, and that behind a delay turns as
-late as its loop is wide.
+filtered copies and their powers; one also from the integral of the input; one also from play operators of the
+input, whose loops do not depend on time. If the last one predicts clearly better, the loop remains at low
+frequency. A record of one repeated loop does not separate them in this way: there, the output of a hysteresis
+turns together with the input, and that behind a delay turns as late as its loop is wide.
 """
 
 from itertools import pairwise
@@ -77,7 +77,8 @@ def check_loop(record: Dataset, place: int) -> Fact:
     if single is None or np.ptp(single.u) == 0.0 or not np.isfinite(single.y).all():
         return Fact("loop", name, None, "", None, None, f"{output} over {name} cannot be judged as a loop.")
     if np.unique(single.u).size == _LEVELS:
-        text = f"{name} has {_LEVELS} levels: {output} over {name} does not show whether a hysteresis makes a loop."
+        shown = f"{output} over {name} does not show whether a hysteresis makes a loop"
+        text = f"{name} has {_LEVELS} levels: {shown}."
         return Fact("loop", name, None, "", None, None, text)
     slow = average_samples(single, _choose_count(single))
     if len(loop_starts(slow)) < 2:

@@ -71,7 +71,8 @@ def check_rest(record: Dataset) -> Fact:
 def _leave_open(record: Dataset, samples: int) -> Fact:
     """Return a fact without a value: the inputs do not rest for the samples in which the output moves."""
     inputs, never = _list_inputs(record), "never rest" if record.inputs > 1 else "never rests"
-    sentence = f"The record does not show whether {record.output_name} rests: {inputs} {never} for {samples} samples."
+    why = f"{inputs} {never} for {samples} samples"
+    sentence = f"The record does not show whether {record.output_name} rests: {why}."
     return Fact("rest", record.output_name, None, "", None, None, sentence)
 
 

@@ -201,8 +201,8 @@ def _describe_preparation(model: DynamicModel, data: Dataset, is_prepared: bool,
     values = describe_values(model)
     if values and is_prepared and model.dt is not None and same_dt(model.dt, data.dt):
         return (
-            f"the record has the sampling time of the model, {model.dt:g} s, and its samples are read as they "
-            f"are; in the data of the model, {values}"
+            f"the record has the sampling time of the model, {model.dt:g} s, and its samples are read as "
+            f"they are; in the data of the model, {values}"
         )
     return f"as in the model, {statement}"
 

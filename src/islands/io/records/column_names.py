@@ -159,8 +159,7 @@ def seconds_per_unit(name: str) -> float | None:
 
 def has_unit_of_time(name: str) -> bool:
     """Return whether a name ends in a unit of time in brackets, whatever its words are: ``Source [s]``."""
-    match = _BRACKETED_UNIT.search(name)
-    return match is not None and match.end() == len(name) and parse_unit(name) in set(TIME_UNITS) - {""}
+    return name.endswith(tuple(_CLOSING)) and parse_unit(name) in set(TIME_UNITS) - {""}
 
 
 def states_unit(name: str) -> bool:

@@ -610,8 +610,8 @@ def describe_estimation_error(facts: RunFacts) -> str:
 def describe_wide_band() -> str:
     """State that the models that the data do not exclude disagree by more than the output moves."""
     return (
-        f"the {100 * LEVEL:g} % prediction band is wider than the output range: the free runs of models that the "
-        "data do not exclude are far apart"
+        f"the {100 * LEVEL:g} % prediction band is wider than the output range: the free runs of models that "
+        "the data do not exclude are far apart"
     )
 
 

@@ -4,8 +4,8 @@ import pytest
 from islands.inspection.column_shape import (
     find_computed,
     is_derived,
-    is_total,
     is_feedback,
+    is_total,
     measure_command,
     measure_noise_level,
     measure_precedence,

@@ -62,7 +62,7 @@ def test_two_levels_do_not_tell_a_hysteresis_from_a_time_constant():
     assert "2 levels" in fact.sentence
 
 
-def test_the_sentence_about_an_input_without_loops_names_the_part_that_is_judged():
+def test_the_part_of_the_record_in_which_an_input_makes_no_loop_is_named():
     u = np.linspace(0.0, 1.0, 500)
     record = replace(measure(u, u**2), segments=(300, 200), recordings=("", ""))
     assert "the longest part of the record, 300 samples" in check_loop(record, 0).sentence

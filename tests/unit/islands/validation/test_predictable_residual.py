@@ -48,7 +48,7 @@ def test_the_share_of_a_moving_average_is_that_of_its_whitening():
     assert predictable_share(moving_average(WHITE, -0.5), U, Y) == pytest.approx(0.2, abs=0.06)
 
 
-def test_a_coloured_residual_is_predictable_where_input_and_output_leave_the_range_of_the_other_half():
+def test_a_coloured_residual_is_predictable_at_two_levels_of_the_output():
     level = np.where(np.arange(2000) < 1000, 0.0, 10.0)
     y, u = level + 0.1 * Y, level[:, None] + 0.1 * U
     coloured = WHITE.copy()

@@ -164,7 +164,7 @@ def test_a_problem_is_the_message_of_read_record(tmp_path, column):
 
 
 @pytest.mark.parametrize("empty", [[5], range(40, SAMPLES)], ids=["single", "at the end"])
-def test_missing_values_are_counted_and_no_problem_since_those_of_an_output_are_skipped(tmp_path, empty):
+def test_missing_values_are_counted_and_are_no_problem_of_an_output(tmp_path, empty):
     file = table(tmp_path, x=cells(U, **{f"c{k}": "" for k in empty}))
     column, known = preview(file).columns[3], np.delete(U, empty)
     assert (column.problem, column.missing, column.samples) == ("", len(empty), SAMPLES)

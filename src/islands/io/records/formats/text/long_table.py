@@ -63,9 +63,9 @@ def describe_long_table(
         f" and {len(signals) - _LISTED} more" if signals[_LISTED:] else ""
     )
     return (
-        f"each row has the value of one signal, which column {label} names ({listed}): a record has a column for "
-        f"each signal. Export it in this form, or pivot it: the rows of one {time}, the columns of {label}, the "
-        f"values of {values[0]}"
+        f"each row has the value of one signal, which column {label} names ({listed}): a record has a column "
+        f"for each signal. Export it in this form, or pivot it: the rows of one {time}, the columns of "
+        f"{label}, the values of {values[0]}"
     )
 
 
