@@ -207,7 +207,8 @@ def _normalise(values: NDArray[np.float64], name: str) -> _Signal:
 def _test_input(
     noise: _Signal, u: NDArray[np.float64], index: int, inputs: int, max_lag: int, level: float
 ) -> list[CorrelationTest]:
-    name = f"input {index}"
+    # Inputs are numbered from 1, as in the symbols of the tests and on the page.
+    name = f"input {index + 1}"
     source = _normalise(u, name)
     power = _normalise(source.values**2, f"the square of {name}")
     noise_power = _normalise(noise.values**2, "the square of the residual")

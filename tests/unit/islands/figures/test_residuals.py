@@ -104,5 +104,5 @@ def test_constant_input_is_noted_in_its_panels(tmp_path):
     figure = draw_residual_correlations(residual_tests(residual, np.ones((300, 1))))
     notes = [" ".join(text.get_text().split()) for axes in figure.axes for text in axes.texts]
     assert len(notes) == 4
-    assert notes[0] == "input 0 is constant: there is nothing to correlate"
+    assert notes[0] == "input 1 is constant: there is nothing to correlate"
     save(figure, tmp_path / "noted.svg")

@@ -233,7 +233,7 @@ def test_constant_input_has_nothing_to_correlate():
         assert not get_test(result, name, 1).values.any()
         assert "constant" in get_test(result, name, 1).note
         assert get_test(result, name, 0).note == ""
-    assert get_test(result, "u_xi", 1).note.startswith("input 1 is constant")
+    assert get_test(result, "u_xi", 1).note.startswith("input 2 is constant")
     assert get_test(result, "xi_xi").note == ""
 
 
@@ -242,7 +242,7 @@ def test_two_level_input_has_no_even_part_to_correlate():
     # Levels symmetric about 0.2: the squared deviations from the mean are equal up to rounding.
     levels = np.tile([[1.3], [-0.9], [-0.9], [1.3]], (SAMPLES // 4, 1))
     result = residual_tests(e, levels)
-    assert get_test(result, "u2_xi").note.startswith("the square of input 0 is constant")
+    assert get_test(result, "u2_xi").note.startswith("the square of input 1 is constant")
     assert not get_test(result, "u2_xi").values.any()
     assert get_test(result, "u_xi").note == ""
     assert get_test(result, "u_xi").values.any()
