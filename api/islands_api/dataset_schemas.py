@@ -76,6 +76,25 @@ class Preview(ResponseModel):
     )
 
 
+class Envelope(ResponseModel):
+    """Extremes of a column in every part of the rows. None where all cells are missing."""
+
+    name: str
+    minimum: tuple[float | None, ...]
+    maximum: tuple[float | None, ...]
+
+
+class Samples(ResponseModel):
+    """Columns of a data set for a plot."""
+
+    start: int = Field(description="First row, counted from 0 without the header.")
+    stop: int = Field(description="Row after the last one.")
+    rows: tuple[int, ...] = Field(
+        description="First row of every part. If the rows are fewer than `points`, each is a part."
+    )
+    columns: tuple[Envelope, ...]
+
+
 _EXPIRES = "Earliest deletion, if no job names the data set until then. None if it is kept."
 
 

@@ -81,6 +81,7 @@ class BaseClient(Generic[H]):
 
     upload = Endpoint(dataset_calls.upload)
     fetch = Endpoint(dataset_calls.fetch)
+    samples = Endpoint(dataset_calls.samples)
     submit = Endpoint(calls.submit)
     diagnose = Endpoint(diagnosis_calls.diagnose)
     job = Endpoint(calls.job)

@@ -1,13 +1,13 @@
-"""Calls that make data sets: the client sends a file, or the service downloads it."""
+"""Calls that make data sets, by a file or a download, and that read their samples."""
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from islands_api.client.calls import RequestSpec, as_list
+from islands_api.client.calls import DatasetRef, RequestSpec, as_list, quote_id
 from islands_api.client.response_parsing import read_as
-from islands_api.dataset_schemas import DatasetView
+from islands_api.dataset_schemas import DatasetView, Samples
 
 
 def upload(
@@ -63,3 +63,26 @@ def fetch(
     }
     given = {field: value for field, value in asked.items() if value}
     return RequestSpec("POST", "/v1/datasets/fetch", read_as(DatasetView), json={"url": url, **given})
+
+
+def samples(
+    dataset: DatasetRef,
+    columns: str | Sequence[str],
+    start: int = 0,
+    stop: int | None = None,
+    points: int = 2000,
+) -> RequestSpec[Samples]:
+    """Return the extremes of columns in equal parts of the rows, for a plot.
+
+    Parameters
+    ----------
+    dataset : str or DatasetView
+    columns : str or sequence of str
+    start, stop : int, int or None
+        First row, from 0, and the row after the last one; by default all rows.
+    points : int
+        Largest number of parts, at most 5000.
+    """
+    params = {"column": as_list(columns), "start": start, "stop": stop, "points": points}
+    given = {name: value for name, value in params.items() if value is not None}
+    return RequestSpec("GET", f"/v1/datasets/{quote_id(dataset)}/samples", read_as(Samples), params=given)

@@ -3,25 +3,14 @@
 A file that exhausts memory, or makes its reader loop, ends only this subprocess.
 """
 
-import asyncio
-import json
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 from islands.errors import RecordError, SettingsError, suggest
-from islands_service.intake.confined_process import (
-    check_status,
-    enter,
-    make_message,
-    refuse,
-    send_document,
-    timeout_error,
-)
-from islands_service.intake.reader_process import FORK_SERVER, ReaderProcess
+from islands_service.intake.confined_answer import ask_confined
+from islands_service.intake.confined_process import enter, refuse, send_document
 
 if TYPE_CHECKING:
     from islands.io.records import Preview
@@ -33,9 +22,6 @@ _MAX_COLUMNS = 1000
 
 #: Longest name of a column: a job cannot contain a longer one (`islands_service.domain.job_spec.Name`).
 _MAX_NAME = 200
-
-#: Largest number of bytes of an answer, which a harmful file may control, and of a part of it.
-_MAX_OUTPUT, _CHUNK = 64_000_000, 65_536
 
 #: Characters of a longer name in a message.
 _SHOWN = 40
@@ -85,50 +71,7 @@ async def inspect_file(
     RecordError
         The file or the requested columns cannot be read.
     """
-    with ExitStack() as files:
-        (answers, output), (complaints, errors) = _open_pipe(files), _open_pipe(files)
-        message = make_message(path, memory, seconds, asdict(request))
-        process = files.enter_context(
-            FORK_SERVER.start("file_inspection", message, output.fileno(), errors.fileno())
-        )
-        output.close()
-        errors.close()
-        try:
-            async with asyncio.timeout(seconds):
-                answer, complaint = await asyncio.gather(
-                    _read_output(process, answers), _read_output(process, complaints)
-                )
-                status = await process.wait_async()
-        except TimeoutError:
-            raise timeout_error(path.name, seconds) from None
-        finally:
-            process.kill()
-            await process.wait_async()
-    check_status(status, answer, complaint, path.name, memory, seconds)
-    return dict(json.loads(answer))
-
-
-def _open_pipe(files: ExitStack) -> tuple[IO[bytes], IO[bytes]]:
-    """Return both ends of a pipe, which are closed with the stack."""
-    reading, writing = os.pipe()
-    return files.enter_context(os.fdopen(reading, "rb", 0)), files.enter_context(os.fdopen(writing, "wb", 0))
-
-
-async def _read_output(process: ReaderProcess, pipe: IO[bytes]) -> bytes:
-    """Read an answer to its end; end the process if it is too long."""
-    stream = asyncio.StreamReader()
-    protocol = asyncio.StreamReaderProtocol(stream)
-    transport, _ = await asyncio.get_running_loop().connect_read_pipe(lambda: protocol, pipe)
-    received = bytearray()
-    try:
-        while chunk := await stream.read(_CHUNK):
-            if len(received) < _MAX_OUTPUT:
-                received += chunk
-            else:
-                process.kill()
-    finally:
-        transport.close()
-    return bytes(received)
+    return await ask_confined("file_inspection", path, asdict(request), memory, seconds)
 
 
 def main() -> None:

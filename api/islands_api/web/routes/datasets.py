@@ -1,33 +1,49 @@
 """Data sets: upload, inspect, list, delete."""
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from typing import Annotated, Any
 
 import fastapi
-from fastapi import APIRouter, File, Form, UploadFile
+from fastapi import APIRouter, File, Form, Query, Response, UploadFile
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.io.records.reading_options import ReadingOptions
-from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest
+from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest, Samples
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
-from islands_api.web.requests import Cursor, FormRoute, JSONRoute, Limit, decode_cursor, encode_cursor
+from islands_api.web.requests import (
+    Cursor,
+    FormRoute,
+    IfNoneMatch,
+    JSONRoute,
+    Limit,
+    decode_cursor,
+    encode_cursor,
+    matches_etag,
+)
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
 from islands_api.web.uploads.dataset_storage import store_dataset
 from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
 from islands_api.web.uploads.uploaded_file import parse_file_name
 from islands_service.domain.job_spec import Name
 from islands_service.intake.file_inspection import InspectionRequest
+from islands_service.intake.job_inputs import link_blob
+from islands_service.intake.sample_reading import SampleRequest, read_samples
 from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
 
 #: The same path for requests in JSON.
 fetching = APIRouter(prefix=router.prefix, tags=["data sets"], responses=RESPONSES, route_class=JSONRoute)
+
+#: Largest number of a row in a request.
+_MAX_ROW = 2**53
 
 _READING = TypeAdapter(ReadingOptions)
 
@@ -146,6 +162,39 @@ async def dataset(dataset: Id, caller: Reader, state: AppStateDep) -> Any:
     """Return a data set: columns, units, statistics, sampling, warnings."""
     stored = await state.run_blocking(state.store.datasets.get, caller.owner, dataset)
     return JSONDocument(dataset_document(stored, await _find_retention(state, caller.owner, (stored,))))
+
+
+@router.get("/{dataset}/samples", response_model=Samples, responses={304: {"description": "Not modified."}})
+async def samples(
+    dataset: Id,
+    caller: Reader,
+    state: AppStateDep,
+    column: Annotated[list[Name], Query(min_length=1, max_length=16, description="Columns, one each.")],
+    start: Annotated[int, Query(ge=0, le=_MAX_ROW, description="First row, from 0.")] = 0,
+    stop: Annotated[
+        int | None, Query(ge=1, le=_MAX_ROW, description="Row after the last one; by default the end.")
+    ] = None,
+    points: Annotated[int, Query(ge=1, le=5000, description="Most values of a column.")] = 2000,
+    if_none_match: IfNoneMatch = None,
+) -> Response:
+    """Return columns for a plot: the least and the greatest value of every part of the rows.
+
+    Every peak is in the answer, whatever the number of points. The file is read for every answer, which does
+    not change.
+    """
+    stored = await state.run_blocking(state.store.datasets.get, caller.owner, dataset)
+    request = SampleRequest(tuple(column), start, stop, points, stored.preview.get("reading", {}))
+    tag = f'"{hashlib.sha256(repr((dataset, request)).encode()).hexdigest()[:32]}"'
+    headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization", "ETag": tag}
+    if matches_etag(if_none_match, tag):
+        return Response(status_code=304, headers=headers)
+    settings = state.settings
+    with ExitStack() as files:
+        async with state.inspection_slots.hold(caller.owner):
+            held = await state.run_blocking(files.enter_context, state.blobs.hold(stored.blob))
+            path = files.enter_context(link_blob(held, stored.name))
+            found = await read_samples(path, request, settings.inspection_memory, settings.inspection_seconds)
+    return JSONDocument(found, headers=headers)
 
 
 async def _find_retention(state: AppState, owner: str, found: Sequence[StoredDataset]) -> int:

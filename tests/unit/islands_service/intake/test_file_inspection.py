@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands_service.intake import file_inspection
+from islands_service.intake import confined_answer
 from islands_service.intake.file_inspection import InspectionRequest, describe_file, inspect_file
 from islands_service.intake.record_reading import RecordRequest, read_confined
 from support.odd_files import write_workbook
@@ -281,8 +281,8 @@ def test_the_service_and_other_owners_are_not_delayed_by_the_slow_files_of_one(s
 
 
 def test_an_endless_answer_is_refused(record, monkeypatch, programs):
-    monkeypatch.setattr(file_inspection, "FORK_SERVER", programs("while True: print('0' * 65536)"))
-    monkeypatch.setattr(file_inspection, "_MAX_OUTPUT", 1_000_000)
+    monkeypatch.setattr(confined_answer, "FORK_SERVER", programs("while True: print('0' * 65536)"))
+    monkeypatch.setattr(confined_answer, "_MAX_OUTPUT", 1_000_000)
     with pytest.raises(RecordError, match="it is damaged, or unpacks to more"):
         inspect(record)
 

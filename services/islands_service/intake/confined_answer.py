@@ -1,0 +1,79 @@
+"""Answers of confined processes as documents, in an event loop."""
+
+import asyncio
+import json
+import os
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, Any
+
+from islands_service.intake.confined_process import check_status, make_message, timeout_error
+from islands_service.intake.reader_process import FORK_SERVER, ReaderProcess
+
+#: Largest number of bytes of an answer, which a harmful file may control, and of a part of it.
+_MAX_OUTPUT, _CHUNK = 64_000_000, 65_536
+
+
+async def ask_confined(
+    program: str, path: Path, asked: Mapping[str, Any], memory: int, seconds: float
+) -> Mapping[str, Any]:
+    """Return the answer of a process that reads a file.
+
+    Parameters
+    ----------
+    program : str
+        Key of `islands_service.intake.fork_server.PROGRAMS`.
+    path : Path
+    asked : mapping
+        What the process is asked for, as JSON.
+    memory, seconds
+        Limits of the process: bytes of address space, and time.
+
+    Raises
+    ------
+    RecordError
+        The file cannot be read as asked, or not within the limits.
+    """
+    with ExitStack() as files:
+        (answers, output), (complaints, errors) = _open_pipe(files), _open_pipe(files)
+        message = make_message(path, memory, seconds, asked)
+        process = files.enter_context(FORK_SERVER.start(program, message, output.fileno(), errors.fileno()))
+        output.close()
+        errors.close()
+        try:
+            async with asyncio.timeout(seconds):
+                answer, complaint = await asyncio.gather(
+                    _read_output(process, answers), _read_output(process, complaints)
+                )
+                status = await process.wait_async()
+        except TimeoutError:
+            raise timeout_error(path.name, seconds) from None
+        finally:
+            process.kill()
+            await process.wait_async()
+    check_status(status, answer, complaint, path.name, memory, seconds)
+    return dict(json.loads(answer))
+
+
+def _open_pipe(files: ExitStack) -> tuple[IO[bytes], IO[bytes]]:
+    """Return both ends of a pipe, which are closed with the stack."""
+    reading, writing = os.pipe()
+    return files.enter_context(os.fdopen(reading, "rb", 0)), files.enter_context(os.fdopen(writing, "wb", 0))
+
+
+async def _read_output(process: ReaderProcess, pipe: IO[bytes]) -> bytes:
+    """Read an answer to its end; end the process if it is too long."""
+    stream = asyncio.StreamReader()
+    protocol = asyncio.StreamReaderProtocol(stream)
+    transport, _ = await asyncio.get_running_loop().connect_read_pipe(lambda: protocol, pipe)
+    received = bytearray()
+    try:
+        while chunk := await stream.read(_CHUNK):
+            if len(received) < _MAX_OUTPUT:
+                received += chunk
+            else:
+                process.kill()
+    finally:
+        transport.close()
+    return bytes(received)
