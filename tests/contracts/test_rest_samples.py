@@ -82,5 +82,5 @@ def test_invalid_requests_say_what_exists(service, dataset, query, status, detai
     assert detail in answer.text
 
 
-def test_a_data_set_of_nobody_is_not_found(service):
+def test_an_unknown_data_set_is_not_found(service):
     problem_of(ask(service, "0" * 40 + "-csv", "column=y"), 404, "no-such-dataset")

@@ -49,7 +49,7 @@ _DEFECTS = """() => {
     levels.filter((level) => level === 1).length === 1 ? null : `headings of the first level: ${levels}`,
     ...levels.map((level, at) => at && level > levels[at - 1] + 1 ? `a level is missing: ${levels}` : null),
     ...all("button, a").map((node) => name(node) ? null : "a control without a name"),
-    ...all("input").map((node) => node.labels.length ? null : "an input without a label"),
+    ...all("input").map((node) => node.labels.length || node.ariaLabel ? null : "an input without a label"),
     ...all("img").map((node) => node.hasAttribute("alt") ? null : "a picture without alternative text"),
     ...all("table").map((node) => node.caption ? null : "a table without a caption"),
     ...all("progress, [role=slider], [role=region]").map((node) => node.ariaLabel ? null : node.tagName),

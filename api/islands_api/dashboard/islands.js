@@ -1,8 +1,11 @@
 /** Entry point: shows the page that the address selects, or the key form if the service needs a key. */
 
 import "./components/banner.js";
+import { listenForDroppedFiles } from "./components/file_upload.js";
 import { connection, key } from "./lib/api.js";
 import { el } from "./lib/dom.js";
+import { mountData } from "./pages/data.js";
+import { mountDataset } from "./pages/dataset.js";
 import { mountJob } from "./pages/job.js";
 import { mountJobs } from "./pages/jobs.js";
 import { mountKeyForm } from "./pages/key.js";
@@ -23,6 +26,16 @@ const ROUTES = [
     pattern: /^\/jobs$/,
     view: (_match, query) => `jobs ${query}`,
     mount: (host, _match, query, signal) => mountJobs(host, Object.fromEntries(query), signal),
+  },
+  {
+    pattern: /^\/data\/([^/]+)$/,
+    view: ([, id]) => `data set ${id}`,
+    mount: (host, [, id], query, signal) => mountDataset(host, { id }, signal),
+  },
+  {
+    pattern: /^\/data$/,
+    view: (_match, query) => `data ${query}`,
+    mount: (host, _match, query, signal) => mountData(host, Object.fromEntries(query), signal),
   },
   {
     pattern: /^\/monitors\/([^/]+)$/,
@@ -125,5 +138,6 @@ function restoreScroll() {
 
 connection.addEventListener("unauthorised", showKeyForm);
 addEventListener("hashchange", show);
+listenForDroppedFiles();
 restoreScroll();
 show();

@@ -19,6 +19,9 @@ function showBanner(kind, ...content) {
   document.getElementById("banners").append(node);
 }
 
+/** Show what the page does for some seconds. */
+export const showNotice = (text) => showBanner("notice", el("p", { role: "status" }, text));
+
 /** Show a problem: its title, what to do, and the id of the request for a search in the logs. */
 export function showProblem(error, kind = "problem") {
   const click = () => clearBanner(kind);

@@ -61,21 +61,21 @@ function makeColumnTable({ preview }, spec) {
 /** Facts that are shown only if they state a problem. */
 const ONLY_PROBLEMS = ["quantisation", "saturation", "levels"];
 
-/** List the facts about the record; data sets of earlier versions have none. */
-function describeInspection(inspection) {
-  if (!inspection) return [];
-  if (!inspection.choice.output) return [el("p", { class: "soft" }, inspection.choice.reason)];
-  const shown = inspection.facts.filter(({ name, value }) => value || !ONLY_PROBLEMS.includes(name));
-  const title = `Facts about ${inspection.choice.inputs.join(", ")} and ${inspection.choice.output}`;
-  return [
-    el(
-      "details",
-      {},
-      el("summary", {}, inspection.rows ? `${title}, samples ${inspection.rows}` : title),
-      el("ul", {}, ...shown.map(({ sentence }) => el("li", {}, sentence))),
-    ),
-  ];
+/** List the facts about a record, with their columns as the title; the reason if no columns are chosen. */
+export function listFacts({ facts, choice, rows }) {
+  if (!choice.output) return el("p", { class: "soft" }, choice.reason);
+  const shown = facts.filter(({ name, value }) => value || !ONLY_PROBLEMS.includes(name));
+  const title = `Facts about ${choice.inputs.join(", ")} and ${choice.output}`;
+  return el(
+    "details",
+    {},
+    el("summary", {}, rows ? `${title}, samples ${rows}` : title),
+    el("ul", {}, ...shown.map(({ sentence }) => el("li", {}, sentence))),
+  );
 }
+
+/** List the facts about the record; data sets of earlier versions have none. */
+const describeInspection = (inspection) => (inspection ? [listFacts(inspection)] : []);
 
 function describeDataset(dataset, spec) {
   const { preview } = dataset;

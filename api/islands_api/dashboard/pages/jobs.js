@@ -1,8 +1,6 @@
-/**
- * Page with the list of jobs: newest first, filtered by state, in pages, updated continuously.
- * A page to submit jobs would be a module `submit.js` here, with a route in islands.js and a link below.
- */
+/** Page with the list of jobs: newest first, filtered by state, in pages, updated continuously. */
 
+import { makeFileButton } from "../components/file_upload.js";
 import {
   STATES,
   getIsolatedName,
@@ -99,8 +97,14 @@ function makeWelcomeCard() {
     el(
       "p",
       {},
-      "Submit a record with an input and an output (CSV with a header, NPZ, MAT or Parquet). The job then ",
-      "appears here. There are three ways; the columns are called ",
+      "Drop a record with an input and an output on this page (CSV and other text, Excel, MATLAB, HDF5, ",
+      "Parquet, NPZ, MDF or TDMS), look at it, and start.",
+    ),
+    makeFileButton(),
+    el(
+      "p",
+      {},
+      "Or submit it from a program; the columns are called ",
       el("code", {}, "u_V"),
       " and ",
       el("code", {}, "y_um"),

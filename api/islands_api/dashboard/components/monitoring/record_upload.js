@@ -3,13 +3,12 @@
 import { getJson } from "../../lib/api.js";
 import { announce, el } from "../../lib/dom.js";
 import { clearBanner, showProblem } from "../banner.js";
+import { uploadFile } from "../file_upload.js";
 
 const inNumericOrder = new Intl.Collator("en", { numeric: true }).compare;
 
 async function addRecord(path, file) {
-  const body = new FormData();
-  body.append("file", file);
-  const { id } = await getJson("v1/datasets", { method: "POST", body });
+  const { id } = await uploadFile(file);
   const record = JSON.stringify({ dataset: id, name: file.name });
   const headers = { "Content-Type": "application/json" };
   await getJson(`${path}/records`, { method: "POST", headers, body: record });

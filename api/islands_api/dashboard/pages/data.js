@@ -1,0 +1,73 @@
+/** Page with the list of data sets, newest first, and the button to add some. */
+
+import { makeFileButton } from "../components/file_upload.js";
+import { makePagedTable } from "../components/paged_table.js";
+import { getJson } from "../lib/api.js";
+import { makeAge } from "../lib/clock.js";
+import { el } from "../lib/dom.js";
+import { NONE, formatBytes, formatCount, formatShort } from "../lib/numbers.js";
+import { poll } from "../lib/polling.js";
+
+/** Number of data sets on a page, and seconds between two requests. */
+const [PAGE_SIZE, POLL_SECONDS] = [25, 4];
+
+const makeAddress = (cursor) => (cursor ? `#/data?${new URLSearchParams({ cursor })}` : "#/data");
+
+function makeRow(dataset) {
+  const number = (name, text) => el("td", { class: "figure", "data-label": name }, text);
+  const node = el(
+    "tr",
+    {},
+    el("th", { scope: "row" }, el("a", { href: `#/data/${dataset.id}` }, el("bdi", {}, dataset.name))),
+    number("columns", formatCount(dataset.columns)),
+    number("rows", formatCount(dataset.samples)),
+    number("sampling time", dataset.dt === null ? NONE : `${formatShort(dataset.dt)} s`),
+    number("size", formatBytes(dataset.bytes)),
+    number("warnings", dataset.warnings ? String(dataset.warnings) : NONE),
+    el("td", { class: "figure" }, makeAge(dataset.created)),
+  );
+  // A data set does not change.
+  return { node, show: () => {} };
+}
+
+/** Make the invitation to add the first record. */
+const makeInvitation = () =>
+  el(
+    "section",
+    { class: "card invitation" },
+    el("h2", {}, "Drop a record here"),
+    el(
+      "p",
+      {},
+      "A table with an input and an output: CSV and other text, Excel, MATLAB, HDF5, Parquet, NPZ, MDF ",
+      "or TDMS.",
+    ),
+    makeFileButton(),
+  );
+
+/** Show the list in a host until the signal aborts. */
+export function mountData(host, { cursor = "" }, signal) {
+  document.title = "Data · islands";
+  const table = makePagedTable({
+    caption: "Data sets, newest first",
+    headings: [
+      "Data set",
+      ...["Columns", "Rows", "Sampling time", "Size", "Warnings", "Added"].map((name) => [name, "figure"]),
+    ],
+    makeRow,
+    makeEmptyMessage: () => (cursor ? el("p", { class: "empty" }, "No older data sets.") : makeInvitation()),
+    makeAddress,
+    cursor,
+  });
+  host.replaceChildren(
+    el("div", { class: "heading" }, el("h1", { tabindex: "-1" }, "Data"), makeFileButton()),
+    ...table.nodes,
+  );
+  poll(async () => {
+    const query = new URLSearchParams({ limit: PAGE_SIZE, ...(cursor && { cursor }) });
+    const page = await getJson(`v1/datasets?${query}`, { signal });
+    if (!signal.aborted) table.show(page);
+    return POLL_SECONDS;
+  }, signal);
+  return {};
+}
