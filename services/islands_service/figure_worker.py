@@ -67,6 +67,7 @@ def main() -> int:
     parser.add_argument("job")
     parser.add_argument("--owner", required=True)
     parser.add_argument("--rank", type=int, help="rank of a model; without it, the figures of the search")
+    parser.add_argument("--numbers", action="store_true", help="only the free run of the model as numbers")
     arguments = parser.parse_args()
     settings = service_settings()
     _limit(settings)
@@ -79,6 +80,8 @@ def main() -> int:
                 made = render_outputs(job, store, blobs)
             elif rank is None:
                 made = render_figures(job, read_search_result(job, store, blobs, rank))
+            elif arguments.numbers:
+                made = render_simulation(read_search_result(job, store, blobs, rank), rank)
             else:
                 made = render_model_figures(read_search_result(job, store, blobs, rank), rank)
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
@@ -189,12 +192,16 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
     made = {f"{rank}/{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
-    data = found.split.validation
+    return made | render_simulation(found, rank)
+
+
+def render_simulation(found: SearchResult, rank: int) -> dict[str, bytes]:
+    """Return the free run of a model on the validation data as numbers, by artefact name."""
+    entry, data = found.models[0], found.split.validation
     bands = entry.bands
     band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
     run = simulate_freely(entry.model, data, entry.warm_up)
-    made[f"{rank}/free-run.json"] = _free_run_document(data, run.y, run.outcome, band)
-    return made
+    return {f"{rank}/free-run.json": _free_run_document(data, run.y, run.outcome, band)}
 
 
 def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:

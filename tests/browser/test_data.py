@@ -27,7 +27,8 @@ DROP = """([name, text]) => {
 
 #: Returns the number of coloured pixels of a canvas; axes and texts are grey.
 DRAWN = """(canvas) => {
-  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
   const pen = copy.getContext("2d", { willReadFrequently: true });
   pen.drawImage(canvas, 0, 0);
   const { data } = pen.getImageData(0, 0, copy.width, copy.height);

@@ -15,6 +15,7 @@ import {
   makeProgressBar,
 } from "../components/job_state.js";
 import { makeModelsPanel } from "../components/models.js";
+import { makeResultCard } from "../components/result_card.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge, makeCountdown } from "../lib/clock.js";
 import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";
@@ -143,14 +144,15 @@ export function mountJob(host, { id, rank }, signal) {
   const bar = makeProgressBar();
   const factsHost = el("div");
   const failureHost = el("div");
-  const [convergenceHost, modelsHost, aboutHost] = [el("div"), el("div"), el("div", { class: "about" })];
+  const [resultHost, convergenceHost, modelsHost] = [el("div"), el("div"), el("div")];
+  const aboutHost = el("div", { class: "about" });
   const titleBar = el(
     "div",
     { class: "heading" },
     el("div", { class: "title" }, heading, state.node),
     el("code", { class: "soft small" }, id),
   );
-  let [current, unit, convergence, models] = [null, "", null, null];
+  let [current, unit, convergence, models] = [null, null, null, null];
 
   function build(job) {
     const onUnitKnown = (value) => {
@@ -166,6 +168,7 @@ export function mountJob(host, { id, rank }, signal) {
       el("a", { class: "back", href: "#/jobs" }, "← Jobs"),
       titleBar,
       buttons.node,
+      resultHost,
       el("section", { class: "card status", "aria-label": "Progress" }, bar.node, factsHost),
       failureHost,
       convergenceHost,
@@ -183,7 +186,8 @@ export function mountJob(host, { id, rank }, signal) {
     state.show(job);
     bar.show(job);
     buttons.show(job);
-    factsHost.replaceChildren(makeJobFacts(job, unit));
+    factsHost.replaceChildren(makeJobFacts(job, unit ?? ""));
+    showResult(job);
     failureHost.replaceChildren(...[makeFailureCard(job)].filter(Boolean));
     convergence?.advance(job);
     if (!isSearch(job)) {
@@ -197,6 +201,14 @@ export function mountJob(host, { id, rank }, signal) {
         : makeModelsPanel(job, rank, signal);
       modelsHost.replaceChildren(models.node);
     }
+  }
+
+  /** Show the recommended model as soon as the unit of its output is known. */
+  function showResult(job) {
+    if (unit === null || job.state !== "succeeded" || resultHost.hasChildNodes()) return;
+    // Results of earlier versions name no recommended model; several outputs have a panel of their own.
+    if (isSearch(job) && !hasSeveralOutputs(job) && job.summary?.rank)
+      resultHost.replaceChildren(makeResultCard(job, unit, signal));
   }
 
   function lost(problem) {

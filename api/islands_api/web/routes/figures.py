@@ -219,7 +219,7 @@ async def _figure_response(
                 # Another request may have drawn the figure in the meantime.
                 blob = await state.run_blocking(state.store.results.artefact, job, name)
                 if blob is None:
-                    await _draw(state, caller, job, rank)
+                    await _draw(state, caller, job, rank, name.endswith(SIMULATION_ARTEFACT))
                     blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
         raise ResourceNotFoundError(f"job {job} has no figure {name}")
@@ -229,21 +229,26 @@ async def _figure_response(
     return Response(data, media_type=media, headers=headers)
 
 
-async def _draw(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
+async def _draw(state: AppState, caller: Principal, job: str, rank: int | None, numbers: bool) -> None:
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     for dataset in parse_identification(found.spec).datasets:
         # Raises if an earlier version deleted it.
         await state.run_blocking(state.store.datasets.get, caller.owner, dataset, deleted=True)
     _FAILURES.refuse(job, rank)
     try:
-        await _run_figure_worker(state, caller, job, rank)
+        await _run_figure_worker(state, caller, job, rank, numbers)
     except (FigureError, BlobNotFoundError) as error:
         _FAILURES.remember(job, rank, error)
         raise
 
 
-async def _run_figure_worker(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
-    options = () if rank is None else ("--rank", str(rank))
+async def _run_figure_worker(
+    state: AppState, caller: Principal, job: str, rank: int | None, numbers: bool
+) -> None:
+    options = [] if rank is None else ["--rank", str(rank)]
+    if numbers:
+        # The page shows the free run first; the figures take several seconds.
+        options.append("--numbers")
     readers = state.settings.readers
     inherited = {} if readers is None else {REQUESTS: str(readers)}
     process = await asyncio.create_subprocess_exec(

@@ -46,6 +46,7 @@ FILES = {
     "components/monitoring/state_charts.js": _SCRIPT,
     "components/paged_table.js": _SCRIPT,
     "components/report.js": _SCRIPT,
+    "components/result_card.js": _SCRIPT,
     "components/run_form.js": _SCRIPT,
     "components/signal_plot.js": _SCRIPT,
     "lib/api.js": _SCRIPT,

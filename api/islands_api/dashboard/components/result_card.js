@@ -1,0 +1,71 @@
+/** What a reader of a result looks for first: the equation, three numbers, the verdict, and the free run. */
+
+import { getJson } from "../lib/api.js";
+import { el, makeFacts } from "../lib/dom.js";
+import { formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
+import { makeLineChart } from "./chart.js";
+import { makeEquation } from "./models.js";
+
+/** Beginnings of the sentences of the summary that are the verdict. */
+const VERDICT = ["As a simulation", "Fails at"];
+
+/** Return the median of half the width of a band; NaN if there is none. */
+function findHalfWidth({ band }) {
+  const widths = (band?.lower ?? [])
+    .map((low, at) => (band.upper[at] - low) / 2)
+    .filter((value) => value > 0)
+    .sort((a, b) => a - b);
+  return widths[widths.length >> 1] ?? NaN;
+}
+
+const withUnit = (value, unit) => (Number.isFinite(value) ? `${formatNumber(value)} ${unit}`.trim() : null);
+
+/** Make the chart of measured and simulated output, with the band as its background. */
+function drawSimulation(chart, { time_s: times, measured, free_run: free, band }) {
+  const points = (values) => times.map((time, at) => [time, values[at]]);
+  const limits = band ? [band.lower, band.upper] : [];
+  chart.draw([
+    ...limits.map((values, at) => ({ name: `limit ${at}`, points: points(values), faint: true })),
+    { name: "measured", points: points(measured) },
+    { name: "free run", points: points(free) },
+  ]);
+}
+
+/** Make the card of the recommended model of a job of one output. */
+export function makeResultCard(job, unit, signal) {
+  const { rank, size, metrics, words = "" } = job.summary;
+  const path = `v1/jobs/${encodeURIComponent(job.id)}/models/${rank}`;
+  const verdict = words.split("\n").filter((line) => VERDICT.some((start) => line.startsWith(start)));
+  const facts = el("div");
+  const showFacts = (half) =>
+    facts.replaceChildren(
+      makeFacts([
+        ["Mean error of the free run", `${formatPercent(metrics.mape)} of the range`],
+        ["RMSE of the free run", withUnit(metrics.rmse, unit)],
+        ["90 % band, half-width", withUnit(half, unit)],
+        ["Terms", String(size)],
+      ]),
+    );
+  const chart = makeLineChart({
+    title: "Free run on the validation data",
+    x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
+    y: { label: [job.spec.output, unit && `(${unit})`].filter(Boolean).join(" ") },
+  });
+  showFacts(NaN);
+  getJson(`${path}/simulation`, { signal }).then(
+    (simulation) => {
+      showFacts(findHalfWidth(simulation));
+      drawSimulation(chart, simulation);
+    },
+    (error) => signal.aborted || chart.node.after(el("p", { class: "complaint" }, error.message)),
+  );
+  return el(
+    "section",
+    { class: "card result", "aria-label": "Result" },
+    el("h2", { class: "visually-hidden" }, "Result"),
+    makeEquation(path, { equation: job.summary.equation }, signal),
+    facts,
+    chart.node,
+    verdict.map((line) => el("p", {}, line)),
+  );
+}
