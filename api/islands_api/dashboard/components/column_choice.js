@@ -2,6 +2,7 @@
 
 import { el, makeScrollable } from "../lib/dom.js";
 import { formatNumber } from "../lib/numbers.js";
+import { describeDefect } from "./dataset.js";
 
 const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
 
@@ -31,9 +32,10 @@ export function makeColumnChoice({ columns, time, inspection }, onChange) {
     onChange(getChoice());
   }
 
-  const row = ({ name, unit, minimum, maximum, mean, deviation, problem }) => {
+  const row = (column) => {
+    const { name, unit, minimum, maximum, mean, deviation } = column;
     const chosen = byName.get(name);
-    const remark = name === time ? "time" : problem;
+    const remark = name === time ? "time" : describeDefect(column);
     return el(
       "tr",
       {},

@@ -21,7 +21,7 @@ function findUnit(columns, spec) {
 }
 
 /** Return why a column cannot be used, or how many values it lacks; empty if neither applies. */
-function describeDefect({ problem, missing }) {
+export function describeDefect({ problem, missing }) {
   // Data sets of earlier versions do not count missing values.
   return problem || (missing ? `${formatCount(missing)} missing` : "");
 }

@@ -52,7 +52,7 @@ function makeContent(dataset, signal) {
     form.node,
     el("section", { class: "card" }, el("h2", {}, "Columns"), choice.node),
     preview.inspection &&
-      el("section", { class: "card" }, el("details", { open: true }, listFacts(preview.inspection))),
+      el("section", { class: "card" }, el("h2", {}, "Facts"), listFacts(preview.inspection)),
   ].filter(Boolean);
 }
 
