@@ -2,12 +2,9 @@
 
 import logging
 import sys
-import warnings
 
 import structlog
 from structlog.typing import Processor
-
-from islands.errors import ExtrapolationWarning
 
 
 def configure_logs(form: str, role: str) -> None:
@@ -35,6 +32,4 @@ def configure_logs(form: str, role: str) -> None:
         structlog.stdlib.ProcessorFormatter(foreign_pre_chain=shared, processors=[remove_meta, renderer])
     )
     logging.basicConfig(handlers=[handler], level=logging.WARNING, force=True)
-    # The progress of a job states it to its owner.
-    warnings.simplefilter("ignore", ExtrapolationWarning)
     structlog.contextvars.bind_contextvars(role=role)

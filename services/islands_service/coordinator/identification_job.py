@@ -8,7 +8,7 @@ from sys import maxsize
 from time import monotonic, sleep
 from typing import Any
 
-from islands.data.coupled_record import couple
+from islands.data.coupled_record import couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import describe_search_extrapolation
 from islands.evolution.engine import Engine
@@ -18,11 +18,11 @@ from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
-from islands.facade.coupled.identification import identify_coupled
+from islands.facade.coupled.identification import identify_coupled_data
 from islands.facade.coupled.result import CoupledResult
-from islands.facade.fit import fit
+from islands.facade.fit import fit_record
 from islands.facade.identification_progress import CLASS_PHASES, SEARCH, IdentificationProgress
-from islands.facade.identify import identify
+from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
 from islands.io.models import NARX, model_json
@@ -132,9 +132,9 @@ def _identify(
     stop: SearchStop,
 ) -> SearchResult:
     if spec.model != NARX:
-        fitted = fit(
+        fitted = fit_record(
             record,
-            validation=validation,
+            validation,
             model=spec.model,
             seed=spec.seed,
             progress=reporter.report_stage,
@@ -151,9 +151,9 @@ def _identify(
         except StoppedChoiceError as stopped:
             return Result.from_search(stopped.found).with_wall_time(reporter.spent).search_result
     reporter.choice = preset if isinstance(preset, Choice) else None
-    result = identify(
+    result = identify_record(
         record,
-        validation=validation,
+        validation,
         preset=preset,
         **_list_arguments(spec, start, engine, reporter, stop),
     )
@@ -186,9 +186,9 @@ def _identify_outputs(
     stop: SearchStop,
 ) -> CoupledResult:
     outputs = len(spec.outputs)
-    result = identify_coupled(
-        couple(record, outputs),
-        validation=couple(validation, outputs) if isinstance(validation, Dataset) else validation,
+    held_out = couple(validation, outputs) if isinstance(validation, Dataset) else validation
+    result = identify_coupled_data(
+        split_coupled(couple(record, outputs), held_out),
         preset=spec.preset,
         **_list_arguments(spec, start, engine, reporter, stop),
     )

@@ -1,7 +1,6 @@
 """Application of commands: their table, and error handling, one line on standard error and exit code 2."""
 
 import sys
-import warnings
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -17,7 +16,6 @@ from islands.cli.options_file import DEFAULT_FILE, match_options, read_option_ta
 from islands.cli.stop_requests import exit_code, ignore_signals, raise_on_signals
 from islands.distribution import describe_missing_extra, read_version
 from islands.errors import (
-    ExtrapolationWarning,
     IslandsError,
     SettingsError,
     command_line_names,
@@ -93,9 +91,7 @@ class Commands(TyperGroup):
         """Run the command. Report an error in one line; exit with code 2, or 130 or 143 after a signal."""
         try:
             try:
-                with command_line_names(), warnings.catch_warnings():
-                    # The commands state it before they compile kernels.
-                    warnings.simplefilter("ignore", ExtrapolationWarning)
+                with command_line_names():
                     return super().invoke(ctx)
             except ModuleNotFoundError as error:
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error

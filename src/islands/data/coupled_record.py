@@ -11,7 +11,7 @@ from islands.data.channel_names import parse_channel_name
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
 from islands.data.missing_outputs import skip_missing_outputs
-from islands.data.split import split_data
+from islands.data.split import Split, split_data
 from islands.errors import RecordError
 
 
@@ -152,6 +152,11 @@ class CoupledSplit:
 
     estimation: CoupledRecord
     validation: CoupledRecord
+
+    @property
+    def first(self) -> Split:
+        """Data of the first output, with the inputs that all outputs share."""
+        return Split(self.estimation.records[0], self.validation.records[0])
 
 
 class OutputNames(Protocol):

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
-from warnings import catch_warnings
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from islands.data.dataset import Dataset
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
-from islands.errors import ExtrapolationWarning
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 
@@ -121,7 +119,7 @@ def explain_residual(
     if np.sqrt(np.mean(residual[is_known] ** 2)) <= ROUNDING * record.output_range:
         return None
     # Most diagnoses search for no formula.
-    from islands.facade.identify import identify  # noqa: PLC0415
+    from islands.facade.identify import identify_record  # noqa: PLC0415
 
     dataset = Dataset(
         u=np.column_stack([record.u[:, 0], found.best.output]),
@@ -134,19 +132,17 @@ def explain_residual(
         segments=record.segments,
         recordings=record.recordings,
     )
-    # The caller knows neither the residual nor the parts into which it is split.
-    with catch_warnings(action="ignore", category=ExtrapolationWarning):
-        result = identify(
-            dataset[: found.estimation_samples],
-            preset="narx",
-            seed=seed,
-            engine=engine,
-            progress=progress,
-            on_epoch=on_epoch,
-            stop=stop,
-            start=start,
-            **SEARCH,
-        )
+    result = identify_record(
+        dataset[: found.estimation_samples],
+        preset="narx",
+        seed=seed,
+        engine=engine,
+        progress=progress,
+        on_epoch=on_epoch,
+        stop=stop,
+        start=start,
+        **SEARCH,
+    )
     best, explained = None, MIN_EXPLAINED_FRACTION
     for each in result.models:
         run = free_run(each.model, dataset)

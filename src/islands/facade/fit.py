@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -13,7 +13,7 @@ from islands.errors import SettingsError, check_seed
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
-from islands.facade.library_fit import FitSettings
+from islands.facade.library_fit import FitChanges, FitSettings
 from islands.facade.results.identification import Result
 from islands.io.data_frames import read_data
 from islands.io.models import NARX
@@ -135,9 +135,20 @@ def fit(
     ExtrapolationWarning
         An input of the validation data leaves the range of the estimation data.
     """
-    check_seed(seed)
     record, validation = read_data(record, y, dt, inputs, output, validation, reading)
-    settings = FitSettings(
+    warn_of_extrapolation(split_data(record, validation))
+    return fit_record(
+        record,
+        validation,
+        model=model,
+        library=library,
+        degree=degree,
+        lags=lags,
+        delays=delays,
+        constraints=constraints,
+        seed=seed,
+        progress=progress,
+        stop=stop,
         max_terms=max_terms,
         estimator=estimator,
         average=average,
@@ -145,8 +156,42 @@ def fit(
         shooting=shooting,
         certificate=certificate,
     )
+
+
+def fit_record(
+    record: Dataset,
+    validation: Dataset | float = 0.25,
+    *,
+    model: str = NARX,
+    library: str = AUTO,
+    degree: int | None = None,
+    lags: int | None = None,
+    delays: Sequence[int] | None = None,
+    constraints: str | None = None,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
+    **changes: Unpack[FitChanges],
+) -> Result:
+    """Fit models to a record as `fit` does, for a caller that states an extrapolation itself.
+
+    Parameters
+    ----------
+    record : Dataset
+    validation : Dataset or float
+    model, library, degree, lags, delays, constraints, seed, progress, stop
+        As for `fit`.
+    **changes
+        Settings that differ from those of `FitSettings`.
+
+    Raises
+    ------
+    SettingsError, StoppedError, RecordError
+        As `fit`.
+    """
+    check_seed(seed)
+    settings = FitSettings(**changes)
     split = split_data(record, validation)
-    warn_of_extrapolation(split)
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if model != NARX:
         given = library, degree, lags, delays, constraints, settings

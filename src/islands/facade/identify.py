@@ -147,10 +147,51 @@ def identify(
     ExtrapolationWarning
         An input of the validation data leaves the range of the estimation data.
     """
-    check_seed(seed)
     record, validation = read_data(record, y, dt, inputs, output, validation, reading)
+    warn_of_extrapolation(split_data(record, validation))
+    return identify_record(
+        record,
+        validation,
+        preset=preset,
+        seed=seed,
+        progress=progress,
+        on_epoch=on_epoch,
+        stop=stop,
+        start=start,
+        engine=engine,
+        **changes,
+    )
+
+
+def identify_record(
+    record: Dataset,
+    validation: Dataset | float = 0.25,
+    *,
+    preset: str | Choice = AUTO,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    on_epoch: SearchCallback | None = None,
+    stop: Stop = never_stop,
+    start: SearchState | None = None,
+    engine: Engine | Ray | str | None = None,
+    **changes: Unpack[SettingChanges],
+) -> Result:
+    """Identify a model of a record as `identify` does, for a caller that states an extrapolation itself.
+
+    Parameters
+    ----------
+    record : Dataset
+    validation : Dataset or float
+    preset, seed, progress, on_epoch, stop, start, engine, **changes
+        As for `identify`.
+
+    Raises
+    ------
+    SettingsError, StoppedError, RecordError, ModelError
+        As `identify`.
+    """
+    check_seed(seed)
     parts = split_data(record, validation)
-    warn_of_extrapolation(parts)
     steps = Steps(progress, stop)
     if preset == AUTO:
         try:

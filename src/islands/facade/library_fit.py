@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
+from typing import TypedDict
 
 from islands.available_cpus import count_cpus
 from islands.data.averaging import AUTO, count_means
@@ -70,6 +71,17 @@ _REFIT = "fit of better subsets"
 
 #: A structure for every number of terms.
 Subsets = tuple[Structure, ...]
+
+
+class FitChanges(TypedDict, total=False):
+    """Settings of `FitSettings` that differ from the defaults."""
+
+    max_terms: int
+    estimator: str
+    average: int | str
+    feedthrough: str
+    shooting: int | None
+    certificate: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

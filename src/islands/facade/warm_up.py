@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,7 +14,6 @@ import numpy as np
 from islands.available_cpus import count_cpus
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
-from islands.errors import ExtrapolationWarning
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.output_error import fit_output_error
@@ -26,8 +24,8 @@ from islands.evolution.rng import Purpose, Stream
 from islands.evolution.variation import random_individuals
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Lagged
-from islands.facade.fit import fit
-from islands.facade.identify import identify
+from islands.facade.fit import fit_record
+from islands.facade.identify import identify_record
 from islands.facade.setting_changes import SettingChanges
 from islands.kernels.jit_cache import cache_folder, ready
 from islands.kernels.pair_table import complete_pairs
@@ -73,9 +71,7 @@ def warm_up(report: Callable[[str], None] = print) -> bool:
     bool
         Whether kernels had to be compiled.
     """
-    # The record of the kernels is none of the user.
-    with warnings.catch_warnings(action="ignore", category=ExtrapolationWarning):
-        return ready(_use_all_kernels, report)
+    return ready(_use_all_kernels, report)
 
 
 def _use_all_kernels() -> None:
@@ -86,8 +82,8 @@ def _use_all_kernels() -> None:
         _evaluate_individual(_make_context(record))
         for constraints in ("none", "hysteresis"):
             changes: SettingChanges = {**SMALL, "constraints": constraints}
-            identify(record, preset="hysteresis", **changes)
-    fit(record, library="phi-polynomial", max_terms=3)
+            identify_record(record, preset="hysteresis", **changes)
+    fit_record(record, library="phi-polynomial", max_terms=3)
     fit_output_error(record)
     _simulate_two_outputs(record)
 

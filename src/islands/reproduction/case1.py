@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS
-from islands.facade.identify import identify
+from islands.facade.identify import identify_record
 from islands.facade.setting_changes import SettingChanges
 from islands.figures.paper import (
     Reproduced,
@@ -128,9 +128,9 @@ def search_with_preset(quick: bool) -> Document:
     estimation, validation = authors_estimation(), authors_validation()
     if quick:
         estimation, validation = estimation[: _QUICK_SAMPLES[0]], validation[: _QUICK_SAMPLES[1]]
-    found = identify(
+    found = identify_record(
         estimation,
-        validation=validation,
+        validation,
         preset="hysteresis",
         engine="serial",
         **(_QUICK_OURS if quick else _OURS),

@@ -18,6 +18,7 @@ from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import stop_requests
 from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS, resolve_settings
+from islands.facade.identify import identify_record
 from islands.figures.names import ALL_FIGURES
 from islands.io.records import write_record
 from islands.models.protocol import DynamicModel
@@ -77,9 +78,9 @@ def demo(
             settings = resolve_settings(PRESET, {"islands": ISLANDS})
             searching = SearchDisplay(show, PRESET, estimation.samples, settings)
             began = perf_counter()
-            found = islands.identify(
+            found = identify_record(
                 estimation,
-                validation=validation,
+                validation,
                 preset=PRESET,
                 islands=ISLANDS,
                 progress=searching,

@@ -18,7 +18,7 @@ from islands.cli.runs.coupled import couple_data, coupled_options, search_output
 from islands.cli.search_options import ModelClass
 from islands.cli.stop_requests import REPEAT, stop_requests
 from islands.data.averaging import AUTO
-from islands.data.coupled_record import join_columns
+from islands.data.coupled_record import join_columns, split_coupled
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
@@ -115,6 +115,10 @@ def fit(
         held_out = recordings.read_held_out(validation, rows)
     state_extrapolation(data, held_out, len(outputs))
     compile_kernels()
+    # The fits load the kernels, which the help of the command does not need.
+    from islands.facade.coupled.identification import fit_coupled_data  # noqa: PLC0415
+    from islands.facade.fit import fit_record  # noqa: PLC0415
+
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
         phases = fit_phases(library, outputs if len(outputs) > 1 else ()) if model == NARX else CLASS_PHASES
@@ -143,10 +147,10 @@ def fit(
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
             record, held = couple_data(data, [held_out], len(outputs), steps, names)
-            fit_all = partial(islands.fit_coupled, record, validation=held, **coupled_options(given))
+            fit_all = partial(fit_coupled_data, split_coupled(record, held), **coupled_options(given))
             result = search_outputs(fit_all, out, stop, drawn)
         else:
-            result = islands.fit(data, validation=held_out, **given)
+            result = fit_record(data, held_out, **given)
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
         drawing = Steps(stop=stop)

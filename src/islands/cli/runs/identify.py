@@ -21,7 +21,7 @@ from islands.cli.runs.timed_engine import TimedEngine
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.data.compatibility import match_record
-from islands.data.coupled_record import CoupledRecord
+from islands.data.coupled_record import CoupledRecord, split_coupled
 from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
@@ -35,6 +35,8 @@ from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.coupled.identification import identify_coupled_data
+from islands.facade.identify import identify_record
 from islands.io.checkpoints import (
     read_checkpoint,
     state_document,
@@ -139,10 +141,10 @@ def run(
             try:
                 result = _search(
                     data,
+                    held_out,
                     folder,
                     run_options.figures,
                     job["changes"],
-                    validation=held_out,
                     start=state,
                     progress=searching,
                     on_epoch=checkpoints,
@@ -166,6 +168,7 @@ def run(
 
 def _search(
     data: islands.Dataset | CoupledRecord,
+    held_out: Any,
     folder: Path,
     figures: Sequence[str],
     changes: dict[str, Any],
@@ -173,8 +176,9 @@ def _search(
 ) -> islands.Result | islands.CoupledResult:
     """Search one or several outputs."""
     if isinstance(data, islands.Dataset):
-        return islands.identify(data, **arguments, **changes)
-    search = partial(islands.identify_coupled, data, **arguments, **coupled_options(changes))
+        return identify_record(data, held_out, **arguments, **changes)
+    parts = split_coupled(data, held_out)
+    search = partial(identify_coupled_data, parts, **arguments, **coupled_options(changes))
     return search_outputs(search, folder, arguments["stop"], figures, partial(_explain_continuation, folder))
 
 

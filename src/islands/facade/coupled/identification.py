@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from islands.data.averaging import AUTO, average_samples
 from islands.data.coupled_record import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
 from islands.data.dataset import Dataset
-from islands.data.split import Split
+from islands.data.split import Split, warn_of_extrapolation
 from islands.errors import SettingsError
 from islands.estimation.refinement import refine
 from islands.evolution.engine import Engine
@@ -26,8 +26,9 @@ from islands.facade.coupled.bands import make_bands
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
-from islands.facade.fit import fit
-from islands.facade.identify import SearchCallback, identify
+from islands.facade.fit import fit_record
+from islands.facade.identify import SearchCallback, identify_record
+from islands.facade.library_fit import FitChanges
 from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
@@ -72,19 +73,13 @@ class StoppedCouplingError(StoppedError):
         self.outputs, self.found = tuple(outputs), tuple(found)
 
 
-class FitOptions(TypedDict, total=False):
+class FitOptions(FitChanges, total=False):
     """Options of `fit` for every output; `fit` describes each of them."""
 
     library: str
     degree: int | None
     lags: int | None
-    max_terms: int
     constraints: str | None
-    estimator: str
-    average: int | str
-    feedthrough: str
-    shooting: int | None
-    certificate: int
 
 
 def fit_coupled(
@@ -146,13 +141,46 @@ def fit_coupled(
     RecordError
         The record is too short or incomplete, an output is given twice or is also an input, or the
         validation data has other columns or another sampling time.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        An input of the validation data leaves the range of the estimation data.
+    """
+    data = _read_data(record, inputs, outputs, dt, validation, reading)
+    warn_of_extrapolation(data.first)
+    return fit_coupled_data(
+        data, refine_together=refine_together, seed=seed, progress=progress, stop=stop, **options
+    )
+
+
+def fit_coupled_data(
+    data: CoupledSplit,
+    *,
+    refine_together: bool = True,
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    stop: Stop = never_stop,
+    **options: Unpack[FitOptions],
+) -> CoupledResult:
+    """Fit one equation per output as `fit_coupled` does, for a caller that states an extrapolation itself.
+
+    Parameters
+    ----------
+    data : CoupledSplit
+    refine_together, seed, progress, stop, **options
+        As for `fit_coupled`.
+
+    Raises
+    ------
+    SettingsError, StoppedError, RecordError
+        As `fit_coupled`.
     """
     chosen: dict[str, Any] = {"library": "polynomial", "feedthrough": "no", **options}
     check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"])
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
-    find = partial(fit, seed=seed, stop=stop)
-    data = _read_data(record, inputs, outputs, dt, validation, reading)
+    find = partial(fit_record, seed=seed, stop=stop)
     return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, Steps(progress, stop), find)
 
 
@@ -210,14 +238,62 @@ def identify_coupled(
     ------
     SettingsError, RecordError, StoppedError
         As `fit_coupled`.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        As `fit_coupled`.
+    """
+    data = _read_data(record, inputs, outputs, dt, validation, reading)
+    warn_of_extrapolation(data.first)
+    return identify_coupled_data(
+        data,
+        refine_together=refine_together,
+        preset=preset,
+        seed=seed,
+        progress=progress,
+        on_epoch=on_epoch,
+        stop=stop,
+        start=start,
+        engine=engine,
+        **changes,
+    )
+
+
+def identify_coupled_data(
+    data: CoupledSplit,
+    *,
+    refine_together: bool = True,
+    preset: str = "narx",
+    seed: int = 0,
+    progress: ProgressCallback = ignore_progress,
+    on_epoch: SearchCallback | None = None,
+    stop: Stop = never_stop,
+    start: SearchState | None = None,
+    engine: Engine | Ray | str | None = None,
+    **changes: Unpack[SettingChanges],
+) -> CoupledResult:
+    """Identify one equation per output, for a caller that states an extrapolation itself.
+
+    Parameters
+    ----------
+    data : CoupledSplit
+    refine_together, preset, seed, progress, on_epoch, stop, start, engine, **changes
+        As for `identify_coupled`.
+
+    Raises
+    ------
+    SettingsError, RecordError, StoppedError
+        As `fit_coupled`.
     """
     chosen: dict[str, Any] = {"feedthrough": "no", **with_tuples(changes)}
     settings = resolve_coupled_settings(preset, chosen)
     preset = COUPLED_PRESET if preset == AUTO_PRESET else preset
     chosen.setdefault("average", settings.average)
-    find = _Searches(partial(identify, preset=preset, seed=seed, stop=stop, engine=engine), start, on_epoch)
+    find = _Searches(
+        partial(identify_record, preset=preset, seed=seed, stop=stop, engine=engine), start, on_epoch
+    )
     trial = make_trial_library(settings)
-    data = _read_data(record, inputs, outputs, dt, validation, reading)
     return _couple(
         data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, Steps(progress, stop), find
     )
@@ -229,7 +305,7 @@ class _Searches:
     Parameters
     ----------
     search : callable
-        `identify` with the arguments that all searches share.
+        `identify_record` with the arguments that all searches share.
     start : SearchState or None
         State to continue from.
     on_epoch : callable or None
@@ -244,11 +320,11 @@ class _Searches:
         self._ended: tuple[SearchState, ...] = ()
         self._state: SearchState | None = None
 
-    def __call__(self, record: Dataset, **options: Any) -> Result:
+    def __call__(self, record: Dataset, validation: Dataset, **options: Any) -> Result:
         """Search the next output."""
         place = len(self._ended)
         self._state = self._starts[place] if place < len(self._starts) else None
-        found = self._search(record, start=self._state, on_epoch=self._report, **options)
+        found = self._search(record, validation, start=self._state, on_epoch=self._report, **options)
         if self._state is not None:
             self._ended = (*self._ended, self._state)
         return found
@@ -308,7 +384,7 @@ def _couple(
     for name, split in zip(names, splits, strict=True):
         show = partial(_report, steps.report, name)
         try:
-            results.append(find(split.estimation, validation=split.validation, progress=show, **options))
+            results.append(find(split.estimation, split.validation, progress=show, **options))
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
     steps.report("choice of the equations", 0.0)

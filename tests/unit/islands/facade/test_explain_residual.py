@@ -37,7 +37,7 @@ def searched(monkeypatch):
         model = make_model(terms, dataset.input_names, dataset.output_name)
         return SimpleNamespace(models=[SimpleNamespace(model=model)])
 
-    monkeypatch.setattr("islands.facade.identify.identify", search)
+    monkeypatch.setattr("islands.facade.identify.identify_record", search)
 
 
 def test_a_formula_has_the_names_of_the_record():

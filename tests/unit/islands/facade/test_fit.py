@@ -10,10 +10,13 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
+from islands.facade.fit import fit_record
+from islands.facade.identify import identify_record
 from islands.figures.names import ALL_FIGURES
 from islands.io.result_folder import record_document, result_document, result_json
 from islands.io.result_text.statements import describe
 from islands.models.equations import equation, latex_equation
+from islands.progress import StoppedError
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from support.undrawn import undrawn_figures
 
@@ -70,6 +73,16 @@ def test_an_extrapolating_validation_is_a_warning_before_the_fit() -> None:
         within = Dataset(0.9 * data.u[:100], data.y[:100], data.dt)
         settings = {"library": "polynomial", "degree": 1, "lags": 1, "certificate": 0, "average": 1}
         islands.fit(data, validation=within, **settings)
+
+
+@pytest.mark.parametrize("search", [fit_record, identify_record])
+def test_a_caller_that_states_an_extrapolation_itself_is_not_warned(search) -> None:
+    data = tank()
+    wide = Dataset(3.0 * data.u[:100], data.y[:100], data.dt)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(StoppedError):
+            search(data, wide, stop=lambda: True)
 
 
 def test_best_model_has_the_documented_attributes(result):

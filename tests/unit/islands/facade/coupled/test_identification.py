@@ -22,6 +22,7 @@ from islands.io.checkpoints import (
     state_document,
     state_from_document,
 )
+from islands.progress import StoppedError
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
@@ -33,6 +34,21 @@ FAST = {"degree": 2, "lags": 2, "max_terms": 4, "average": 1, "certificate": 0}
 @pytest.fixture(scope="module")
 def found():
     return fit_coupled(make_coupled_record(PREY, samples=150), **FAST)
+
+
+@pytest.mark.parametrize("search", [fit_coupled, identify_coupled])
+def test_an_extrapolating_input_is_one_warning_and_outputs_are_none(search) -> None:
+    record = make_coupled_record(PREY, samples=150)
+    wide = make_coupled_record(PREY, samples=100).map(
+        lambda each: replace(each, u=np.tile([[9.0]], (100, record.u.shape[1])), y=5.0 * each.y)
+    )
+    with pytest.warns(islands.ExtrapolationWarning) as warned, pytest.raises(StoppedError):
+        search(record, validation=wide, stop=lambda: True)
+    named = [str(each.message) for each in warned]
+    assert len(named) == len(record.input_names)
+    for name, message in zip(record.input_names, named, strict=True):
+        assert message.startswith(f"validation extrapolates: {name} is 9 to 9")
+    assert {each.filename for each in warned} == {__file__}
 
 
 def test_without_noise_the_true_equations_are_found() -> None:
