@@ -220,6 +220,9 @@ class ModelView(ResponseModel):
         description="For example metrics.validation.free_run.mape; of several outputs the means."
     )
     outcomes: dict[str, Any] = Field(default_factory=dict)
+    criterion: dict[str, Any] | None = Field(
+        default=None, description="Estimator of the parameters, and the error that they minimise."
+    )
     warm_up: int | None = Field(
         default=None, description="Samples before the first prediction of the simulations in metrics."
     )

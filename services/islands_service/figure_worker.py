@@ -31,7 +31,7 @@ from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import any_model_from_json, model_from_json
-from islands.io.result_models import read_shooting_interval
+from islands.io.result_models import read_criterion, read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
@@ -138,7 +138,8 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
             # Results of earlier versions do not state their warm-up; their default was this preset.
             preset = "hysteresis" if spec.preset == AUTO else spec.preset
             warm_up = resolve_settings(preset, spec.changes).maximum_lag
-        assessment = assess(model, split, shooting, warm_up, document["settings"]["constraints"])
+        criterion = read_criterion(entry.document)
+        assessment = assess(model, split, shooting, warm_up, document["settings"]["constraints"], criterion)
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(replace(assessment, bands=bands))
     search = _search(document["search"], store.results.history(job.id))

@@ -1,4 +1,7 @@
-"""Table of estimators, without their functions: command line and job validation import it in milliseconds."""
+"""Table of estimators, without their functions: command line and job validation import it in milliseconds.
+
+A `Criterion` states which estimator gave the parameters of a model, and which error they minimise.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -34,3 +37,42 @@ ESTIMATORS: Mapping[str, Estimator] = MappingProxyType(
         "free-run": Estimator(lambda _shooting: None, "output noise"),
     }
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """Error that the parameters of a model minimise on the estimation data.
+
+    Attributes
+    ----------
+    estimator : str
+        An entry of ``ESTIMATORS``, or ``output-error`` for a linear model of `fit_output_error`.
+    interval : int or None
+        Samples of the interval over which predictions are fed back: 1 for the one-step-ahead error, None for
+        that of the free run, and else the error of multiple shooting.
+    """
+
+    estimator: str
+    interval: int | None
+
+    @property
+    def error(self) -> str:
+        """Name of the error, as of the metrics of a result."""
+        return {1: "one_step_ahead", None: "free_run"}.get(self.interval, "multiple_shooting")
+
+
+#: Criterion of least squares.
+LEAST_SQUARES = Criterion("least-squares", 1)
+
+#: Criterion of linear models of the free run with estimated initial states.
+OUTPUT_ERROR = Criterion("output-error", None)
+
+
+def make_criterion(estimator: str, shooting: int) -> Criterion:
+    """Return the criterion of an entry of ``ESTIMATORS`` for a shooting interval of the settings."""
+    return Criterion(estimator, ESTIMATORS[estimator].interval(shooting))
+
+
+def refinement_criterion(interval: int | None) -> Criterion:
+    """Return the criterion of a refinement over an interval; None is the free run."""
+    return Criterion("free-run" if interval is None else "shooting", interval)

@@ -6,6 +6,7 @@ from math import isfinite
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError, lookup
+from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.refinement import refine
 from islands.evolution.search_result import SearchResult, SearchStatistics, rank_models, with_bands
 from islands.facade.results.model_simulation import SHOOTING
@@ -19,6 +20,9 @@ from islands.validation.ensemble import ValidatedModel
 
 #: Largest number of accepted steps from a starting model.
 _STEPS = 100
+
+#: Every class is fitted by the error of the free run.
+_CRITERION = refinement_criterion(None)
 
 
 def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps) -> SearchResult:
@@ -55,13 +59,13 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
         )
     _, model = min(found, key=lambda pair: pair[0])
     steps("assessment of the model", 0.9)
-    assessment = assess(model, split, interval)
+    assessment = assess(model, split, interval, criterion=_CRITERION)
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
     counts = {"ok": len(found)}
     search = SearchStatistics(len(found), counts, {"candidates": len(found), "bytes": 0})
     result = SearchResult(record, split, seed, settings, search, rank_models([assessment]))
     error = free_run(model, split.validation).mean_squared_error
-    return with_bands(result, [ValidatedModel(model, None, error)], "none", model.maximum_lag, steps)
+    return with_bands(result, [ValidatedModel(model, _CRITERION, error)], "none", model.maximum_lag, steps)
 
 
 def _estimate(
@@ -72,6 +76,6 @@ def _estimate(
         if number > 1 and steps.skip("estimation from further starting models"):
             return
         steps.report(f"estimation from starting model {number}", 0.0)
-        refined = refine(start, record, None, max_steps=_STEPS)
+        refined = refine(start, record, _CRITERION.interval, max_steps=_STEPS)
         if not isinstance(refined, EvaluationOutcome) and isfinite(refined.after):
             yield refined.after, refined.model

@@ -9,7 +9,13 @@ from typing import Protocol, TypeAlias, TypeVar
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.estimate import FittedStructure, estimate
-from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimator_table import (
+    LEAST_SQUARES,
+    OUTPUT_ERROR,
+    Criterion,
+    make_criterion,
+    refinement_criterion,
+)
 from islands.estimation.estimators import estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import Refinement, begin_refinement, refine
@@ -88,7 +94,10 @@ def select_final_models(
             model = candidate.model
             if model.standard_errors is None and not steps.skip("standard errors"):
                 model = _with_standard_errors(candidate, settings, split.estimation)
-            assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
+            assessment = assess(
+                *(model, split, settings.shooting, settings.maximum_lag, settings.constraints),
+                candidate.criterion,
+            )
             if _is_valid(assessment, settings):
                 kept.append(assessment)
                 break
@@ -114,11 +123,11 @@ def _with_standard_errors(candidate: Candidate, settings: Settings, record: Data
     """Return the model with standard errors; most candidates do not need them, so they have none."""
     model = candidate.model
     limits = settings.constraints, settings.maximum_lag
-    if candidate.interval == 1:
+    if candidate.criterion.interval == 1:
         estimated = estimate(require_narx(model).regressors, record, *limits)
         if not isinstance(estimated, EvaluationOutcome) and estimated.model.parameters == model.parameters:
             return estimated.model
-    refined = refine(model, record, candidate.interval, *limits, max_steps=0)
+    refined = refine(model, record, candidate.criterion.interval, *limits, max_steps=0)
     return model if isinstance(refined, EvaluationOutcome) else refined.model
 
 
@@ -173,7 +182,7 @@ def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Can
     ):
         return []
     models = [each.model for each in library.fit_simulations(split.estimation, settings.max_terms)]
-    return _without_diverged(_validate(models, None, split.validation, settings.maximum_lag))
+    return _without_diverged(_validate(models, OUTPUT_ERROR, split.validation, settings.maximum_lag))
 
 
 def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[Individual, ...]:
@@ -255,7 +264,7 @@ def _estimate_models(
     if settings.estimator and not steps.skip(f"estimator {settings.estimator}"):
         return keep(_estimate_with_choice(fitted, settings, split))
     estimated = [each.model for each in fitted]
-    validated = keep(_validate(estimated, 1, split.validation, settings.maximum_lag))
+    validated = keep(_validate(estimated, LEAST_SQUARES, split.validation, settings.maximum_lag))
     if settings.refine and not steps.skip(_REFINEMENT):
         interval = FITNESSES[settings.fitness](settings.shooting)
         refined = keep(_refine(estimated, interval, settings, split, steps))
@@ -281,8 +290,8 @@ def _estimate_with_choice(fitted: list[FittedStructure], settings: Settings, spl
         for start in fitted
     )
     models = [each.model for each in found if not isinstance(each, EvaluationOutcome)]
-    interval = ESTIMATORS[settings.estimator].interval(settings.shooting)
-    return _validate(models, interval, split.validation, settings.maximum_lag)
+    criterion = make_criterion(settings.estimator, settings.shooting)
+    return _validate(models, criterion, split.validation, settings.maximum_lag)
 
 
 def _refine(
@@ -295,13 +304,14 @@ def _refine(
     """
     limits = settings.constraints, settings.maximum_lag
     stop = partial(steps.skip, _REFINEMENT)
+    criterion = refinement_criterion(interval)
 
     def begin(model: DynamicModel) -> Refinement[DynamicModel] | None:
         begun = None if stop() else begin_refinement(model, split.estimation, interval, *limits)
         return None if isinstance(begun, EvaluationOutcome) else begun
 
     def validate(entry: Refinement[DynamicModel]) -> Candidate:
-        (validated,) = _validate([entry.model], interval, split.validation, settings.maximum_lag)
+        (validated,) = _validate([entry.model], criterion, split.validation, settings.maximum_lag)
         return validated
 
     left: list[Candidate] = []
@@ -322,11 +332,11 @@ def _refine(
 
 
 def _validate(
-    models: Iterable[DynamicModel], interval: int | None, validation: Dataset, warm_up: int
+    models: Iterable[DynamicModel], criterion: Criterion, validation: Dataset, warm_up: int
 ) -> list[Candidate]:
     """Simulate models on the validation data and return them, least error first."""
     validated = (
-        ValidatedModel(model, interval, simulate_freely(model, validation, warm_up).mean_squared_error)
+        ValidatedModel(model, criterion, simulate_freely(model, validation, warm_up).mean_squared_error)
         for model in models
     )
     return sorted(validated, key=lambda entry: entry.order)

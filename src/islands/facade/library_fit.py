@@ -12,7 +12,7 @@ from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError, check_integers, lookup
-from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimator_table import ESTIMATORS, OUTPUT_ERROR, make_criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
     Structure,
@@ -251,21 +251,18 @@ def fit_library(
         "shooting": shooting,
     }
     result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
-    minimised = ESTIMATORS[settings.estimator].interval(interval)
-    estimates = [
-        ValidatedModel(
-            entry.model,
-            None if entry in simulated else minimised,
-            entry.metrics["validation"]["free_run"].rmse ** 2,
-        )
-        for entry in models
-    ]
+    estimates = [_as_candidate(entry) for entry in models]
 
     def report_again(text: str, _fraction: float | None = None, /) -> None:
         progress(text, None)  # the fraction never falls
 
     refit = partial(fit_library, record, start, library, settings, seed, report_again, stop)
     return LibraryFit(result, samples, estimates, warm_up, searches, started, refit, steps)
+
+
+def _as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
+    assert entry.criterion is not None, "the models of a fit are estimated"
+    return ValidatedModel(entry.model, entry.criterion, entry.metrics["validation"]["free_run"].rmse ** 2)
 
 
 def _estimate(
@@ -281,6 +278,7 @@ def _estimate(
     Once a stop is requested, only the last structure of every size that has no model is estimated.
     """
     constraints, interval = swaps.constraints, swaps.shooting
+    criterion = make_criterion(settings.estimator, interval)
     found: list[Assessment | EvaluationOutcome | None] = [None] * len(structures)
     by_size: dict[int, list[int]] = {}
     for place, (structure, _) in enumerate(structures):
@@ -302,7 +300,7 @@ def _estimate(
             if isinstance(estimated, EvaluationOutcome):
                 found[place] = estimated
             elif estimated.model.size <= settings.max_terms:
-                found[place] = assess(estimated.model, split, interval, warm_up, constraints)
+                found[place] = assess(estimated.model, split, interval, warm_up, constraints, criterion)
 
     sizes = map_over_record(estimate_size, by_size, split.estimation.samples)
     for done, size in enumerate(by_size):
@@ -335,7 +333,7 @@ def _fit_simulations(
     if steps.skip("linear models of the free run"):
         return []
     return [
-        assess(found.model, split, swaps.shooting, warm_up, library.constraints)
+        assess(found.model, split, swaps.shooting, warm_up, library.constraints, OUTPUT_ERROR)
         for found in library.fit_simulations(split.estimation, settings.max_terms)
     ]
 

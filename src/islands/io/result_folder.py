@@ -13,6 +13,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.split import measure_input_ranges
+from islands.estimation.estimator_table import Criterion
 from islands.evolution.search_result import SearchResult
 from islands.inspection.noise import measure_output_noise
 from islands.io.certificates import certificates_document
@@ -148,6 +149,7 @@ def _model_document(
             part: {name: asdict(value) for name, value in by_name.items()}
             for part, by_name in assessment.recordings.items()
         },
+        "criterion": criterion_document(assessment.criterion),
         "warm_up": assessment.warm_up,
         "estimated_start": assessment.has_estimated_start,
         "information": asdict(assessment.information),
@@ -159,6 +161,11 @@ def _model_document(
         "residual_tests": residual_tests_document(assessment.residual_tests)
         | residual_structure_document(assessment.residual_structure),
     }
+
+
+def criterion_document(criterion: Criterion | None) -> dict[str, Any] | None:
+    """Return the error that the parameters of a model minimise as JSON values; null if they are given."""
+    return None if criterion is None else {**asdict(criterion), "error": criterion.error}
 
 
 def terms_in_result(model: AnyModel, ensemble: Ensemble | None) -> list[dict[str, Any]]:

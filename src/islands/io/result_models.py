@@ -1,4 +1,4 @@
-"""What a model file or a reader of results needs of ``result.json``: outputs, shooting, preprocessing."""
+"""What readers need of ``result.json``: outputs, shooting, criterion, preprocessing."""
 
 import json
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from typing import Any
 
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
+from islands.estimation.estimator_table import Criterion
 
 
 def check_single_output(document: Mapping[str, Any], folder: Path) -> None:
@@ -29,6 +30,13 @@ def read_shooting_interval(document: Mapping[str, Any]) -> int:
     # Results of earlier versions had intervals of as many means as the setting has samples.
     preprocessing = document.get("preprocessing", {})
     return int(preprocessing.get("shooting_interval", document["settings"]["shooting"]))
+
+
+def read_criterion(entry: Mapping[str, Any]) -> Criterion | None:
+    """Return the error that the parameters of a model minimise; None if its entry does not state it."""
+    # Results of earlier versions have no criterion.
+    found = entry.get("criterion")
+    return None if found is None else Criterion(found["estimator"], found["interval"])
 
 
 def read_preprocessing(model_file: str | Path) -> Preprocessing | None:

@@ -12,6 +12,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
+from islands.estimation.estimator_table import Criterion
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.models.protocol import DynamicModel
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
@@ -94,6 +95,8 @@ class Assessment:
         part as the scale of the MAPE. Empty for a part that consists of one recording.
     bands : PredictionBands or None
         Prediction bands of the free run. None without an ensemble, or if its free runs diverge.
+    criterion : Criterion or None
+        Error that the parameters minimise. None if they are given.
     """
 
     model: DynamicModel
@@ -106,6 +109,7 @@ class Assessment:
     constraints: tuple[ConstraintCheck, ...] = ()
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
     bands: PredictionBands | None = None
+    criterion: Criterion | None = None
 
     @property
     def physics(self) -> PhysicsChecks:
@@ -132,7 +136,12 @@ class Assessment:
 
 
 def assess(
-    model: DynamicModel, split: Split, shooting: int, warm_up: int | None = None, constraints: str = "none"
+    model: DynamicModel,
+    split: Split,
+    shooting: int,
+    warm_up: int | None = None,
+    constraints: str = "none",
+    criterion: Criterion | None = None,
 ) -> Assessment:
     """Assess a model on the estimation data and the validation data.
 
@@ -146,6 +155,8 @@ def assess(
         Number of samples before the first prediction. None is the model's largest lag.
     constraints : str
         Constraints under which the parameters were estimated.
+    criterion : Criterion or None
+        Error that the parameters minimise. None if they are given.
 
     Raises
     ------
@@ -188,6 +199,7 @@ def assess(
         _compute_squared_errors(split.validation, runs["validation"]["free_run"]),
         check_constraints(model, constraints),
         recordings,
+        criterion=criterion,
     )
 
 

@@ -23,6 +23,7 @@ from islands.data.coupled_record import AnyRecord, CoupledSplit
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
+from islands.estimation.estimator_table import Criterion
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
@@ -61,16 +62,15 @@ class ValidatedModel(Generic[M]):
     Attributes
     ----------
     model : DynamicModel or CoupledModel
-    interval : int or None
-        Shooting interval of the error that its parameters minimise, in samples: 1 for least squares, None for
-        the free run.
+    criterion : Criterion
+        Error that its parameters minimise.
     error : float
         Mean squared error of the free run on the validation data (see `mean_squares`); not finite if it
         diverged.
     """
 
     model: M
-    interval: int | None
+    criterion: Criterion
     error: float
 
     @property
@@ -232,7 +232,9 @@ def make_ensemble(
             return None
         model, count = candidate.model, max(1, round(MEMBERS * weight))
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
-        drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)
+        drawn = draw_parameters(
+            model, split.estimation, candidate.criterion.interval, constraints, warm_up, count, rng
+        )
         # The divergence of a member gives NaN, which is not plausible either.
         started = estimate_initial_outputs(model, split.validation, warm_up)
         predicted = find_predicted(free_run(model, started, warm_up).y)

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from islands.data.coupled_record import CoupledSplit
+from islands.estimation.estimator_table import refinement_criterion
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.progress import Steps
@@ -15,6 +16,9 @@ from islands.validation.prediction_bands import PredictionBands, calibrate_outpu
 
 #: Name of the step.
 _BANDS = "prediction bands"
+
+#: Error whose block bootstrap gives the parameters of the members.
+_CRITERION = refinement_criterion(None)
 
 
 def make_bands(
@@ -54,7 +58,7 @@ def make_bands(
     steps.report(_BANDS, 1.0)
     skip = partial(steps.skip, _BANDS)
     candidates = [
-        ValidatedModel(each, None, _validate(each, data, warm_up))
+        ValidatedModel(each, _CRITERION, _validate(each, data, warm_up))
         for each in _list_rivals(model, ranked, ranks)
     ]
     ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip, model)

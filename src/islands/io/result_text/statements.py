@@ -4,7 +4,6 @@ Each statement has a name, a predicate on the document and a sentence. Every tex
 them, so that a run, its folder, the REST service, the report and a notebook state the same.
 """
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -54,9 +53,6 @@ _UNLIKELY = 0.5
 #: Closure of a loop, in per cent of the output range, above which the loop is open.
 _OPEN_PERCENT = 5.0
 
-#: Regressor that is linear in the signals, or a constant.
-_SIGNAL = re.compile(r"[uy]\d*\(k[^()]*\)|[-\d.]+")
-
 #: Where to look for missing terms, by correlation test.
 _HINTS = {
     "xi_xi": "terms in past outputs (larger lags, other powers), or a model of coloured noise",
@@ -64,6 +60,15 @@ _HINTS = {
     "xi_xiu": "products of past outputs and {input}",
     "u2_xi": "even terms in {input}, such as squares or absolute values",
     "u2_xi2": "terms that grow with {input}, because the size of the residual depends on it",
+}
+
+#: Estimators of the parameters, by the name of the criterion.
+_ESTIMATES = {
+    "least-squares": "least squares of the error one step ahead",
+    "extended-least-squares": "least squares of the error one step ahead, with a model of the noise",
+    "shooting": "least error of simulations over {interval} samples",
+    "free-run": "least error of the free run",
+    "output-error": "least error of the free run and its initial state (linear output-error model)",
 }
 
 #: Values of a JSON object.
@@ -279,20 +284,19 @@ class ResultFacts(RunFacts):
         return bounded and bool(self.physics["property_1"] or not self.requires_property_1)
 
     @property
+    def criterion(self) -> Document:
+        """Error that the parameters minimise. Empty in results of earlier versions."""
+        return self.model.get("criterion") or {}
+
+    @property
     def has_output_noise(self) -> bool:
         """Whether least squares is biased by noise of the measured output.
 
         The measured past then makes the prediction one step ahead worse than an adequate free run.
         """
-        # Linear models that minimise the error of the free run are among the candidates.
-        if self.document["settings"].get("estimator") != "least-squares" or self._is_linear:
+        if self.criterion.get("estimator") != "least-squares":
             return False
         return self.is_unpredictable and all(map(self._is_free_run_better, ("estimation", "validation")))
-
-    @property
-    def _is_linear(self) -> bool:
-        """Whether every term is a signal or a constant."""
-        return all(_SIGNAL.fullmatch(term["regressor"]) for term in self.model["terms"])
 
     def _is_free_run_better(self, part: str) -> bool:
         """Return whether the free run is clearly better than the prediction one step ahead."""
@@ -483,6 +487,12 @@ def _describe_rate(facts: ResultFacts) -> str:
 def _describe_feedthrough(facts: ResultFacts) -> str:
     inputs = ", ".join(facts.document["preprocessing"]["feedthrough"])
     return f"Direct feedthrough: the output responds to {inputs} within the sample, so models read it at k."
+
+
+def _describe_criterion(facts: ResultFacts) -> str:
+    found = facts.criterion
+    text = _ESTIMATES[found["estimator"]].format(interval=found["interval"])
+    return f"Parameters: {text}{', under constraints' if facts.model['constraints'] else ''}."
 
 
 def _describe_error(facts: ResultFacts) -> str:
@@ -777,8 +787,9 @@ _REMARKS: Final[tuple[Statement[ResultFacts], ...]] = (
     ),
 )
 
-#: Measured errors, uncertainty, and what the model meets.
+#: Estimate of the parameters, measured errors, uncertainty, and what the model meets.
 MEASURES: Final[tuple[Statement[ResultFacts], ...]] = (
+    Statement("criterion", lambda facts: facts.criterion, _describe_criterion),
     Statement("error", lambda facts: facts.error()["rmse"] is not None, _describe_error),
     Statement(
         "divergence",
@@ -922,7 +933,7 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         lambda facts: (
             (facts.has_structure or facts.exceeds_noise)
             and not exceeds_limit(facts.share("one_step_ahead"))
-            and facts.document["settings"].get("estimator") != "free-run"
+            and facts.criterion.get("error", "free_run") != "free_run"
         ),
         lambda _: (
             "try an estimate that minimises the error of the free run "

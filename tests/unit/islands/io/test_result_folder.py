@@ -10,8 +10,10 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.estimation.estimator_table import Criterion
 from islands.io.models import read_model, terms_document
 from islands.io.result_folder import content_sha256, result_document, result_json, write_result
+from islands.io.result_models import read_criterion
 from islands.io.result_text.summary_text import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
 from support.assessments import with_changes
@@ -72,6 +74,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
             *(
                 "outcomes",
                 "recordings",
+                "criterion",
                 "warm_up",
                 "estimated_start",
                 "information",
@@ -92,6 +95,25 @@ def test_a_result_has_every_field_of_the_contract(findings):
         text = "hysteresis"
         assert check == {"text": text, "target": 0.0, "value": check["value"], "met": True, "named": text}
         assert check["value"] <= 1e-9
+
+
+def test_a_result_states_the_error_that_the_parameters_minimise(findings):
+    squares = {"estimator": "least-squares", "interval": 1, "error": "one_step_ahead"}
+    assert all(model["criterion"] == squares for model in loaded(findings)["models"])
+    given = with_best(findings, criterion=None)
+    assert loaded(given)["models"][0]["criterion"] is None
+    criteria = {
+        ("shooting", 500): "multiple_shooting",
+        ("free-run", None): "free_run",
+        ("output-error", None): "free_run",
+    }
+    for (estimator, interval), error in criteria.items():
+        found = with_best(findings, criterion=Criterion(estimator, interval))
+        expected = {"estimator": estimator, "interval": interval, "error": error}
+        entry = loaded(found)["models"][0]
+        assert entry["criterion"] == expected
+        assert read_criterion(entry) == Criterion(estimator, interval)
+    assert read_criterion({}) is None
 
 
 def test_a_result_names_the_recommended_model_with_reasons(findings):

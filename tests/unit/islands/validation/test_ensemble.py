@@ -9,6 +9,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.estimation.estimate import estimate
+from islands.estimation.estimator_table import LEAST_SQUARES
 from islands.expressions.parsing import parse
 from islands.facade.fit import fit
 from islands.models.regressor import regressor
@@ -36,7 +37,7 @@ def parts(noise=0.0, samples=500, seed=0):
 
 def candidate(texts, data):
     model = estimate([term(text) for text in texts], data.estimation, "none", 2).model
-    return ValidatedModel(model, 1, free_run(model, data.validation, 2).mean_squared_error)
+    return ValidatedModel(model, LEAST_SQUARES, free_run(model, data.validation, 2).mean_squared_error)
 
 
 def ensemble(data, structures=STRUCTURES, seed=0):
@@ -145,7 +146,9 @@ def test_errors_on_a_constant_output_of_zero_are_weighed() -> None:
     resting = replace(data, validation=replace(data.validation, y=np.zeros(data.validation.samples)))
     exact, other = (candidate(texts, data).model for texts in STRUCTURES[:2])
     made = make_ensemble(
-        [ValidatedModel(exact, 1, 0.0), ValidatedModel(other, 1, 5.0)], resting, "none", 2, seed=0
+        [ValidatedModel(exact, LEAST_SQUARES, 0.0), ValidatedModel(other, LEAST_SQUARES, 5.0)],
+        *(resting, "none", 2),
+        seed=0,
     )
     assert [structure.weight for structure in made.structures] == [1.0]
 

@@ -10,6 +10,13 @@ import islands
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import command_line_names
+from islands.estimation.estimator_table import (
+    ESTIMATORS,
+    LEAST_SQUARES,
+    OUTPUT_ERROR,
+    Criterion,
+    make_criterion,
+)
 from islands.expressions.parsing import parse
 from islands.io.result_folder import result_document
 from islands.io.result_text import statements
@@ -77,7 +84,7 @@ def test_the_method_has_settings_numbers_and_all_equations(findings):
 
 
 def test_the_equation_has_the_names_and_units_of_the_record(findings):
-    first, text, units, error, *_ = describe(findings)
+    first, text, units, _parameters, error, *_ = describe(findings)
     rank, size = findings.recommendation.rank, findings.recommended.model.size
     assert first.startswith(f"Recommended: model {rank} of 4, size {size}: ")
     assert text.strip().startswith("y_um(k) = y_um(k-1) ")
@@ -225,6 +232,40 @@ def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
     free = Metrics(1.0, 0.99, 2.0, 90.0)
     disturbed = said(findings, metrics=errors(findings, free), residual_structure=white)
     assert "estimate with --estimator" not in disturbed["Next"]
+
+
+@pytest.mark.parametrize(
+    ("criterion", "expected"),
+    [
+        (LEAST_SQUARES, "least squares of the error one step ahead"),
+        (Criterion("shooting", 500), "least error of simulations over 500 samples"),
+        (OUTPUT_ERROR, "least error of the free run and its initial state (linear output-error model)"),
+        *((make_criterion(name, 500), "least") for name in ESTIMATORS),
+    ],
+)
+def test_the_error_that_the_parameters_minimise_is_stated(findings, criterion, expected):
+    stated = said(findings, criterion=criterion)["Parameters"]
+    assert stated.startswith(f"Parameters: {expected}")
+    assert stated.endswith(", under constraints.")
+    assert "constraints" not in said(findings, criterion=criterion, constraints=())["Parameters"]
+
+
+def test_a_free_run_estimate_is_no_advice_for_a_model_that_has_it(findings):
+    drifting = ResidualStructure(0.02, 0.939, 5.0, "inadequate")
+    for criterion in (LEAST_SQUARES, Criterion("shooting", 500)):
+        advice = said(findings, residual_structure=drifting, criterion=criterion)["Next"]
+        assert "try an estimate that minimises the error of the free run" in advice
+    for criterion in (OUTPUT_ERROR, Criterion("free-run", None)):
+        assert "--estimator" not in said(findings, residual_structure=drifting, criterion=criterion)["Next"]
+
+
+def test_a_result_of_an_earlier_version_states_no_criterion(findings):
+    document = result_document(findings)
+    for entry in document["models"]:
+        del entry["criterion"]
+    text = " ".join(statements.describe(document))
+    assert "Parameters:" not in text
+    assert "--estimator" not in text
 
 
 def with_noise(findings, noise, **changes):
