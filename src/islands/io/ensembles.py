@@ -25,7 +25,7 @@ from islands.validation.prediction_bands import PredictionBands
 class StructureDocument(BaseModel):
     """A structure of an ensemble: its weight, its terms or its model, and the parameters of its members.
 
-    ``law`` is the position of the shorter structure with the same free run, if there is one.
+    ``law`` is the position of the structure with the same free run that this one counts as, if there is one.
     """
 
     model_config = ConfigDict(frozen=True)

@@ -8,8 +8,8 @@ penalty of the size is necessary for inclusion probabilities. Without it the lar
 equal errors has the same weight, and terms that are not in the law of the system have probabilities of up to
 one half.
 
-Structures with equal free runs state one law: ``y(k) = 0.9 y(k-1) + u(k-1)`` is also ``y(k) = 0.81 y(k-2) +
-u(k-1) + 0.9 u(k-2)``. In inclusion probabilities, the longer one counts as the shorter one.
+Structures with equal free runs state one law (see `find_laws`). In inclusion probabilities, they count as one
+of them: the shortest, and of equal sizes the recommended one.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,6 +28,7 @@ from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run, free_runs
+from islands.validation.equal_laws import ROUNDING, find_laws
 
 M = TypeVar("M", bound=AnyModel)
 
@@ -40,13 +41,6 @@ _MIN_WEIGHT = 0.5 / MEMBERS
 #: A member is left out if the squared error of its free run on the validation data exceeds that of its
 #: structure by this factor: a replicate is a linear step, which may leave the stable models.
 _IMPLAUSIBLE = 4.0
-
-#: Two free runs are equal if the mean square of their difference is at most this fraction of that of the
-#: residual: the limit below which the predictable part of a residual is negligible.
-_EQUAL_SHARE = 0.1
-
-#: Errors below this fraction of the output range are rounding errors and are equal.
-_ROUNDING = 1e-9
 
 #: Fraction of the weight within the spread of an ensemble.
 _INSIDE = 0.9
@@ -97,7 +91,7 @@ class EnsembleStructure:
     parameters : ndarray, shape (members, terms)
         Parameters of the members.
     law : int or None
-        Position in the ensemble of a shorter structure with the same free run, whose terms count in place of
+        Position in the ensemble of another structure with the same free run, whose terms count in place of
         those of this one. None if there is none.
     """
 
@@ -226,7 +220,7 @@ def make_ensemble(
     floor = _error_floor(split.validation)
     best = _best_of_each_structure(candidates)
     kept = _weigh(best, split.validation, floor, warm_up, recommended)
-    laws = _find_laws([candidate.model for candidate, _ in kept], split.validation, warm_up)
+    laws = find_laws([candidate.model for candidate, _ in kept], split.validation, warm_up, recommended)
     for position, ((candidate, weight), law) in enumerate(zip(kept, laws, strict=True)):
         if skip():
             return None
@@ -272,7 +266,7 @@ def mean_squares(
         return squares
     ranges = np.array([each.output_range or 1.0 for each in record.records])
     # Errors by rounding are equal.
-    relative: NDArray[np.float64] = np.exp(np.log(squares / ranges / ranges + _ROUNDING**2).mean(axis=1))
+    relative: NDArray[np.float64] = np.exp(np.log(squares / ranges / ranges + ROUNDING**2).mean(axis=1))
     return relative
 
 
@@ -284,7 +278,7 @@ def find_predicted(y: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _error_floor(record: AnyRecord) -> float:
     scale = record.output_range if isinstance(record, Dataset) else 1.0
-    return (_ROUNDING * scale) ** 2
+    return (ROUNDING * scale) ** 2
 
 
 def _best_of_each_structure(candidates: Sequence[ValidatedModel[M]]) -> list[ValidatedModel[M]]:
@@ -294,40 +288,6 @@ def _best_of_each_structure(candidates: Sequence[ValidatedModel[M]]) -> list[Val
         if np.isfinite(candidate.error):
             found.setdefault(candidate.model.parameter_names, candidate)
     return list(found.values())
-
-
-def _find_laws(models: Sequence[AnyModel], record: AnyRecord, warm_up: int) -> list[int | None]:
-    """Return the position of a shorter model with the same free run for every model; None if there is none.
-
-    A model that contains all terms of the shorter one is another law: it states a further effect.
-    """
-    runs = [simulate_freely(model, record, warm_up).y for model in models]
-    ranges = (
-        np.array(record.output_range)
-        if isinstance(record, Dataset)
-        else np.array([each.output_range for each in record.records])
-    )
-
-    def compare(at: int, shorter: int) -> float:
-        """Return the largest mean square of the difference, as a fraction of that of a residual."""
-        known = find_predicted(runs[at]) & find_predicted(runs[shorter])
-        residual = np.mean((record.y - runs[shorter])[known] ** 2, axis=0)
-        difference = np.mean((runs[at] - runs[shorter])[known] ** 2, axis=0)
-        return float(np.max(difference / (residual + (_ROUNDING * ranges) ** 2 + np.finfo(float).tiny)))
-
-    laws: list[int | None] = [None] * len(models)
-    for at in sorted(range(len(models)), key=lambda each: models[each].size):
-        terms = set(models[at].parameter_names)
-        compared = [
-            (compare(at, other), other)
-            for other, law in enumerate(laws)
-            if law is None
-            and models[other].size < models[at].size
-            and not terms.issuperset(models[other].parameter_names)
-        ]
-        nearest, shorter = min(compared, default=(np.inf, None))
-        laws[at] = shorter if nearest <= _EQUAL_SHARE else None
-    return laws
 
 
 def _weigh(
