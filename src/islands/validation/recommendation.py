@@ -6,6 +6,8 @@ Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984,
 differences. Blocks of the validation data take the correlation of the errors into account. Models with
 different warm-ups are compared over the samples that both predict. Decision 0017 compares rules.
 
+A model may be good on the validation data by chance. Its error on the estimation data is then large.
+
 The setting ``select`` can replace this rule by the paper's choice of Appendix A: the least training error.
 """
 
@@ -37,6 +39,10 @@ _NEAR = 1.0
 #: Drift of the output at the end of such a hold, in ranges, that is not stated.
 _STILL = 0.01
 
+#: Largest free-run error on the estimation data, relative to the least of the models that are as good on the
+#: validation data.
+LARGEST_ESTIMATION_RATIO = 1.5
+
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
 
@@ -67,14 +73,15 @@ def recommend(
     holds. Of these, the one with the least RMSE is the reference. A model is as good as the reference if its
     RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds
     it by at most 20 % and the mean squared errors differ by at most three standard errors. The standard error
-    is that of the mean difference over blocks of the validation data.
+    is that of the mean difference over blocks of the validation data. Of these models, those whose free-run
+    error on the estimation data exceeds 1.5 times the least of them are passed over.
 
     Parameters
     ----------
     sizes : sequence of int
         Numbers of terms, in the order of the ranks.
     assessments : sequence of Assessment
-        Assessments on the same validation data, best first.
+        Assessments on the same estimation data and validation data, best first.
     hysteresis : bool
         Whether models need Property 1.
     unit : str
@@ -89,11 +96,12 @@ def recommend(
     candidates = sound or bounded
     best = min(candidates, key=lambda at: (_rmse(assessments[at]), at))
     equal = [at for at in candidates if _is_as_good(assessments[at], assessments[best])]
-    chosen = min(equal, key=lambda at: (sizes[at], at))
+    kept = _pass_over(equal, assessments)
+    chosen = min(kept, key=lambda at: (sizes[at], at))
     return Recommendation(
         chosen + 1,
         (
-            _describe_choice(chosen, best, len(equal), assessments, unit),
+            _describe_choice(chosen, best, len(equal), len(kept), assessments, unit),
             _describe_physics(bool(sound), hysteresis, assessments[chosen].physics),
         ),
     )
@@ -150,6 +158,24 @@ def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
         return bool(error <= (1.0 + LARGEST_EXCESS) * smallest and excess.mean() <= uncertainty)
 
 
+def _pass_over(equal: Sequence[int], assessments: Sequence[Assessment]) -> list[int]:
+    """Return the models whose error on the estimation data is close to the least of them."""
+    errors = {at: _estimation_error(assessments[at]) for at in equal}
+    limit = LARGEST_ESTIMATION_RATIO * min(errors.values())
+    return [at for at, error in errors.items() if error <= limit]
+
+
+def _estimation_error(entry: Assessment) -> float:
+    """Return the free-run error on the estimation data relative to the standard deviation of the output.
+
+    Infinite after a divergence. Errors up to rounding are equal, and those of a constant output.
+    """
+    found = entry.metrics["estimation"]["free_run"]
+    if isnan(found.rmse):
+        return inf
+    return ROUNDING if isnan(found.fit_percent) else max(ROUNDING, 1.0 - found.fit_percent / 100.0)
+
+
 def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean squared errors of two models on blocks of the samples that both predict.
 
@@ -178,13 +204,21 @@ def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> 
     return errors[~(np.isnan(errors) | np.isnan(others[at]))]
 
 
-def _describe_choice(chosen: int, best: int, count: int, assessments: Sequence[Assessment], unit: str) -> str:
+def _describe_choice(
+    chosen: int, best: int, equal: int, kept: int, assessments: Sequence[Assessment], unit: str
+) -> str:
+    """State the choice among a number of equal models, of which some are kept for the estimation data."""
     error, least = (f"{_rmse(assessments[at]):.4g} {unit}".rstrip() for at in (chosen, best))
     if chosen == best:
-        return f"least free-run error on the validation data, RMSE {error}; no smaller model is as good"
+        both = " on both parts of the data" if kept < equal else ""
+        return f"least free-run error on the validation data, RMSE {error}; no smaller model is as good{both}"
+    exception = (
+        f", without {equal - kept} with more than {LARGEST_ESTIMATION_RATIO:g} times the least error of these"
+        " on the estimation data"
+    )
     return (
-        f"smallest of {count} models whose free-run errors on the validation data do not differ "
-        f"significantly from the least: RMSE {error}, least {least}"
+        f"smallest of {equal} models whose free-run errors on the validation data do not differ "
+        f"significantly from the least{exception if kept < equal else ''}: RMSE {error}, least {least}"
     )
 
 

@@ -29,6 +29,7 @@ class Candidate:
     trained: float = nan
     ranges: float = 0.0
     drift: float = 0.0
+    estimated: float = 0.01
 
     def assessment(self):
         physics = PhysicsChecks(
@@ -46,7 +47,10 @@ class Candidate:
         return Assessment(
             None,
             {
-                "estimation": {"one_step_ahead": Metrics(nan, nan, self.trained, nan)},
+                "estimation": {
+                    "one_step_ahead": Metrics(nan, nan, self.trained, nan),
+                    "free_run": Metrics(nan, nan, self.estimated, 100.0 * (1.0 - self.estimated)),
+                },
                 "validation": {"free_run": Metrics(nan, nan, rmse, nan)},
             },
             {"validation": {"free_run": OK if known else LOST}},
@@ -93,9 +97,42 @@ def test_an_uncertain_excess_of_twenty_per_cent_justifies_a_term(excess, size):
     assert chosen(Candidate(3, blocks), Candidate(9, NOISE)) == size
 
 
+@pytest.mark.parametrize(("estimated", "size"), [(0.0149, 3), (0.0151, 4), (0.2, 4), (nan, 4)])
+def test_a_model_that_is_as_good_on_the_validation_data_alone_is_passed_over(estimated, size):
+    by_chance = Candidate(3, NOISE, estimated=estimated)
+    assert chosen(by_chance, Candidate(4, NOISE), Candidate(9, NOISE)) == size
+
+
+def test_the_least_validation_error_by_chance_is_passed_over():
+    lucky = Candidate(3, 0.99 * NOISE, estimated=0.2)
+    entries = [lucky.assessment(), Candidate(4, NOISE).assessment()]
+    found = recommend([3, 4], entries, False, "um")
+    assert found.rank == 2
+    least, error = (sqrt(np.mean(blocks)) for blocks in (0.99 * NOISE, NOISE))
+    assert found.reasons[0] == (
+        "smallest of 2 models whose free-run errors on the validation data do not differ significantly from "
+        "the least, without 1 with more than 1.5 times the least error of these on the estimation data: "
+        f"RMSE {error:.4g} um, least {least:.4g} um"
+    )
+    found = recommend([3, 4], entries[::-1], False)
+    assert "no smaller model is as good" not in found.reasons[0]
+    lucky = Candidate(3, NOISE, estimated=0.2).assessment()
+    found = recommend([4, 3], [Candidate(4, 0.99 * NOISE).assessment(), lucky], False)
+    assert found.reasons[0].endswith("; no smaller model is as good on both parts of the data")
+
+
+def test_the_estimation_data_do_not_justify_a_larger_validation_error():
+    assert chosen(Candidate(3, NOISE, estimated=0.2), Candidate(4, 4 * NOISE)) == 3
+
+
+def test_no_model_is_passed_over_if_all_diverge_on_the_estimation_data():
+    assert chosen(Candidate(3, NOISE, estimated=nan), Candidate(4, NOISE, estimated=nan)) == 3
+
+
 def test_rounding_errors_of_exact_models_do_not_matter():
     tiny = np.full(20, 1e-32)
-    assert chosen(Candidate(2, NOISE), Candidate(3, 1e4 * tiny), Candidate(8, 0 * tiny)) == 3
+    exact = Candidate(3, 1e4 * tiny, estimated=1e-13), Candidate(8, 0 * tiny, estimated=1e-15)
+    assert chosen(Candidate(2, NOISE), *exact) == 3
 
 
 def test_a_model_that_diverges_beyond_the_record_is_not_recommended():
