@@ -6,7 +6,7 @@ import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.kernels.linear_filter import filter_linearly, low_pass_cubic
+from islands.kernels.linear_filter import divide_rows, filter_linearly, low_pass_cubic
 
 signals = st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=60).map(np.array)
 
@@ -30,3 +30,21 @@ def test_a_low_pass_filters_the_weighted_neighbours(x, weights, decay):
     moved = np.convolve(seen, weights[::-1], mode="valid")
     expected = np.append(x[0], scipy.signal.lfilter([1.0], [1.0, -decay], moved) + x[0])
     assert np.array_equal(low_pass_cubic(x, weights, decay), expected)
+
+
+@pytest.mark.parametrize("series", [1, 3, 4, 6])
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_every_segment_of_every_series_is_divided_from_rest(series, order):
+    rng = np.random.default_rng(series + 10 * order)
+    a, x, ends = np.poly(rng.uniform(-0.9, 0.9, order))[1:], rng.normal(size=(series, 300)), np.array([2, 120, 300])
+    divided = divide_rows(a, x, ends)
+    for first, last in zip([0, *ends[:-1]], ends, strict=True):
+        expected = scipy.signal.lfilter([1.0], np.append(1.0, a), x[:, first:last])
+        np.testing.assert_allclose(divided[:, first:last], expected, rtol=0, atol=1e-13)
+
+
+def test_bits_of_a_divided_series_do_not_depend_on_the_others():
+    rng = np.random.default_rng(0)
+    a, x, ends = np.array([-1.5, 0.7]), rng.normal(size=(7, 200)), np.array([80, 200])
+    alone = [divide_rows(a, x[row : row + 1], ends)[0] for row in range(7)]
+    assert np.array_equal(divide_rows(a, x, ends), alone)

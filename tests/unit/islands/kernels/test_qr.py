@@ -94,6 +94,30 @@ def test_unit_of_a_column_changes_only_the_triangle(size):
         assert np.array_equal(left, right)
 
 
+@pytest.mark.parametrize("rows", [10, 257, 1000])
+def test_rows_of_zeros_before_and_after_change_no_bit(rows):
+    matrix, target = random(5, rows)
+    added = np.zeros((5, 512))
+    here = factored(matrix, target)
+    there = factored(np.hstack([added, matrix, added]), np.hstack([added[0], target, added[0]]))
+    for place in (0, 3):
+        assert np.array_equal(there[place][..., 512 : 512 + rows], here[place])
+    assert np.array_equal(there[1], here[1])
+    assert np.array_equal(there[2], here[2])
+
+
+def test_columns_of_one_segment_each_become_orthonormal_with_columns_of_all():
+    matrix, target = random(8, 1500)
+    for column, (first, last) in enumerate([(0, 700), (1, 700), (700, 1100), (702, 1100), (1100, 1500)]):
+        matrix[column, :first] = matrix[column, last:] = 0.0
+    q, triangle, projection, residual, dependent = factored(matrix, target)
+    assert dependent == -1
+    assert not triangle[:2, 2:5].any()
+    np.testing.assert_allclose(q @ q.T, np.eye(8), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(triangle.T @ q, matrix, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(projection @ q + residual, target, rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize("position", [0, 1, 4])
 def test_zero_column_is_reported(position):
     matrix, target = random(5, 300)
