@@ -20,9 +20,10 @@ def poles(model):
     return np.sort(np.roots([1.0, *(-lags[f"y(k-{lag})"] for lag in range(1, count + 1))]))
 
 
-def make_record(seed, numerator, denominator, noise, samples=600, offset=0.0):
+def make_record(seed, numerator, denominator, noise, samples=600, offset=0.0, rest=0):
     random = np.random.default_rng(seed)
     u = np.repeat(random.uniform(-1.0, 1.0, samples // 5), 5)
+    u[:rest] *= 1e-3
     y = offset + lfilter([0.0, *numerator], denominator, u)
     return Dataset(u, y + noise * random.standard_normal(samples), 0.1)
 
@@ -94,6 +95,25 @@ def test_estimate_is_the_minimum_of_the_refinement_of_the_free_run():
     # The refinement weights the first outputs differently: it takes them as measurements.
     assert refined.theta == pytest.approx(found.theta, rel=3e-3)
     assert refined.standard_errors == pytest.approx(found.standard_errors, rel=0.2)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("rest", [0, 6000])
+def test_estimate_of_a_long_record_is_its_minimum(rest):
+    record = make_record(5, [0.2, 0.1], [1.0, -1.6, 0.8], 0.2, 12_000, rest=rest)
+    found = next(each.model for each in fit_output_error(record) if each.model.size == 4)
+    refined = refine(found, record, None).model
+    shift = np.abs(np.subtract(refined.theta, found.theta)) / found.standard_errors
+    assert shift.max() < 0.05
+    assert found.theta == pytest.approx((1.6, -0.8, 0.2, 0.1), abs=0.01)
+
+
+@pytest.mark.ci
+def test_constant_that_only_many_samples_show_is_found():
+    record = make_tank(3, 12_000, 0.5)
+    drift = replace(record, y=record.y + 1e-4 * np.arange(12_000))
+    sizes = [fit_output_error(each)[0].model.size for each in (record, drift[:4000], drift)]
+    assert sizes == [2, 2, 3]
 
 
 @pytest.mark.ci
