@@ -7,7 +7,6 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.noise_model import NoiseModel
 from islands.diagnosis.planning.cause import Cause, CauseScale
 from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.diagnosis.planning.experiment import Experiment
@@ -16,6 +15,7 @@ from islands.diagnosis.planning.pair_separation import CausePair
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Signal
+from islands.estimation.noise_model import NoiseModel
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 

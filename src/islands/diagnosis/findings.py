@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.segments import count_runs
-from islands.diagnosis.calibration.noise_model import is_rounding_error
 from islands.diagnosis.gross_errors.explanation import GrossError
 from islands.diagnosis.gross_errors.record_finding import FAMILY, RecordFinding
 from islands.diagnosis.inference.confidence import CONFIDENCE_TEMPERATURE
@@ -14,6 +13,7 @@ from islands.diagnosis.inference.finding import Finding, Value
 from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.effects.interface.effect import Signal, SimulationContext
+from islands.estimation.noise_model import is_rounding_error
 
 
 def describe_gross_errors(errors: Sequence[GrossError]) -> tuple[Finding, ...]:

@@ -13,7 +13,6 @@ from islands.diagnosis.calibration.intersample_selection import (
     select_intersample,
 )
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
-from islands.diagnosis.calibration.noise_model import is_rounding_error
 from islands.diagnosis.calibration.preparation import (
     count_fitted_samples,
     make_target,
@@ -51,6 +50,7 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect
 from islands.errors import RecordError
+from islands.estimation.noise_model import is_rounding_error
 from islands.parallel import ParallelMap
 from islands.progress import Phase, PhasedProgress, ProgressCallback, ignore_progress
 from islands.simulators.context import make_context

@@ -6,12 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.diagnosis.calibration.noise_model import (
-    NoiseModel,
-    fit_noise,
-    fit_whitening,
-    white_noise,
-)
 from islands.diagnosis.calibration.problem import (
     CalibrationProblem,
     FittedPoint,
@@ -20,6 +14,12 @@ from islands.diagnosis.calibration.problem import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.effect import Signal
+from islands.estimation.noise_model import (
+    NoiseModel,
+    fit_noise,
+    fit_whitening,
+    white_noise,
+)
 from islands.simulators.extended import ExtendedSimulator
 
 #: Maximum number of accepted steps.

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.segments import find_bounds
-from islands.diagnosis.calibration.noise_model import NoiseModel
 from islands.effects.interface.effect import Signal
+from islands.estimation.noise_model import NoiseModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.segments import count_runs, map_segments, take_backward_differences
-from islands.diagnosis.calibration.noise_model import fit_noise
 from islands.effects.interface.effect import Signal, SimulationContext
+from islands.estimation.noise_model import fit_noise
 
 #: Number of random circular shifts that give the null distribution of a map.
 SHIFTS = 200

@@ -16,7 +16,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
     whiten_target,
 )
-from islands.diagnosis.calibration.noise_model import estimate_effective_samples
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, make_task_key
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.chance_gain import ForwardSelection
@@ -41,6 +40,7 @@ from islands.diagnosis.inference.verdict import (
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect
 from islands.effects.model_form import CORE_SHAPE
+from islands.estimation.noise_model import estimate_effective_samples
 from islands.parallel import memoised_map
 
 #: Beginning of the messages of a search that takes the residual for model error.

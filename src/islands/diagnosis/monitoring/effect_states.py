@@ -12,7 +12,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     estimate_covariance,
     whiten_target,
 )
-from islands.diagnosis.calibration.noise_model import NoiseModel
 from islands.diagnosis.calibration.preparation import (
     MIN_SAMPLES,
     make_target,
@@ -27,6 +26,7 @@ from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
 from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError
+from islands.estimation.noise_model import NoiseModel
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -6,8 +6,8 @@ from enum import StrEnum
 import numpy as np
 import scipy
 
-from islands.diagnosis.calibration.noise_model import NoiseModel, white_noise
 from islands.effects.interface.context import Signal
+from islands.estimation.noise_model import NoiseModel, white_noise
 
 
 class NoiseOrigin(StrEnum):

@@ -36,7 +36,11 @@ def test_a_low_pass_filters_the_weighted_neighbours(x, weights, decay):
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_every_segment_of_every_series_is_divided_from_rest(series, order):
     rng = np.random.default_rng(series + 10 * order)
-    a, x, ends = np.poly(rng.uniform(-0.9, 0.9, order))[1:], rng.normal(size=(series, 300)), np.array([2, 120, 300])
+    a, x, ends = (
+        np.poly(rng.uniform(-0.9, 0.9, order))[1:],
+        rng.normal(size=(series, 300)),
+        np.array([2, 120, 300]),
+    )
     divided = divide_rows(a, x, ends)
     for first, last in zip([0, *ends[:-1]], ends, strict=True):
         expected = scipy.signal.lfilter([1.0], np.append(1.0, a), x[:, first:last])

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from islands.diagnosis.calibration.fit_journal import FitJournal, RecordedFit, journal_from_document
-from islands.diagnosis.calibration.noise_model import NoiseModel
 from islands.diagnosis.calibration.starts_calibrator import (
     CalibratedStart,
     CalibrationTask,
@@ -18,6 +17,7 @@ from islands.diagnosis.calibration.starts_calibrator import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
+from islands.estimation.noise_model import NoiseModel
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.noise_model import estimate_effective_samples
 from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.chance_gain import ForwardSelection, compute_chance_gain, draw_noise
@@ -14,6 +13,7 @@ from islands.diagnosis.inference.screening import bic_penalty, screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
+from islands.estimation.noise_model import estimate_effective_samples
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput

@@ -5,7 +5,7 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
-from islands.diagnosis.calibration.noise_model import estimate_effective_samples, white_noise
+from islands.estimation.noise_model import estimate_effective_samples, white_noise
 
 N = 4000
 

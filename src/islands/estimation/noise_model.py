@@ -10,14 +10,13 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from islands.data.segments import find_bounds, map_segments
-from islands.effects.interface.effect import Signal
+from islands.data.segments import Signal, find_bounds, map_segments
 from islands.kernels.linear_filter import filter_linearly
 
 #: Maximum order of the autoregression.
 MAX_ORDER = 16
 
-#: Maximum order of the autoregression that whitens residuals in a calibration.
+#: Maximum order of the autoregression that whitens residuals in an estimation.
 WHITENING_ORDER = 3
 
 #: Orders of the fractional difference that are tried. Noise with a spectrum of 1/f has the order 0.5.
@@ -140,7 +139,7 @@ def fit_integrated_noise(residual: Signal, segments: Sequence[int] = ()) -> Nois
 
 
 def fit_whitening(residual: Signal, segments: Sequence[int] = ()) -> NoiseModel:
-    """Fit the noise model that whitens residuals in a calibration: an autoregression of low order.
+    """Fit the noise model that whitens residuals in an estimation: an autoregression of low order.
 
     The model of `fit_noise` decides between hypotheses. As a filter it can reduce the response to a jump to a
     few samples, and then a calibration does not find its instant.

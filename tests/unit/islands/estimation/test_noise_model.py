@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.diagnosis.calibration.noise_model import (
+from islands.estimation.noise_model import (
     NoiseModel,
     estimate_effective_samples,
     fit_noise,
