@@ -28,6 +28,20 @@ def make_record(seed, numerator, denominator, noise, samples=600, offset=0.0, re
     return Dataset(u, y + noise * random.standard_normal(samples), 0.1)
 
 
+def make_coloured_record(seed, samples=600):
+    """Return a resonance with noise whose resonance is near that of the system."""
+    record = make_record(seed, [0.1, 0.15], [1.0, -1.5, 0.7], 0.0, samples)
+    noise = lfilter(
+        [1.0], [1.0, -1.7, 0.9], np.random.default_rng(seed + 1000).standard_normal(samples + 200)
+    )
+    return replace(record, y=record.y + 0.05 * noise[200:])
+
+
+def fit_pair(record):
+    """Return the models of second order: that of the output error, and that of the whitened error."""
+    return [each for each in fit_output_error(record) if each.model.output_lag == 2]
+
+
 def test_poles_of_a_battery_are_found_where_least_squares_fails():
     record = advance_inputs(make_battery(3, 2000), [0])
     best = fit_output_error(record)[0]
@@ -123,6 +137,43 @@ def test_intervals_contain_the_true_parameters():
         found = fit_output_error(make_record(seed, true[2:], [1.0, -1.5, 0.7], 0.05))
         model = next(each.model for each in found if each.model.size == 4)
         inside.append(np.abs(np.subtract(model.theta, true)) <= 1.96 * np.array(model.standard_errors))
+    # Of 240 intervals with a probability of 0.95.
+    assert 0.9 < np.mean(inside) < 0.99
+
+
+def test_white_noise_gives_no_second_model():
+    found = [
+        each.model.size for each in fit_output_error(make_record(2, [0.1, 0.15], [1.0, -1.5, 0.7], 0.05))
+    ]
+    assert found == sorted(set(found))
+
+
+def test_residual_variance_of_a_second_model_is_that_of_the_innovations():
+    first, second = fit_pair(make_coloured_record(1, 3000))
+    assert second.residual_variance == pytest.approx(0.05**2, rel=0.1)
+    assert first.residual_variance > 10.0 * 0.05**2
+
+
+@pytest.mark.ci
+def test_whitened_error_of_coloured_noise_has_the_smaller_variance():
+    true = np.array([1.5, -0.7, 0.1, 0.15])
+    errors = np.array(
+        [
+            [np.array(each.model.theta[:4]) - true for each in fit_pair(make_coloured_record(seed))]
+            for seed in range(30)
+        ]
+    )
+    first, second = np.sqrt(np.mean(errors**2, axis=0))
+    assert (second < 0.8 * first).all()
+
+
+@pytest.mark.ci
+def test_intervals_of_the_whitened_error_contain_the_true_parameters():
+    true, inside = (1.5, -0.7, 0.1, 0.15), []
+    for seed in range(60):
+        model = fit_pair(make_coloured_record(seed))[1].model
+        error = np.subtract(model.theta[:4], true)
+        inside.append(np.abs(error) <= 1.96 * np.array(model.standard_errors[:4]))
     # Of 240 intervals with a probability of 0.95.
     assert 0.9 < np.mean(inside) < 0.99
 

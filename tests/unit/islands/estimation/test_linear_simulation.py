@@ -1,0 +1,66 @@
+"""Problems of linear models: their parts, and their equations behind the filter of a noise model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from islands.estimation.linear_simulation import LinearProblem, find_start, minimise, project, solve
+from islands.estimation.noise_model import NoiseModel
+from islands.expressions.tree import Lagged
+
+A, B = np.array([-1.5, 0.7]), [0.1, 0.15]
+
+
+def make_problem(lengths, seed=0):
+    """Return the rows of a second-order system without noise, from other states in every segment."""
+    random = np.random.default_rng(seed)
+    columns, y = [], []
+    for samples in lengths:
+        u = random.normal(size=samples + 50)
+        columns.append(np.array([u[49:-1], u[48:-2]]))
+        y.append(lfilter([0.0, *B], np.append(1.0, A), u)[50:])
+    terms = tuple(Lagged(channel, lag) for channel in (0, 1) for lag in (1, 2))
+    return LinearProblem(2, terms, np.hstack(columns), np.concatenate(y), np.cumsum(lengths))
+
+
+@pytest.mark.parametrize("coefficients", [[], [0.9], [1.4, -0.6, 0.1]])
+def test_filtered_signals_fulfil_the_same_equation(coefficients):
+    problem = make_problem((80, 60, 90))
+    noise = NoiseModel(np.array(coefficients), 1.0, 1.0)
+    whitened = problem.whiten(noise)
+    assert whitened.lengths == [each - noise.order for each in problem.lengths]
+    assert solve(whitened, A).squares < 1e-20 * problem.y @ problem.y
+
+
+def test_segments_that_the_filter_and_the_initial_states_take_are_left_out():
+    noise = NoiseModel(np.array([0.5, 0.2, 0.1]), 1.0, 1.0)
+    assert make_problem((80, 5, 90, 6)).whiten(noise).lengths == [77, 87, 3]
+
+
+def test_filtered_constant_has_the_coefficient_of_the_constant():
+    problem = make_problem((200,)).with_constant()
+    raised = replace(problem, y=problem.y + 3.0).whiten(NoiseModel(np.array([0.9]), 1.0, 1.0))
+    coefficients = project(raised.divide(A, raised.columns), raised.y)
+    assert coefficients[-3:] == pytest.approx([*B, 3.0 * (1.0 + A.sum())])
+
+
+def test_part_is_where_the_inputs_vary_most():
+    problem = make_problem((300, 150, 450))
+    weights = np.where(np.arange(900) // 200 == 2, 1.0, 1e-2)
+    part = replace(problem, columns=problem.columns * weights).take_part(200)
+    assert np.array_equal(part.y, problem.y[400:600])
+    assert part.lengths == [50, 150]
+
+
+def test_part_has_no_segment_that_its_initial_states_take():
+    problem = make_problem((401, 499))
+    weights = np.where(np.arange(900) // 200 == 2, 1.0, 1e-2)
+    part = replace(problem, columns=problem.columns * weights).take_part(200)
+    assert np.array_equal(part.y, problem.y[401:600])
+
+
+def test_steps_from_the_start_find_the_exact_equation():
+    found = minimise(find_start(make_problem((80, 60, 90))), 1e-7)
+    assert found.denominator == pytest.approx(A, abs=1e-9)
