@@ -90,8 +90,8 @@ def measure(system: str, colour: str, seed: int, samples: int) -> list[float]:
         return min(models, key=lambda each: simulate_freely(each, record[-held:]).mean_squared_error)
 
     chosen = [choose(simulated), choose([*simulated, *weighted])]
-    # White noise has no second model.
-    compared = [pair[0], pair[1] if weighted else pair[0], *chosen]
+    # An order whose residual is white has no second model.
+    compared = [pair[0], pair[1] or pair[0], *chosen]
     return [measure_error(each, clean) if each else np.nan for each in compared]
 
 

@@ -172,7 +172,7 @@ def estimate_candidates(
 
 
 def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Candidate]:
-    """Return the linear models that minimise the error of the free run, if the settings refine parameters."""
+    """Return the linear models of the free run, if the settings refine parameters."""
     library = make_trial_library(settings)
     is_other = settings.select == "fitness" or settings.estimator not in ("", "free-run")
     if (

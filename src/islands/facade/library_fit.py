@@ -323,7 +323,7 @@ def _estimate(
 def _fit_simulations(
     split: Split, library: TrialLibrary, settings: FitSettings, swaps: Settings, warm_up: int, steps: Steps
 ) -> list[Assessment]:
-    """Return the linear models that minimise the error of the free run, and not that of one step.
+    """Return the linear models of the free run, which do not minimise the error of one step.
 
     Measurement noise hides slow modes from the one-step-ahead error, by which structures are selected.
     """

@@ -37,11 +37,11 @@ class TrialLibrary:
 
     @property
     def has_simulations(self) -> bool:
-        """Whether linear models that minimise the error of the free run belong to the library."""
+        """Whether linear models of the free run belong to the library."""
         return self.name == "polynomial" and self.constraints == "none"
 
     def fit_simulations(self, record: Dataset, max_terms: int) -> list[FittedStructure]:
-        """Fit the linear models that minimise the error of the free run; none if the library has none."""
+        """Fit the linear models of the free run; none if the library has none."""
         if not self.has_simulations:
             return []
         return fit_output_error(record, self.delays, self.lags, max_terms)
