@@ -5,7 +5,7 @@ sampling time is short compared with the slow modes, the bias is large: of an in
 it finds neither. The error of the free run of `LinearProblem` is minimised instead.
 
 Under coloured noise, that estimate is consistent but has a larger variance than necessary. If the residual
-is coloured, a second estimate minimises the residual that an autoregressive model of the noise whitens: a
+is coloured, a further estimate minimises the residual that an autoregressive model of the noise whitens: a
 Box-Jenkins model with C = 1 (Ljung 1999, sections 4.2 and 7.5). Filtered input and output fulfil the same
 difference equation, with other initial states.
 """
@@ -76,8 +76,8 @@ def fit_output_error(
     list of FittedStructure
         Difference equations of x, one for each order at most, with a constant if it reduces the information
         criterion of Schwarz. Orders after two that do not reduce it are left out, also those whose error is
-        much larger than the least. After them, a second model of every order whose residual is coloured: its
-        residual variance is that of the whitened residual.
+        much larger than the least. After them, of the models that minimise a whitened residual the one with
+        the least criterion, if the residual is coloured; its residual variance is that of the whitened one.
     """
     record = record[:_LARGEST_SAMPLES]
     late = tuple(delays) or (0,) * record.inputs
@@ -92,17 +92,12 @@ def fit_output_error(
             least = min(least, best.criterion)
         if failed == _PATIENCE:
             break
-    coloured = [each for each in map(_fit_coloured, found) if each]
-    kept = [*_drop_large(found, found), *_drop_large(coloured, [*found, *coloured])]
+    smallest = min((each.mean_square for each in found), default=inf)
+    kept = [each for each in found if each.mean_square <= _LARGEST_RATIO**2 * smallest]
+    # Whitening takes different numbers of rows.
+    coloured = [each for each in map(_fit_coloured, found) if each and each.mean_square < smallest]
+    kept += sorted(coloured, key=lambda each: each.criterion / each.residual.size)[:1]
     return [_make_structure(each, record) for each in kept]
-
-
-def _drop_large(
-    found: Sequence[LinearSimulation], compared: Sequence[LinearSimulation]
-) -> list[LinearSimulation]:
-    """Return the models whose error is not much larger than the least of those compared."""
-    allowed = _LARGEST_RATIO**2 * min((each.mean_square for each in compared), default=inf)
-    return [each for each in found if each.mean_square <= allowed]
 
 
 def _make_problem(record: Dataset, order: int, delays: Sequence[int], lags: int) -> LinearProblem | None:

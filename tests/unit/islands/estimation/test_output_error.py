@@ -157,12 +157,9 @@ def test_residual_variance_of_a_second_model_is_that_of_the_innovations():
 @pytest.mark.ci
 def test_whitened_error_of_coloured_noise_has_the_smaller_variance():
     true = np.array([1.5, -0.7, 0.1, 0.15])
-    errors = np.array(
-        [
-            [np.array(each.model.theta[:4]) - true for each in fit_pair(make_coloured_record(seed))]
-            for seed in range(30)
-        ]
-    )
+    pairs = [pair for pair in (fit_pair(make_coloured_record(seed)) for seed in range(30)) if len(pair) == 2]
+    assert len(pairs) > 25
+    errors = np.array([[np.array(each.model.theta[:4]) - true for each in pair] for pair in pairs])
     first, second = np.sqrt(np.mean(errors**2, axis=0))
     assert (second < 0.8 * first).all()
 
@@ -171,10 +168,12 @@ def test_whitened_error_of_coloured_noise_has_the_smaller_variance():
 def test_intervals_of_the_whitened_error_contain_the_true_parameters():
     true, inside = (1.5, -0.7, 0.1, 0.15), []
     for seed in range(60):
-        model = fit_pair(make_coloured_record(seed))[1].model
-        error = np.subtract(model.theta[:4], true)
-        inside.append(np.abs(error) <= 1.96 * np.array(model.standard_errors[:4]))
-    # Of 240 intervals with a probability of 0.95.
+        pair = fit_pair(make_coloured_record(seed))
+        if len(pair) == 2:
+            error = np.subtract(pair[1].model.theta[:4], true)
+            inside.append(np.abs(error) <= 1.96 * np.array(pair[1].model.standard_errors[:4]))
+    assert len(inside) > 50
+    # Of more than 200 intervals with a probability of 0.95.
     assert 0.9 < np.mean(inside) < 0.99
 
 
