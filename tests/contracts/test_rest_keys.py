@@ -42,6 +42,7 @@ GUARDED = {
     ("POST", "/v1/datasets"): "write",
     ("POST", "/v1/datasets/fetch"): "write",
     ("GET", "/v1/datasets/{dataset}"): "read",
+    ("GET", "/v1/datasets/{dataset}/samples"): "read",
     ("DELETE", "/v1/datasets/{dataset}"): "write",
     ("GET", "/metrics"): "metrics",
     ("GET", "/v1/admin/keys"): "admin",

@@ -9,6 +9,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.conditions import Constrained
+from islands.estimation.estimator_table import Criterion
 from islands.estimation.parameter_constraints import constraint
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
@@ -32,12 +33,15 @@ class FittedStructure:
     least_squares_bias : float or None
         Largest difference of a parameter from least squares in standard errors; see `least_squares_bias` in
         `islands.estimation.estimators`. None for least squares itself.
+    criterion : Criterion or None
+        Error that the parameters minimise, if it is not that of the estimator of the settings.
     """
 
     model: Model
     residual_variance: float
     noise: tuple[float, ...] = ()
     least_squares_bias: float | None = None
+    criterion: Criterion | None = None
 
 
 def estimate(

@@ -46,7 +46,8 @@ class Criterion:
     Attributes
     ----------
     estimator : str
-        An entry of ``ESTIMATORS``, or ``output-error`` for a linear model of `fit_output_error`.
+        An entry of ``ESTIMATORS``; ``output-error`` or ``box-jenkins`` for a linear model of
+        `fit_output_error`.
     interval : int or None
         Samples of the interval over which predictions are fed back: 1 for the one-step-ahead error, None for
         that of the free run, and else the error of multiple shooting.
@@ -66,6 +67,9 @@ LEAST_SQUARES = Criterion("least-squares", 1)
 
 #: Criterion of linear models of the free run with estimated initial states.
 OUTPUT_ERROR = Criterion("output-error", None)
+
+#: Criterion of those that minimise the free-run error after a filter that makes it white.
+BOX_JENKINS = Criterion("box-jenkins", None)
 
 
 def make_criterion(estimator: str, shooting: int) -> Criterion:

@@ -20,6 +20,7 @@ from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.estimate import FittedStructure
+from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR, Criterion
 from islands.estimation.linear_simulation import (
     LinearProblem,
     LinearSimulation,
@@ -96,8 +97,11 @@ def fit_output_error(
     kept = [each for each in found if each.mean_square <= _LARGEST_RATIO**2 * smallest]
     # Whitening takes different numbers of rows.
     coloured = [each for each in map(_fit_coloured, found) if each and each.mean_square < smallest]
-    kept += sorted(coloured, key=lambda each: each.criterion / each.residual.size)[:1]
-    return [_make_structure(each, record) for each in kept]
+    whitened = sorted(coloured, key=lambda each: each.criterion / each.residual.size)[:1]
+    return [
+        *(_make_structure(each, record, OUTPUT_ERROR) for each in kept),
+        *(_make_structure(each, record, BOX_JENKINS) for each in whitened),
+    ]
 
 
 def _make_problem(record: Dataset, order: int, delays: Sequence[int], lags: int) -> LinearProblem | None:
@@ -175,7 +179,7 @@ def _fit_coloured(found: LinearSimulation) -> LinearSimulation | None:
     return minimise(start, _MIN_FINAL_GAIN if problem.y.size > _MANY_ROWS else _MIN_GAIN) if start else None
 
 
-def _make_structure(found: LinearSimulation, record: Dataset) -> FittedStructure:
+def _make_structure(found: LinearSimulation, record: Dataset, criterion: Criterion) -> FittedStructure:
     """Return the difference equation with its parameters and their standard errors."""
     problem = found.problem
     divided = np.roll(problem.divide(found.denominator, problem.columns), -problem.states, axis=0)
@@ -192,4 +196,5 @@ def _make_structure(found: LinearSimulation, record: Dataset) -> FittedStructure
     ordered = make_model(list(zip(problem.terms, errors, strict=True)), record.input_names)
     assert ordered.regressors == model.regressors
     model = replace(model, standard_errors=ordered.theta, preprocessing=record.preprocessing)
-    return FittedStructure(model, found.squares / max(1, problem.y.size - len(divided) - problem.order))
+    variance = found.squares / max(1, problem.y.size - len(divided) - problem.order)
+    return FittedStructure(model, variance, criterion=criterion)

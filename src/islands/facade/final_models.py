@@ -11,7 +11,6 @@ from islands.data.split import Split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import (
     LEAST_SQUARES,
-    OUTPUT_ERROR,
     Criterion,
     make_criterion,
     refinement_criterion,
@@ -181,8 +180,13 @@ def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Can
         or steps.skip(_REFINEMENT)
     ):
         return []
-    models = [each.model for each in library.fit_simulations(split.estimation, settings.max_terms)]
-    return _without_diverged(_validate(models, OUTPUT_ERROR, split.validation, settings.maximum_lag))
+    fitted = library.fit_simulations(split.estimation, settings.max_terms)
+    return _without_diverged(
+        each
+        for found in fitted
+        if found.criterion is not None
+        for each in _validate([found.model], found.criterion, split.validation, settings.maximum_lag)
+    )
 
 
 def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[Individual, ...]:

@@ -12,7 +12,7 @@ from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError, check_integers, lookup
-from islands.estimation.estimator_table import ESTIMATORS, OUTPUT_ERROR, make_criterion
+from islands.estimation.estimator_table import ESTIMATORS, make_criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
     Structure,
@@ -333,7 +333,7 @@ def _fit_simulations(
     if steps.skip("linear models of the free run"):
         return []
     return [
-        assess(found.model, split, swaps.shooting, warm_up, library.constraints, OUTPUT_ERROR)
+        assess(found.model, split, swaps.shooting, warm_up, library.constraints, found.criterion)
         for found in library.fit_simulations(split.estimation, settings.max_terms)
     ]
 

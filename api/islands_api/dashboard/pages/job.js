@@ -206,7 +206,7 @@ export function mountJob(host, { id, rank }, signal) {
   /** Show the recommended model as soon as the unit of its output is known. */
   function showResult(job) {
     if (unit === null || job.state !== "succeeded" || resultHost.hasChildNodes()) return;
-    // Results of earlier versions name no recommended model; several outputs have a panel of their own.
+    // Results of earlier versions name no recommended model; several outputs have another panel.
     if (isSearch(job) && !hasSeveralOutputs(job) && job.summary?.rank)
       resultHost.replaceChildren(makeResultCard(job, unit, signal));
   }

@@ -69,6 +69,7 @@ _ESTIMATES = {
     "shooting": "least error of simulations over {interval} samples",
     "free-run": "least error of the free run",
     "output-error": "least error of the free run and its initial state (linear output-error model)",
+    "box-jenkins": "least error of the free run and its initial state, whitened (linear Box-Jenkins model)",
 }
 
 #: Values of a JSON object.

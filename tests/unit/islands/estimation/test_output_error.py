@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from islands.data.dataset import Dataset, join
 from islands.data.input_lead import advance_inputs
 from islands.estimation.estimate import estimate
+from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR
 from islands.estimation.output_error import fit_output_error
 from islands.estimation.refinement import refine
 from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, TANK_NOISE, make_battery, make_tank
@@ -150,6 +151,7 @@ def test_white_noise_gives_no_second_model():
 
 def test_residual_variance_of_a_second_model_is_that_of_the_innovations():
     first, second = fit_pair(make_coloured_record(1, 3000))
+    assert (first.criterion, second.criterion) == (OUTPUT_ERROR, BOX_JENKINS)
     assert second.residual_variance == pytest.approx(0.05**2, rel=0.1)
     assert first.residual_variance > 10.0 * 0.05**2
 

@@ -11,6 +11,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import command_line_names
 from islands.estimation.estimator_table import (
+    BOX_JENKINS,
     ESTIMATORS,
     LEAST_SQUARES,
     OUTPUT_ERROR,
@@ -240,6 +241,10 @@ def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
         (LEAST_SQUARES, "least squares of the error one step ahead"),
         (Criterion("shooting", 500), "least error of simulations over 500 samples"),
         (OUTPUT_ERROR, "least error of the free run and its initial state (linear output-error model)"),
+        (
+            BOX_JENKINS,
+            "least error of the free run and its initial state, whitened (linear Box-Jenkins model)",
+        ),
         *((make_criterion(name, 500), "least") for name in ESTIMATORS),
     ],
 )
