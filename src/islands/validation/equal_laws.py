@@ -101,7 +101,7 @@ class _Comparison:
         if share > _EQUAL_SHARE:
             return share
         effect = self._measure_effect(other, set(self._models[at].parameter_names))
-        change = float(np.mean(difference / self._scales**2))
+        change = float(np.mean((np.sqrt(difference) / self._scales) ** 2))
         return max(share, change / effect) if effect > 0.0 else np.inf
 
     def _measure_effect(self, at: int, kept: set[str]) -> float:
