@@ -80,7 +80,10 @@ EXCLUSIVE_OF_DIAGNOSES = (
         r"no known effect is confirmed",
         r"(confidence (above |below )?\d\.\d\d, \d+ % of the misfit|the RMSE falls)",
     ),
-    (r"stopped before a verdict", r"(No significant discrepancy|explains? |the RMSE falls from)"),
+    (
+        r"stopped before a verdict",
+        r"(No significant discrepancy|explains? (most of |a part of |)(it|the discrepancy)|the RMSE falls)",
+    ),
     (r"significant structure remains(?!.*(The remaining residual depends|A flexible model of))", r""),
     (r"Record and simulation do not match", r"(The simulation lacks|No significant|the RMSE (falls|is))"),
     (r"Known effects alone explain less", r"(the score is worse by -|that explain the record as well)"),
