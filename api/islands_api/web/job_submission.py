@@ -1,7 +1,6 @@
 """Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -13,10 +12,10 @@ from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import ResourceNotFoundError, ResultNotReadyError
 from islands_api.web.responses import JSONDocument, job_document
+from islands_api.web.uploads.dataset_storage import open_stored
 from islands_service.domain.job import Job, JobState, Requester, Submission
 from islands_service.domain.job_spec import Discrepancy, Identification
 from islands_service.intake.file_inspection import inspect_file
-from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.job_validation import ValidJob, validate_job
 
 #: Path of jobs of every kind.
@@ -114,17 +113,13 @@ async def _validate_and_store(
     if isinstance(found, tuple):
         return found
     for inspection in found.inspections:
-        with ExitStack() as files:
-            async with state.inspection_slots.hold(submission.owner):
-                holding = state.blobs.hold(inspection.dataset.blob)
-                held = await state.run_blocking(files.enter_context, holding)
-                path = files.enter_context(link_blob(held, inspection.dataset.name))
-                await inspect_file(
-                    path,
-                    inspection.request,
-                    state.settings.inspection_memory,
-                    state.settings.inspection_seconds,
-                )
+        async with open_stored(state, submission.owner, inspection.dataset) as path:
+            await inspect_file(
+                path,
+                inspection.request,
+                state.settings.inspection_memory,
+                state.settings.inspection_seconds,
+            )
     return await state.run_blocking(_store, state, submission, found, by)
 
 

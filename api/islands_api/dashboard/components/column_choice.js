@@ -2,9 +2,7 @@
 
 import { el, makeScrollable } from "../lib/dom.js";
 import { formatNumber } from "../lib/numbers.js";
-import { describeDefect } from "./dataset.js";
-
-const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
+import { STATISTICS, describeDefect } from "./dataset.js";
 
 const HEADINGS = [
   ...["Column", "Unit", "Input", "Output"],

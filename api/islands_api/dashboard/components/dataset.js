@@ -5,7 +5,8 @@ import { el, makeFacts, makeScrollable, makeTable } from "../lib/dom.js";
 import { formatBytes, formatCount, formatNumber, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
 
-const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
+/** Headings of the statistics of a column. */
+export const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
 
 /** Return the input columns of a job; none for a record, whose monitor names them. */
 const getInputs = ({ inputs, input }) => inputs ?? (input === undefined ? [] : [input]);

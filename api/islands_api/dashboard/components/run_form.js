@@ -1,6 +1,6 @@
 /** Form that starts an identification of a data set, with the same request for other programs. */
 
-import { getJson } from "../lib/api.js";
+import { postJson } from "../lib/api.js";
 import { el, setText } from "../lib/dom.js";
 import { clearBanner, showProblem } from "./banner.js";
 
@@ -91,9 +91,7 @@ export function makeRunForm({ id, name, preview }) {
     clearBanner("problem");
     submit.disabled = true;
     try {
-      const headers = { "Content-Type": "application/json" };
-      const body = JSON.stringify(makeRequest());
-      const job = await getJson("v1/jobs", { method: "POST", headers, body });
+      const job = await postJson("v1/jobs", makeRequest());
       location.hash = `#/jobs/${job.id}`;
     } catch (error) {
       showProblem(error);

@@ -94,6 +94,14 @@ async function readBody(response, form, signal) {
 export const getJson = async (path, options = {}) =>
   readBody(await sendRequest(path, options), "json", options.signal);
 
+/** Send a JSON document; return the one in the response. */
+export const postJson = (path, document) =>
+  getJson(path, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(document),
+  });
+
 /** Request text. */
 export const getText = async (path, options = {}) =>
   readBody(await sendRequest(path, options), "text", options.signal);

@@ -3,7 +3,6 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from typing import Annotated, Any
 
 import fastapi
@@ -28,12 +27,11 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
-from islands_api.web.uploads.dataset_storage import store_dataset
+from islands_api.web.uploads.dataset_storage import open_stored, store_dataset
 from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
 from islands_api.web.uploads.uploaded_file import parse_file_name
 from islands_service.domain.job_spec import Name
 from islands_service.intake.file_inspection import InspectionRequest
-from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.sample_reading import SampleRequest, read_samples
 from islands_service.store.datasets import StoredDataset
 
@@ -189,11 +187,8 @@ async def samples(
     if matches_etag(if_none_match, tag):
         return Response(status_code=304, headers=headers)
     settings = state.settings
-    with ExitStack() as files:
-        async with state.inspection_slots.hold(caller.owner):
-            held = await state.run_blocking(files.enter_context, state.blobs.hold(stored.blob))
-            path = files.enter_context(link_blob(held, stored.name))
-            found = await read_samples(path, request, settings.inspection_memory, settings.inspection_seconds)
+    async with open_stored(state, caller.owner, stored) as path:
+        found = await read_samples(path, request, settings.inspection_memory, settings.inspection_seconds)
     return JSONDocument(found, headers=headers)
 
 

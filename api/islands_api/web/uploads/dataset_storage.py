@@ -1,5 +1,7 @@
 """Inspection and storage of a received file as a data set."""
 
+from collections.abc import AsyncIterator
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 from typing import IO
 
@@ -9,6 +11,20 @@ from islands_api.web.uploads.uploaded_file import find_stored_suffix, receive
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
+
+
+@asynccontextmanager
+async def open_stored(state: AppState, owner: str, dataset: StoredDataset) -> AsyncIterator[Path]:
+    """Provide the file of a data set to a process that reads it, with a slot of its owner.
+
+    Raises
+    ------
+    BlobNotFoundError, ObjectStoreError, StorageFullError
+    """
+    with ExitStack() as files:
+        async with state.inspection_slots.hold(owner):
+            held = await state.run_blocking(files.enter_context, state.blobs.hold(dataset.blob))
+            yield files.enter_context(link_blob(held, dataset.name))
 
 
 async def store_dataset(

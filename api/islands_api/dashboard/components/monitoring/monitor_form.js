@@ -1,6 +1,6 @@
 /** Form that creates a monitor of the simulation of a diagnosis. */
 
-import { getJson } from "../../lib/api.js";
+import { postJson } from "../../lib/api.js";
 import { el } from "../../lib/dom.js";
 import { clearBanner, showProblem } from "../banner.js";
 
@@ -20,10 +20,8 @@ export function makeMonitorForm(job) {
     submit.disabled = true;
     const { interval, training, ...given } = Object.fromEntries(new FormData(event.target));
     const numbers = { ...(interval && { interval: Number(interval) }), training: Number(training) };
-    const body = JSON.stringify({ diagnosis: job.id, ...given, ...numbers });
     try {
-      const headers = { "Content-Type": "application/json" };
-      const monitor = await getJson("v1/monitors", { method: "POST", headers, body });
+      const monitor = await postJson("v1/monitors", { diagnosis: job.id, ...given, ...numbers });
       location.hash = `#/monitors/${monitor.id}`;
     } catch (error) {
       showProblem(error);

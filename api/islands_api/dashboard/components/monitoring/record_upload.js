@@ -1,6 +1,6 @@
 /** Form that uploads records by hand and adds them to a monitor, in the order of their names. */
 
-import { getJson } from "../../lib/api.js";
+import { postJson } from "../../lib/api.js";
 import { announce, el } from "../../lib/dom.js";
 import { clearBanner, showProblem } from "../banner.js";
 import { uploadFile } from "../file_upload.js";
@@ -9,9 +9,7 @@ const inNumericOrder = new Intl.Collator("en", { numeric: true }).compare;
 
 async function addRecord(path, file) {
   const { id } = await uploadFile(file);
-  const record = JSON.stringify({ dataset: id, name: file.name });
-  const headers = { "Content-Type": "application/json" };
-  await getJson(`${path}/records`, { method: "POST", headers, body: record });
+  await postJson(`${path}/records`, { dataset: id, name: file.name });
 }
 
 /** Make the form; `onAdded()` is called after each record. */
