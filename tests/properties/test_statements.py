@@ -251,6 +251,16 @@ def make_chosen_document(choices):
     )
 
 
+@pytest.mark.parametrize("ratio", [2.999, 3.0])
+def test_an_error_that_is_written_as_far_from_the_noise_is_not_explained(ratio):
+    gain = GAIN | {"after": {"rmse": 0.1 * ratio, "mape": 1.0}}
+    text = " ".join(
+        describe_diagnosis(make_document("named", effects=[CAUSE], gain=gain, noise_floor_rmse=0.1))
+    )
+    assert "3 times the floor" in text
+    assert not find_contradictions(text)
+
+
 @given(DIAGNOSES)
 def test_no_two_sentences_about_a_diagnosis_contradict_each_other(choices):
     document = make_chosen_document(choices)

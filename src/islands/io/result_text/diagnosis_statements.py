@@ -10,7 +10,7 @@ from functools import cached_property
 from math import ceil, floor, log10
 from typing import Final
 
-from islands.io.result_text.statements import Document, Statement, write_amount, write_statements
+from islands.io.result_text.statements import Document, Statement, round_ratio, write_amount, write_statements
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
 _WHOLE, _MOST = 0.9, 0.5
@@ -21,7 +21,7 @@ _CERTAIN = 0.5
 #: Ratio of an error and the noise floor up to which the error is that of the noise.
 _NOISE_RATIO = 1.2
 
-#: Ratio of an error and the noise floor above which noise does not explain the error.
+#: Ratio of an error and the noise floor from which on noise does not explain the error.
 _FAR_RATIO = 3.0
 
 #: Error as a fraction of the standard deviation of the output above which white and coloured noise are large.
@@ -148,13 +148,15 @@ class DiagnosisFacts:
 
     @property
     def noise_ratio(self) -> float | None:
-        """That error divided by the noise floor; None if it is unknown, or a rounding error."""
-        return None if self.error is None or not self.floor or self.is_exact else self.error / self.floor
+        """That error divided by the noise floor, as written; None if it is unknown, or a rounding error."""
+        if self.error is None or not self.floor or self.is_exact:
+            return None
+        return round_ratio(self.error / self.floor)
 
     @property
     def is_far(self) -> bool:
         """Whether the error of the held-out data is far above the noise floor."""
-        return (self.noise_ratio or 0.0) > _FAR_RATIO
+        return (self.noise_ratio or 0.0) >= _FAR_RATIO
 
     @property
     def is_noise(self) -> bool:

@@ -23,7 +23,7 @@ _GOOD_R2 = 0.9
 #: Largest ratio of the free-run error and the noise level at which the error is that of the noise.
 _NOISE_RATIO = 1.2
 
-#: Ratio of the free-run error and the noise level above which noise does not explain the error.
+#: Ratio of the free-run error and the noise level from which on noise does not explain the error.
 _FAR_RATIO = 3.0
 
 #: Ratio of the errors on validation data and estimation data above which a model does not generalise.
@@ -199,9 +199,9 @@ class RunFacts:
 
     @property
     def noise_ratio(self) -> float | None:
-        """Free-run error divided by the noise level, or by the least error if the level is unknown."""
+        """Free-run error divided by the noise level, or by the least error if that is unknown, as written."""
         rmse, level = self.error()["rmse"], self.data.get("noise") or self.least_error
-        return None if rmse is None or not level or self.is_rounding(rmse) else float(rmse / level)
+        return None if rmse is None or not level or self.is_rounding(rmse) else round_ratio(rmse / level)
 
     @property
     def is_unpredictable(self) -> bool:
@@ -211,7 +211,7 @@ class RunFacts:
     @property
     def exceeds_noise(self) -> bool:
         """Whether an unpredictable residual of the free run is far above the noise."""
-        return self.is_unpredictable and (self.noise_ratio or 0.0) > _FAR_RATIO
+        return self.is_unpredictable and (self.noise_ratio or 0.0) >= _FAR_RATIO
 
     @property
     def error_ratio(self) -> float:
@@ -402,6 +402,11 @@ def write_percent(share: float) -> str:
 def round_down(share: float) -> str:
     """Write a share so that one below a limit never shows the limit."""
     return f"{floor(100 * share) / 100:.2f}"
+
+
+def round_ratio(ratio: float) -> float:
+    """Round a ratio to the digits that are written, so that a limit decides as the written value does."""
+    return float(f"{ratio:.3g}")
 
 
 def list_doubtful(terms: Iterable[Document]) -> list[tuple[str, float]]:
