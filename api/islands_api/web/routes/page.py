@@ -1,5 +1,6 @@
 """Dashboard at ``/``: static files; the page uses the REST interface like any other client."""
 
+import gzip
 import hashlib
 from functools import cache
 from pathlib import Path
@@ -66,29 +67,39 @@ FILES = {
 
 
 @cache
-def _read_file(name: str) -> tuple[bytes, str]:
-    """Return the bytes of a file and its ETag."""
+def _read_file(name: str) -> tuple[bytes, bytes, str]:
+    """Return the bytes of a file, the compressed ones, and its ETag."""
     data = (DASHBOARD_DIR / name).read_bytes()
-    return data, f'W/"{hashlib.sha256(data).hexdigest()[:16]}"'
+    return data, gzip.compress(data, mtime=0), f'W/"{hashlib.sha256(data).hexdigest()[:16]}"'
 
 
 @router.get("/")
-async def index(if_none_match: Annotated[str | None, Header()] = None) -> Response:
+async def index(
+    if_none_match: Annotated[str | None, Header()] = None,
+    accept_encoding: Annotated[str, Header()] = "",
+) -> Response:
     """Return the dashboard."""
-    return _file_response("index.html", if_none_match)
+    return _file_response("index.html", if_none_match, accept_encoding)
 
 
 @router.get("/dashboard/{name:path}")
-async def file(name: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
+async def file(
+    name: str,
+    if_none_match: Annotated[str | None, Header()] = None,
+    accept_encoding: Annotated[str, Header()] = "",
+) -> Response:
     """Return a file of the dashboard."""
     if name not in FILES:
         raise ResourceNotFoundError(f"the dashboard has no file {name!r}")
-    return _file_response(name, if_none_match)
+    return _file_response(name, if_none_match, accept_encoding)
 
 
-def _file_response(name: str, if_none_match: str | None) -> Response:
-    data, etag = _read_file(name)
-    headers = {"Cache-Control": "no-cache", "ETag": etag}
+def _file_response(name: str, if_none_match: str | None, accept_encoding: str) -> Response:
+    data, compressed, etag = _read_file(name)
+    headers = {"Cache-Control": "no-cache", "ETag": etag, "Vary": "Accept-Encoding"}
     if if_none_match == etag:
         return Response(status_code=304, headers=headers)
+    # A browser that refuses an encoding by "gzip;q=0" is not known.
+    if "gzip" in accept_encoding:
+        return Response(compressed, media_type=FILES[name], headers=headers | {"Content-Encoding": "gzip"})
     return Response(data, media_type=FILES[name], headers=headers)
