@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from islands_api.schemas import DATASET_ID, ResponseModel
+from islands_api.schemas import DATASET_ID, Envelope, ResponseModel
 from islands_service.domain.job_spec import Name
 
 
@@ -74,14 +74,6 @@ class Preview(ResponseModel):
         default=None,
         description="Facts about the record. None if the file has problems that `warnings` state.",
     )
-
-
-class Envelope(ResponseModel):
-    """Extremes of a column in every part of the rows. None where all cells are missing."""
-
-    name: str
-    minimum: tuple[float | None, ...]
-    maximum: tuple[float | None, ...]
 
 
 class Samples(ResponseModel):

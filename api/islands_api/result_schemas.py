@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from islands_api.schemas import ModelView, ResponseModel
+from islands_api.schemas import Envelope, ModelView, ResponseModel
 
 
 class IdentificationResult(ResponseModel):
@@ -123,6 +123,23 @@ class FreeRun(ResponseModel):
     measured: tuple[float | None, ...]
     free_run: tuple[float | None, ...] = Field(description="Null where the free run diverged.")
     band: Band | None = None
+
+
+class DiagnosisOutputs(ResponseModel):
+    """Measured and simulated outputs of a diagnosis, for a plot."""
+
+    start: int = Field(description="First sample, counted from 0.")
+    stop: int = Field(description="Sample after the last one.")
+    rows: tuple[int, ...] = Field(
+        description="First sample of every part. If the samples are fewer than `points`, each is a part."
+    )
+    outputs: tuple[Envelope, ...] = Field(
+        description="`measured`; `simulated`, calibrated without effects; `extended` by the effects, or "
+        "`corrected` for a gross error, if there are any."
+    )
+    residuals: tuple[Envelope, ...] = Field(
+        description="Measured less simulated output, under the name of the simulated one."
+    )
 
 
 class ProblemType(ResponseModel):

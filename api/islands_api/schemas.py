@@ -254,6 +254,14 @@ class HistoryPage(ResponseModel):
     items: tuple[HistoryPoint, ...]
 
 
+class Envelope(ResponseModel):
+    """Extremes of a signal in every part of the rows. None where all samples are missing."""
+
+    name: str
+    minimum: tuple[float | None, ...]
+    maximum: tuple[float | None, ...]
+
+
 class Names(ResponseModel):
     """List of names."""
 

@@ -37,7 +37,10 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/figures/{figure}.svg"): "read",
     ("GET", "/v1/jobs/{job}/report"): "read",
     ("GET", "/v1/jobs/{job}/extended"): "read",
+    ("GET", "/v1/jobs/{job}/outputs"): "read",
     ("POST", "/v1/discrepancies"): "write",
+    ("GET", "/v1/simulations"): "read",
+    ("POST", "/v1/simulations/equations"): "read",
     ("GET", "/v1/datasets"): "read",
     ("POST", "/v1/datasets"): "write",
     ("POST", "/v1/datasets/fetch"): "write",
@@ -77,6 +80,8 @@ def send_request(service, method, path, headers):
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
         body = {"json": held("0-csv")}
+    if path == "/v1/simulations/equations":
+        body = {"json": {"text": ""}}
     if method == "POST" and path.endswith("/records"):
         body = {"json": {"dataset": "0-csv"}}
     if (method, path) == ("POST", "/v1/monitors"):

@@ -1,13 +1,24 @@
-"""Requests of discrepancy jobs, which diagnose a simulation."""
+"""Requests of discrepancy jobs, which diagnose a simulation, and of the simulations that they accept."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
 from islands.simulators.specification.table import SIMULATORS, innermost, parse_spec
-from islands_api.client.calls import DatasetRef, RequestSpec, as_list, get_id, make_submission
+from islands_api.client.calls import (
+    DatasetRef,
+    JobRef,
+    RequestSpec,
+    as_list,
+    get_id,
+    make_submission,
+    quote_id,
+)
 from islands_api.client.recording_parts import make_part
+from islands_api.client.response_parsing import read_as, read_mapping
+from islands_api.result_schemas import DiagnosisOutputs
 from islands_api.schemas import JobView
+from islands_api.simulation_schemas import SimulationList, SimulationView
 
 
 def diagnose(
@@ -73,6 +84,41 @@ def diagnose(
         "priority": priority or None,
     }
     return make_submission("/v1/discrepancies", given, idempotency_key)
+
+
+def outputs(
+    which: JobRef, start: int = 0, stop: int | None = None, points: int = 2000
+) -> RequestSpec[DiagnosisOutputs]:
+    """Return measured and simulated outputs of a discrepancy job, and the residuals, for a plot.
+
+    Parameters
+    ----------
+    which : str or JobView
+    start, stop : int, int or None
+        First sample, from 0, and the sample after the last one; by default all samples.
+    points : int
+        Largest number of parts, at most 5000.
+    """
+    params = {"start": start, "points": points, **({} if stop is None else {"stop": stop})}
+    path = f"/v1/jobs/{quote_id(which)}/outputs"
+    return RequestSpec("GET", path, read_as(DiagnosisOutputs), params=params)
+
+
+def simulations() -> RequestSpec[tuple[SimulationView, ...]]:
+    """Return the simulations that `diagnose` accepts, with the parameters of the physical systems."""
+    listed = read_as(SimulationList)
+    return RequestSpec("GET", "/v1/simulations", lambda response: listed(response).items)
+
+
+def check_equations(text: str) -> RequestSpec[dict[str, Any]]:
+    """Check differential equations; return them as the simulation of `diagnose`.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file that ``ode:FILE.toml`` names.
+    """
+    return RequestSpec("POST", "/v1/simulations/equations", read_mapping, json={"text": text})
 
 
 def parse_simulation(text: str) -> dict[str, Any]:

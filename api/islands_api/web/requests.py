@@ -239,6 +239,15 @@ Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the 
 #: Query parameter of a route that lists: the size of the page.
 Limit = Annotated[int, Query(ge=1, le=200, description="Maximum number of entries of a page.")]
 
+#: Largest number of a row in a request.
+_MAX_ROW = 2**53
+
+#: Query parameters of a route that returns signals for a plot: the rows, and the largest number of parts.
+StartRow = Annotated[int, Query(ge=0, le=_MAX_ROW, description="First row, from 0.")]
+StopRow = Annotated[
+    int | None, Query(ge=1, le=_MAX_ROW, description="Row after the last one; by default the end.")
+]
+Points = Annotated[int, Query(ge=1, le=5000, description="Most values of a column.")]
 
 #: Header of a route whose response has an entity tag.
 IfNoneMatch = Annotated[str | None, Header(max_length=1000, description="The `ETag` of the last response.")]

@@ -69,6 +69,9 @@ REPORT = "report.html"
 #: Artefact of a discrepancy job with the simulation extended by the effects found.
 EXTENDED = "extended.json"
 
+#: Artefact of a discrepancy job with the measured and the simulated outputs.
+OUTPUTS = "outputs.npy"
+
 #: Phase of a queued job whose last attempt has ended early. The note of its progress has the reason.
 WAITING_PHASE = "waiting"
 

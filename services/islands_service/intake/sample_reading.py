@@ -5,10 +5,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from islands.errors import RecordError, SettingsError, suggest
+from islands_service.domain.plot_envelopes import describe_envelopes
 from islands_service.intake.confined_answer import ask_confined
 from islands_service.intake.confined_process import enter, refuse, send_document
 
@@ -70,7 +68,6 @@ def describe_samples(path: Path, request: SampleRequest) -> dict[str, Any]:
         The columns or the rows do not exist, or a column contains text.
     """
     # Only the process that reads files imports its readers.
-    from islands.data.envelope import find_envelope  # noqa: PLC0415
     from islands.io.records.reader import open_record  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
 
@@ -80,21 +77,6 @@ def describe_samples(path: Path, request: SampleRequest) -> dict[str, Any]:
             known = f"it has {', '.join(table.names)}{suggest(name, table.names)}"
             raise RecordError(f"{path.name} has no column {name}; {known}")
     read = table.read(request.columns, slice(request.start, request.stop))
-    columns = []
-    first: NDArray[np.int64] = np.empty(0, np.int64)
-    for name in request.columns:
-        least, greatest, first = find_envelope(read.numbers[name], request.points)
-        columns.append({"name": name, "minimum": _to_list(least), "maximum": _to_list(greatest)})
-    return {
-        "start": read.first,
-        "stop": read.first + len(read.rows),
-        "rows": (first + read.first).tolist(),
-        "columns": columns,
-    }
-
-
-def _to_list(values: NDArray[np.float64]) -> list[float | None]:
-    """Return values as JSON has them: None for missing and infinite ones."""
-    return [
-        value if known else None for value, known in zip(values.tolist(), np.isfinite(values), strict=True)
-    ]
+    signals = {name: read.numbers[name] for name in request.columns}
+    rows, columns = describe_envelopes(signals, read.first, request.points)
+    return {"start": read.first, "stop": read.first + len(read.rows), "rows": rows, "columns": columns}

@@ -11,6 +11,7 @@ from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.diagnosis.inference.finding import Finding
 from islands.diagnosis.inference.holdout import HoldoutGain
 from islands.diagnosis.inference.verdict import Verdict
+from islands.effects.interface.context import Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +106,15 @@ class Diagnosis:
     def noise(self) -> tuple[Finding, ...]:
         """The properties of the noise. They are no discrepancy: alone they leave the verdict "nothing"."""
         return tuple(each for each in self.effects if each.explained_fraction is None)
+
+    @property
+    def simulated_outputs(self) -> dict[str, Signal]:
+        """Outputs by name: of the calibrated simulation, and of the extended or corrected one, if any."""
+        outputs = {"simulated": self.base.output}
+        if self.best is not self.base:
+            after = "corrected" if self.verdict == Verdict.GROSS_ERROR else "extended"
+            outputs[after] = self.best.output
+        return outputs
 
     @property
     def held_out_part(self) -> str:

@@ -10,7 +10,6 @@ from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
 from islands.data.segments import fill_gaps, map_segments
-from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.effects.interface.context import Signal
 from islands.figures.diverging_lines import break_line
@@ -172,10 +171,11 @@ def _input_label(diagnosis: Diagnosis) -> str:
 
 def _outputs(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
     """Return name, colour and values of each simulated output."""
-    name = "corrected" if diagnosis.verdict == Verdict.GROSS_ERROR else "extended"
-    after = (name, SIMULATED, diagnosis.best.output)
-    before = ("simulated", BEFORE, diagnosis.base.output)
-    return [before] if diagnosis.best is diagnosis.base else [before, after]
+    outputs = diagnosis.simulated_outputs
+    return [
+        (name, colour, output)
+        for (name, output), colour in zip(outputs.items(), (BEFORE, SIMULATED), strict=False)
+    ]
 
 
 def _residuals(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:

@@ -18,6 +18,7 @@ from islands_api.web.routes import (
     owners,
     page,
     service,
+    simulations,
     webhooks,
 )
 
@@ -27,6 +28,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     datasets.router,
     datasets.fetching,
     diagnoses.router,
+    simulations.router,
     events.router,
     models.router,
     figures.router,

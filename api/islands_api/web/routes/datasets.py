@@ -22,6 +22,9 @@ from islands_api.web.requests import (
     IfNoneMatch,
     JSONRoute,
     Limit,
+    Points,
+    StartRow,
+    StopRow,
     decode_cursor,
     encode_cursor,
     matches_etag,
@@ -39,9 +42,6 @@ router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSE
 
 #: The same path for requests in JSON.
 fetching = APIRouter(prefix=router.prefix, tags=["data sets"], responses=RESPONSES, route_class=JSONRoute)
-
-#: Largest number of a row in a request.
-_MAX_ROW = 2**53
 
 _READING = TypeAdapter(ReadingOptions)
 
@@ -168,11 +168,9 @@ async def samples(
     caller: Reader,
     state: AppStateDep,
     column: Annotated[list[Name], Query(min_length=1, max_length=16, description="Columns, one each.")],
-    start: Annotated[int, Query(ge=0, le=_MAX_ROW, description="First row, from 0.")] = 0,
-    stop: Annotated[
-        int | None, Query(ge=1, le=_MAX_ROW, description="Row after the last one; by default the end.")
-    ] = None,
-    points: Annotated[int, Query(ge=1, le=5000, description="Most values of a column.")] = 2000,
+    start: StartRow = 0,
+    stop: StopRow = None,
+    points: Points = 2000,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """Return columns for a plot: the least and the greatest value of every part of the rows.

@@ -1,13 +1,14 @@
-"""Discrepancy diagnoses: compare a simulation with a record, and download the extended simulation."""
+"""Discrepancy diagnoses: compare a simulation with a record, and download what was found."""
 
+import hashlib
 from typing import Any
 
 from fastapi import APIRouter, Response
 
-from islands_api.result_schemas import ExtendedSimulation
+from islands_api.result_schemas import DiagnosisOutputs, ExtendedSimulation
 from islands_api.schemas import DiscrepancyRequest, JobView
 from islands_api.web.auth import Reader, Writer
-from islands_api.web.dependencies import AppStateDep
+from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import (
     ACCEPTED_RESPONSES,
     JOBS_PATH,
@@ -17,9 +18,19 @@ from islands_api.web.job_submission import (
     submit_job,
 )
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
-from islands_api.web.requests import JSONRoute
+from islands_api.web.requests import (
+    REVALIDATE,
+    IfNoneMatch,
+    JSONRoute,
+    Points,
+    StartRow,
+    StopRow,
+    matches_etag,
+)
+from islands_api.web.responses import JSONDocument
 from islands_api.web.routes.jobs import Id
-from islands_service.domain.job import DISCREPANCY, EXTENDED
+from islands_service.domain.diagnosis_outputs import describe_outputs
+from islands_service.domain.job import DISCREPANCY, EXTENDED, OUTPUTS
 
 router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)
 
@@ -47,3 +58,43 @@ async def extended(job: Id, caller: Reader, state: AppStateDep) -> Response:
             f"job {job} has no extended simulation: its verdict is {document['verdict']}"
         )
     return Response(await state.run_blocking(state.blobs.read, blob), media_type="application/json")
+
+
+@router.get(
+    JOBS_PATH + "/{job}/outputs",
+    response_model=DiagnosisOutputs,
+    responses={304: {"description": "Not modified."}},
+)
+async def outputs(
+    job: Id,
+    caller: Reader,
+    state: AppStateDep,
+    start: StartRow = 0,
+    stop: StopRow = None,
+    points: Points = 2000,
+    if_none_match: IfNoneMatch = None,
+) -> Response:
+    """Return the measured and the simulated outputs, and the residuals, for a plot.
+
+    Of every part of the samples the answer has the least and the greatest value, so that no peak is lost.
+    Samples are those of the analysed rows of all recordings. The simulation is calibrated.
+    """
+    await get_result(state, await get_job_of_kind(state, caller, job, DISCREPANCY))
+    blob = await state.run_blocking(state.store.results.artefact, job, OUTPUTS)
+    if blob is None:
+        raise ResourceNotFoundError(
+            f"job {job} has no outputs, because an earlier version of islands has run it: submit it again"
+        )
+    tag = f'"{hashlib.sha256(repr((blob, start, stop, points)).encode()).hexdigest()[:32]}"'
+    # A cancelled job that is resumed replaces its outputs.
+    headers = {"Cache-Control": REVALIDATE, "Vary": "Authorization", "ETag": tag}
+    if matches_etag(if_none_match, tag):
+        return Response(status_code=304, headers=headers)
+    return JSONDocument(
+        await state.run_blocking(_read_outputs, state, blob, start, stop, points), headers=headers
+    )
+
+
+def _read_outputs(state: AppState, blob: str, start: int, stop: int | None, points: int) -> dict[str, Any]:
+    with state.blobs.hold(blob) as path:
+        return describe_outputs(path, start, stop, points)

@@ -8,6 +8,7 @@ from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
 from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.io.result_text.diagnosis_statements import describe_headline
 from islands.parallel import ParallelMap
 from islands.progress import report_part
 from islands.simulators.specification.factory import make_simulator
@@ -15,7 +16,8 @@ from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoin
 from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_run import JobRun
-from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState
+from islands_service.domain.diagnosis_outputs import write_outputs
+from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, JobState
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.outage_log import OutageLog
@@ -78,6 +80,7 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
         artefacts[REPORT] = _keep(found.write_report(names), run.blobs, run.check)
         left_out.remove(REPORT)
+        artefacts[OUTPUTS] = _keep(_write_outputs(found), run.blobs, run.check)
         if (extended := found.extended_document) is not None:
             artefacts[EXTENDED] = _keep(extended.encode(), run.blobs, run.check)
         ended = JobState.SUCCEEDED
@@ -89,6 +92,8 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
         ended = JobState.CANCELLED
         if EXTENDED not in artefacts and (extended := found.extended_document) is not None:
             artefacts[EXTENDED] = run.blobs.write(extended.encode())
+        if OUTPUTS not in artefacts:
+            artefacts[OUTPUTS] = run.blobs.write(_write_outputs(found))
     summary = _make_summary(found, simulator.name, state.note)
     return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
 
@@ -119,6 +124,10 @@ def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
             return blob
 
 
+def _write_outputs(found: DiagnosisResult) -> bytes:
+    return write_outputs(found.record.y, found.simulated_outputs)
+
+
 def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[str, object]:
     words = found.summary
     return {
@@ -126,6 +135,7 @@ def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[st
         "verdict": str(found.verdict),
         "effects": list(found.claimed_names),
         "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
+        "headline": "\n".join(describe_headline(found.document)),
         "words": f"{words}\nNote: {note}." if note else words,
         "wall_s": found.wall_s,
         **({"note": note} if note else {}),

@@ -48,6 +48,7 @@ def diagnosis_document(
         "candidates": [_describe_candidate(each) for each in diagnosis.candidates],
         "remainder": dict(diagnosis.residual_structure),
         "proposal": None if proposal is None else asdict(proposal),
+        "estimation_samples": diagnosis.estimation_samples,
         "held_out_part": diagnosis.held_out_part,
         "output_std": _measure_output(diagnosis),
         "as_given_rmse": diagnosis.nominal_rmse,

@@ -218,6 +218,18 @@ def describe_diagnosis(document: Document) -> list[str]:
     return [describe_verdict(document), *causes, *describe_details(document)]
 
 
+def describe_headline(document: Document) -> list[str]:
+    """Describe a diagnosis in its most important sentences: verdict, causes, and errors or correction.
+
+    They are sentences of `describe_diagnosis`, without indents.
+    """
+    facts = DiagnosisFacts(document)
+    names = ("record",) if facts.is_gross else ("gain", "error")
+    texts = write_statements((each for each in DETAILS if each.name in names), facts)
+    lines = (line for text in texts for line in text.splitlines())
+    return [describe_verdict(document), *describe_causes(document), *lines]
+
+
 def describe_verdict(document: Document) -> str:
     """State the verdict."""
     return " ".join(write_statements(VERDICTS, DiagnosisFacts(document)))

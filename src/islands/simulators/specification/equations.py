@@ -143,16 +143,45 @@ class OdeSpec(SimulatorSpec):
     def from_text(cls, kind: str, text: str) -> "OdeSpec":
         """Parse the path of a TOML file."""
         try:
-            document = tomllib.loads(Path(text).read_text(encoding="utf-8"))
+            content = Path(text).read_text(encoding="utf-8")
         except (OSError, ValueError) as error:
-            raise SettingsError(f"{text} cannot be read as TOML ({error}): write ode:FILE.toml") from error
-        document.setdefault("name", Path(text).stem)
-        return cls.model_validate({**document, "kind": kind})
+            raise SettingsError(f"{text} cannot be read as text ({error}): write {kind}:FILE.toml") from error
+        return cls.from_toml(content, text, Path(text).stem)
+
+    @classmethod
+    def from_toml(cls, content: str, place: str, name: str) -> "OdeSpec":
+        """Parse the content of a TOML file.
+
+        Parameters
+        ----------
+        content : str
+        place : str
+            What the content is, for messages.
+        name : str
+            Name of equations that have none.
+
+        Raises
+        ------
+        SettingsError
+            The content is not TOML. The message has line and column.
+        ValidationError
+            The equations are invalid. The message has the line.
+        """
+        try:
+            document = tomllib.loads(content)
+        except (ValueError, RecursionError) as error:
+            raise SettingsError(
+                f"{place} cannot be read as TOML ({error}): write NAME = VALUE, and texts in quotes"
+            ) from error
+        return cls.model_validate({"name": name, **document, "kind": "ode"})
+
+
+def read_built_in_text(name: str) -> str:
+    """Return the TOML file with the equations of a built-in simulator."""
+    return files("islands.simulators").joinpath("built_in", f"{name}.toml").read_text(encoding="utf-8")
 
 
 @cache
 def read_built_in(name: str) -> OdeSystem:
     """Return the equations of a built-in simulator."""
-    document = files("islands.simulators").joinpath("built_in", f"{name}.toml").read_text(encoding="utf-8")
-    system = OdeSpec.model_validate({**tomllib.loads(document), "kind": "ode"}).make_system()
-    return replace(system, is_built_in=True)
+    return replace(OdeSpec.from_toml(read_built_in_text(name), name, name).make_system(), is_built_in=True)

@@ -9,6 +9,7 @@ from islands.io.result_text.diagnosis_statements import (
     VERDICTS,
     DiagnosisFacts,
     describe_diagnosis,
+    describe_headline,
     describe_verdict,
     name_reference,
     write_value,
@@ -192,3 +193,18 @@ def test_contradictions_are_found():
 
 def _value(value, unit):
     return {"value": value, "unit": unit, "ci95": None}
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_the_headline_is_a_part_of_the_sentences(verdict):
+    finding = {
+        "name": "time-offset",
+        "description": "The output is late.",
+        "advice": "Shift it.",
+        "errors": None,
+    }
+    document = make_document(str(verdict), effects=[CAUSE], record_findings=[finding])
+    headline = describe_headline(document)
+    assert headline[0] == describe_verdict(document)
+    assert set(headline) <= {line.strip() for line in describe_diagnosis(document)}
+    assert any("the RMSE" in line or "Record: " in line for line in headline)

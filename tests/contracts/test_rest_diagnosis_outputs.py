@@ -1,0 +1,75 @@
+"""Measured and simulated outputs of a finished diagnosis over REST."""
+
+import pytest
+
+from islands_api import Client
+from islands_service.domain.job import DISCREPANCY, JobOutcome, JobState
+from support.service import hidden, problem_of, run_diagnosis
+
+pytestmark = pytest.mark.ci
+
+
+@pytest.fixture(scope="module")
+def finished(serve):
+    """A service with a finished diagnosis of a record with an injected effect, and the id of the job."""
+    with serve() as running:
+        yield running, run_diagnosis(running, hidden(running.settings.data_dir))
+
+
+def ask(finished, query="", **headers):
+    service, job = finished
+    return service.client.get(f"/v1/jobs/{job}/outputs?{query}", headers=headers)
+
+
+def test_the_outputs_have_the_errors_of_the_result(finished):
+    service, job = finished
+    result = service.client.get(f"/v1/jobs/{job}/result").json()
+    found = ask(finished, f"start={result['estimation_samples']}&points=5000").json()
+    assert found["stop"] == result["record"]["samples"]
+    assert [each["name"] for each in found["outputs"]] == ["measured", "simulated", "extended"]
+    for residual, side in zip(found["residuals"], ("before", "after"), strict=True):
+        squares = [value**2 for value in residual["minimum"]]
+        assert (sum(squares) / len(squares)) ** 0.5 == pytest.approx(result["gain"][side]["rmse"])
+
+
+def test_the_extremes_are_those_of_all_samples(finished):
+    every, few = (ask(finished, f"points={points}").json() for points in (5000, 7))
+    assert len(few["rows"]) == 7
+    for part in ("outputs", "residuals"):
+        for fine, coarse in zip(every[part], few[part], strict=True):
+            assert min(fine["minimum"]) == min(coarse["minimum"])
+            assert max(fine["maximum"]) == max(coarse["maximum"])
+
+
+def test_an_answer_is_revalidated(finished):
+    first = ask(finished)
+    again = ask(finished, **{"if-none-match": first.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert "no-cache" in first.headers["cache-control"]
+
+
+def test_the_client_has_the_same_outputs(finished):
+    service, job = finished
+    with Client(str(service.client.base_url)) as client:
+        found = client.outputs(job, start=10, stop=20)
+    assert found.rows == tuple(range(10, 20))
+
+
+@pytest.mark.parametrize(
+    ("query", "detail"), [("start=9999999", "is not a part of it"), ("points=0", "points")]
+)
+def test_invalid_requests_say_what_exists(finished, query, detail):
+    answer = ask(finished, query)
+    assert (answer.status_code, detail in answer.text) == (422, True), answer.text
+
+
+def test_a_result_of_an_earlier_version_has_no_outputs(finished):
+    service, _ = finished
+    dataset = service.upload(hidden(service.settings.data_dir)).json()["id"]
+    order = {"dataset": dataset, "input": "u_V", "output": "y_um", "simulation": {"kind": "second-order"}}
+    job = service.client.post("/v1/discrepancies", json=order).json()
+    assert job["kind"] == DISCREPANCY
+    lease = service.store.leases.claim("test", 600.0)
+    service.store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"verdict": "nothing"}))
+    answer = service.client.get(f"/v1/jobs/{job['id']}/outputs")
+    assert "submit it again" in problem_of(answer, 404, "not-found")

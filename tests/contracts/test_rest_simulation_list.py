@@ -1,0 +1,72 @@
+"""Simulations over REST: the list, and the check of equations."""
+
+import pytest
+
+from islands.simulators.specification.table import SIMULATORS
+from islands_api import Client
+from support.service import held, kept, problem_of
+
+VALID = """
+input = "u"
+output = "x"
+equations = '''
+dx/dt = (u - x)/tau
+'''
+
+[parameters]
+tau = { value = 0.2, unit = "s", tolerance = 0.05 }
+"""
+
+
+def check(service, text):
+    return service.client.post("/v1/simulations/equations", json={"text": text})
+
+
+def test_the_list_has_all_simulations_that_are_no_code(service):
+    items = service.client.get("/v1/simulations").json()["items"]
+    assert [each["kind"] for each in items] == [each.name for each in SIMULATORS.values() if each.is_remote]
+    for each in items:
+        assert {entry["name"] for entry in each["parameters"]} == SIMULATORS[each["kind"]].parameters.keys()
+
+
+def test_a_listed_default_is_the_value_of_an_absent_parameter(service):
+    piezo, oscillator = service.client.get("/v1/simulations").json()["items"][:2]
+    assert {each["name"]: each["default"] for each in piezo["parameters"]}["dp"] == 1.6
+    assert {each["default"] for each in oscillator["parameters"]} == {None}
+    assert oscillator["estimated"]
+
+
+def test_the_equations_of_a_built_in_simulation_are_valid(service):
+    for each in service.client.get("/v1/simulations").json()["items"]:
+        if each["equations"]:
+            answer = check(service, each["equations"])
+            assert (answer.status_code, answer.json()["name"]) == (200, each["kind"])
+
+
+def test_checked_equations_are_the_simulation_of_a_request(service):
+    with Client(str(service.client.base_url)) as client:
+        simulation = client.check_equations(VALID)
+    assert simulation["parameters"] == {"tau": {"value": 0.2, "unit": "s", "tolerance": 0.05}}
+    order = held(kept(service.store), simulation=simulation)
+    answer = service.client.post("/v1/discrepancies", json=order)
+    assert answer.status_code == 202, answer.text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "detail"),
+    [
+        ("- x)/tau", "- x)/tua", "line 1 of the equations, 'dx/dt = (u - x)/tua': unknown name 'tua'"),
+        ("(u - x)", "(u - x", "'(' was never closed"),
+        ("0.2,", ",", "(at line 9, column "),
+        ("input", "inputs", "inputs: Extra inputs are not permitted. Did you mean 'input'"),
+        ("[parameters]", f"a = {'[' * 900}", "cannot be read as TOML"),
+    ],
+)
+def test_a_wrong_text_is_refused_with_its_place(service, old, new, detail):
+    assert detail in problem_of(check(service, VALID.replace(old, new, 1)), 422, "invalid-settings")
+
+
+def test_a_long_line_is_refused_before_it_is_parsed(service):
+    answer = check(service, f"{'a.' * 600}a = 1")
+    problem_of(answer, 422, "invalid-request")
+    assert "line 1 has 1205 characters" in answer.text
