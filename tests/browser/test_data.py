@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from support.canvas import DRAWN
 from support.command_line import write_hysteresis
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
@@ -23,21 +24,6 @@ DROP = """([name, text]) => {
   for (const kind of ["dragover", "drop"])
     document.querySelector("main").dispatchEvent(
       new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data }));
-}"""
-
-#: Returns the number of coloured pixels of a canvas; axes and texts are grey.
-DRAWN = """(canvas) => {
-  const copy = document.createElement("canvas");
-  [copy.width, copy.height] = [canvas.width, canvas.height];
-  const pen = copy.getContext("2d", { willReadFrequently: true });
-  pen.drawImage(canvas, 0, 0);
-  const { data } = pen.getImageData(0, 0, copy.width, copy.height);
-  let coloured = 0;
-  for (let at = 0; at < data.length; at += 4) {
-    const rgb = data.slice(at, at + 3);
-    coloured += data[at + 3] > 0 && Math.max(...rgb) - Math.min(...rgb) > 40;
-  }
-  return coloured;
 }"""
 
 

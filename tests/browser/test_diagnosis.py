@@ -1,14 +1,21 @@
 """Page of a discrepancy job; the test acts as the coordinator."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, ProgressReport
+from islands_service.domain.diagnosis_outputs import write_outputs
+from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, JobState, ProgressReport
 from islands_service.store.blobs import Blobs
+from support.canvas import DRAWN
+from support.diagnosis_documents import CAUSE, GAIN, make_document
 from support.played import stored
+from support.processes import eventually
+from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
@@ -17,7 +24,33 @@ pytestmark = pytest.mark.ci
 
 WORDS = "The simulation lacks something <b>that has a name</b>.\n  thermal-drift: k = 1 um/K\nThe RMSE falls."
 
-SUMMARY = {"verdict": "named", "effects": ["thermal-drift"], "reduction_percent": 64.3, "words": WORDS}
+#: The headline without the last sentence, which belongs to the details.
+HEADLINE = "\n".join(line.strip() for line in WORDS.split("\n")[:2])
+
+SUMMARY = {
+    "verdict": "named",
+    "effects": ["thermal-drift"],
+    "reduction_percent": 64.3,
+    "headline": HEADLINE,
+    "words": WORDS,
+}
+
+#: A named cause that another one equals, a worse cause, and one that worsens the fit.
+CANDIDATES = [
+    {"name": "thermal-drift", "score": 40.0, "eta": 0.99},
+    {"name": "linear-drift", "score": 10.0, "eta": 0.5},
+    {"name": "jump", "score": -2.0, "eta": 0.0},
+]
+
+RESULT = make_document(
+    "named",
+    effects=[{**CAUSE, "name": "thermal-drift", "equivalents": ["exponential-creep"]}],
+    gain=GAIN,
+    candidates=CANDIDATES,
+    estimation_samples=300,
+    decisive_experiment="hold the input",
+)
+RESULT["record"] |= {"samples": 400, "dt": 0.01}
 
 PAGE = b"<!DOCTYPE html><title>piezo.csv: named</title><h1>piezo.csv against bouc-wen-piezo</h1>"
 
@@ -25,8 +58,14 @@ PAGE = b"<!DOCTYPE html><title>piezo.csv: named</title><h1>piezo.csv against bou
 def make_outcome(desk: Service, **summary: Any) -> JobOutcome:
     """Return the outcome of a diagnosis, with a stored report."""
     blobs = Blobs(desk.folder / "blobs")
-    artefacts = {REPORT: blobs.write(PAGE), EXTENDED: blobs.write(b"{}")}
-    return JobOutcome(JobState.SUCCEEDED, {}, summary={**SUMMARY, **summary}, artefacts=artefacts)
+    output = np.sin(np.arange(400) / 20)
+    outputs = write_outputs(output, {"simulated": 0.8 * output, "extended": 0.99 * output})
+    artefacts = {
+        REPORT: blobs.write(PAGE),
+        EXTENDED: blobs.write(b"{}"),
+        OUTPUTS: blobs.write(outputs),
+    }
+    return JobOutcome(JobState.SUCCEEDED, RESULT, summary={**SUMMARY, **summary}, artefacts=artefacts)
 
 
 def submit_diagnosis(desk: Service, **changes: Any) -> str:
@@ -56,9 +95,9 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
         store.leases.finish(lease, make_outcome(desk))
     expect(page.locator(".status .progress-text")).to_have_text("named: thermal-drift")
     findings = page.locator(".findings")
-    expect(findings.locator("p")).to_have_text([line.strip() for line in WORDS.split("\n")])
-    assert findings.locator("b").count() == 0
-    assert page.locator("figure.chart").count() == 0
+    expect(findings.locator(":scope > p")).to_have_text(HEADLINE.split("\n"))
+    expect(page.locator(".sentences p")).to_have_text("The RMSE falls.")
+    assert page.locator(".findings b, .sentences b").count() == 0
     facts = page.locator(".about .facts").first
     expect(facts).to_contain_text("bouc-wen-piezo: dp = 1.5")
     expect(facts).to_contain_text("Tolerance of dp1 %")
@@ -103,3 +142,57 @@ def test_the_list_shows_the_verdict_of_a_diagnosis(
     page.get_by_role("link", name="two").first.click()
     expect(page.get_by_role("button", name="Save the report")).to_be_visible()
     assert page.get_by_role("button", name="Save the extended simulation").count() == 0
+
+
+@pytest.fixture
+def finished(desk: Service) -> str:
+    """A succeeded diagnosis."""
+    job = submit_diagnosis(desk)
+    with stored(desk) as store:
+        store.leases.finish(taken(store, job), make_outcome(desk))
+    return job
+
+
+def test_verdict_and_figure_are_on_the_first_screen_above_the_causes(
+    quiet: Callable[..., Screen], desk: Service, finished: str
+) -> None:
+    page = quiet(desk.url, width=1440, height=900).go(f"#/jobs/{finished}")
+    eventually(lambda: page.locator("canvas").count() == 1 and page.locator("canvas").evaluate(DRAWN) > 100)
+    boxes = [page.locator(part).first.bounding_box() for part in (".verdict", "canvas", "table.causes")]
+    assert boxes[0]["y"] < boxes[1]["y"] < boxes[2]["y"]
+    assert boxes[1]["y"] + boxes[1]["height"] <= 900
+
+
+def test_the_values_of_all_outputs_are_read_with_the_keys(
+    quiet: Callable[..., Screen], desk: Service, finished: str, expect: Any
+) -> None:
+    page = quiet(desk.url).go(f"#/jobs/{finished}")
+    plot = page.get_by_role("slider", name="Record")
+    plot.press("ArrowRight")
+    names = r"measured \S+, simulated \S+, extended \S+, residual before \S+, residual after \S+"
+    expect(plot).to_have_attribute("aria-valuetext", re.compile(rf"^0\.04 s: {names}$"))
+
+
+def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
+    quiet: Callable[..., Screen], desk: Service, finished: str, expect: Any
+) -> None:
+    page = quiet(desk.url).go(f"#/jobs/{finished}")
+    rows = page.locator("table.causes tbody tr")
+    expect(rows).to_have_text(
+        [
+            re.compile(text)
+            for text in ("drift40.0\\s*99 %0.98exponential-creep", "drift10.0\\s*50 %$", "jump−2.00")
+        ]
+    )
+    widths = [float(bar.get_attribute("width")) for bar in rows.locator("rect").all()]
+    assert widths == [100.0, 25.0, 0.0]
+    expect(page.locator(".card", has=rows).locator(".facts")).to_contain_text("hold the input")
+
+
+@pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
+def test_the_page_of_a_finished_diagnosis_is_readable(
+    quiet: Callable[..., Screen], desk: Service, finished: str, scheme: str, width: int
+) -> None:
+    page = quiet(desk.url, width, 800, color_scheme=scheme).go(f"#/jobs/{finished}")
+    page.locator("table.causes").wait_for()
+    assert unreadable(page) == []

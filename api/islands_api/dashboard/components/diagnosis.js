@@ -1,6 +1,10 @@
-/** Result in words of a discrepancy job, with its report, or of a record of a monitor. */
+/** Result of a discrepancy job in words and figures, or of a record of a monitor in words. */
 
+import { getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
+import { showProblem } from "./banner.js";
+import { makeCauses } from "./diagnosing/causes.js";
+import { makeOutputsPlot } from "./diagnosing/outputs_plot.js";
 import { makeMonitorForm } from "./monitoring/monitor_form.js";
 import { makeReportButtons, makeSaveButton } from "./report.js";
 
@@ -14,18 +18,39 @@ export const isSearch = (job) => job.kind === "identification";
 export const formatVerdict = ({ verdict: word, effects = [], status }) =>
   effects.length ? `${word}: ${effects.join(", ")}` : (word ?? status);
 
-/** Make the panel of the result. */
-export function makeFindingsPanel(job) {
+/** Return the lines of the headline, and those of the other sentences. */
+function splitWords({ headline, words }) {
+  const lines = words.split("\n").map((line) => line.trim());
+  // Results of earlier versions have no headline.
+  const first = headline?.split("\n") ?? lines;
+  return [first, lines.filter((line) => !first.includes(line))];
+}
+
+const makeLines = (lines) => lines.map((line) => el("p", {}, line));
+
+/** Show the figure and the causes of a diagnosis in their hosts. */
+async function showResult(job, figureHost, causesHost, signal) {
+  const result = await getJson(`v1/jobs/${encodeURIComponent(job.id)}/result`, { signal });
+  figureHost.replaceChildren(...[makeOutputsPlot(job, result, signal)].filter(Boolean));
+  causesHost.replaceChildren(...[makeCauses(result)].filter(Boolean));
+}
+
+/** Make the panels of the result: the headline and the figure, the causes, and the other sentences. */
+export function makeFindingsPanels(job, signal) {
   const { summary } = job;
   const file = `extended-${job.id.slice(0, 8)}.json`;
-  const [first, ...lines] = summary.words.split("\n");
+  const [[verdict, ...headline], rest] = splitWords(summary);
   const isNamed = isDiagnosis(job) && summary.reduction_percent !== null;
-  return el(
+  const [figureHost, causesHost] = [el("div"), el("div")];
+  if (isDiagnosis(job))
+    showResult(job, figureHost, causesHost, signal).catch((error) => signal.aborted || showProblem(error));
+  const findings = el(
     "section",
     { class: "card findings" },
     el("h2", {}, "Findings"),
-    el("p", { class: "verdict" }, first),
-    lines.map((line) => el("p", {}, line.trim())),
+    el("p", { class: "verdict" }, verdict),
+    makeLines(headline),
+    figureHost,
     el(
       "div",
       { class: "row exports" },
@@ -34,4 +59,6 @@ export function makeFindingsPanel(job) {
     ),
     isDiagnosis(job) ? makeMonitorForm(job) : null,
   );
+  const details = el("section", { class: "card sentences" }, el("h2", {}, "Details"), makeLines(rest));
+  return [findings, causesHost, ...(rest.length ? [details] : [])];
 }

@@ -1,20 +1,22 @@
 /**
- * Plot of columns of a data set, one panel each. After a click the wheel zooms; dragging moves; arrow keys
- * read values.
+ * Plot of signals in panels. After a click the wheel zooms; dragging moves; arrow keys read values.
  *
  * The service sends the extremes of as many parts of the rows as the plot has pixels. A new range is drawn at
  * once from the last answer, and again when its own answer arrives.
  */
 
-import { getJson } from "../lib/api.js";
 import { el, setText } from "../lib/dom.js";
 import { formatCount, formatNumber, formatShort } from "../lib/numbers.js";
 import { makeScale } from "../lib/scale.js";
+import { drawEnvelope, drawNames, strokeLine } from "./signal_lines.js";
 
-const [PANEL, GAP, LEFT, BOTTOM] = [110, 14, 62, 36];
+const [PANEL, TALL_PANEL, GAP, LEFT, BOTTOM] = [110, 150, 14, 62, 36];
 
-/** Fewest rows of a range, largest number of points of a request, and columns of a plot. */
-const [LEAST_ROWS, MOST_POINTS, MOST_COLUMNS] = [8, 2000, 8];
+/** How a plot is read; for a text beside it. */
+export const HINT = "Click, then wheel: zoom. Drag: move. Keys: arrows, +, −, Home.";
+
+/** Fewest rows of a range, largest number of points of a request, and panels of a plot. */
+const [LEAST_ROWS, MOST_POINTS, MOST_PANELS] = [8, 2000, 8];
 
 /** Factor of the range for a step of the wheel or a key. */
 const ZOOM = 1.25;
@@ -44,16 +46,17 @@ function findPart({ rows, stop }, row) {
 }
 
 /**
- * Make the plot of a data set with `preview`; `show(names)` selects its columns, `onRange([start, stop])` is
- * called with the rows that are visible.
+ * Make a plot of a record of `samples` rows, those from `heldOut` on with another background.
+ *
+ * `ask(query, names)` requests the rows `start` to `stop` of signals as at most `points` parts.
+ * `show(panels)` selects the panels, each a list of lines `{name, unit, colour}` over one axis; a colour is a
+ * custom property of the style. `onRange([start, stop])` is called with the rows that are visible.
  */
-export function makeSignalPlot({ id, preview }, onRange, signal) {
-  const { samples, dt } = preview;
-  const units = Object.fromEntries(preview.columns.map(({ name, unit }) => [name, unit]));
+export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange, signal) {
   const canvas = el("canvas", { "aria-hidden": "true" });
   const plot = el("div", { class: "signals", tabindex: "0", role: "slider", "aria-label": "Record" }, canvas);
   const position = el("p", { class: "position soft small" });
-  let [names, range, pointed, answer] = [[], [0, samples], null, null];
+  let [panels, range, pointed, answer] = [[], [0, samples], null, null];
   let timer;
 
   const describeRow = (row) =>
@@ -63,11 +66,10 @@ export function makeSignalPlot({ id, preview }, onRange, signal) {
   async function request() {
     const [start, stop] = [Math.floor(range[0]), Math.ceil(range[1])];
     const points = clamp(Math.round(plot.clientWidth), 1, MOST_POINTS);
-    const query = new URLSearchParams({ start, stop, points });
-    for (const name of names) query.append("column", name);
-    const asked = names;
-    const found = await getJson(`v1/datasets/${encodeURIComponent(id)}/samples?${query}`, { signal });
-    if (asked !== names) return;
+    const asked = panels;
+    const names = new Set(panels.flat().map(({ name }) => name));
+    const found = await ask(new URLSearchParams({ start, stop, points }), [...names]);
+    if (asked !== panels) return;
     answer = found;
     draw();
   }
@@ -75,27 +77,37 @@ export function makeSignalPlot({ id, preview }, onRange, signal) {
   function load() {
     clearTimeout(timer);
     timer = setTimeout(
-      () => names.length && request().catch((error) => signal.aborted || setText(position, error.message)),
+      () => panels.length && request().catch((error) => signal.aborted || setText(position, error.message)),
       answer === null ? 0 : PAUSE,
     );
   }
 
   function draw() {
     const width = plot.clientWidth;
-    const height = names.length * (PANEL + GAP) + BOTTOM;
-    if (!width || !names.length) return;
+    const heights = panels.map((lines) => (lines.length > 1 ? TALL_PANEL : PANEL));
+    const height = heights.reduce((sum, each) => sum + each + GAP, BOTTOM);
+    if (!width || !panels.length) return;
     const ratio = devicePixelRatio || 1;
     [canvas.width, canvas.height] = [width * ratio, height * ratio];
     const pen = canvas.getContext("2d");
     pen.scale(ratio, ratio);
     const style = getComputedStyle(plot);
     const colours = Object.fromEntries(
-      ["ink", "soft", "line", "accent"].map((name) => [name, style.getPropertyValue(`--${name}`)]),
+      ["ink", "soft", "line", "tint", "accent", "before"].map((name) => [
+        name,
+        style.getPropertyValue(`--${name}`),
+      ]),
     );
     pen.font = `11.5px ${style.fontFamily}`;
     const x = getX();
+    pen.fillStyle = colours.tint;
+    const shaded = Math.max(heldOut, range[0]);
+    if (shaded < range[1]) pen.fillRect(x.at(shaded), 0, x.at(range[1]) - x.at(shaded), height - BOTTOM);
     drawTimes(pen, width, height, colours);
-    names.forEach((name, at) => drawPanel(pen, x, name, at, width, colours));
+    panels.reduce((top, lines, at) => {
+      drawPanel(pen, x, lines, [top, top + heights[at]], width, colours);
+      return top + heights[at] + GAP;
+    }, 0);
     if (pointed !== null) {
       pen.strokeStyle = colours.soft;
       pen.setLineDash([3, 3]);
@@ -117,41 +129,27 @@ export function makeSignalPlot({ id, preview }, onRange, signal) {
     pen.fillText(dt === null ? "row" : "time (s)", (LEFT + width) / 2, height - 4);
   }
 
-  function drawPanel(pen, x, name, at, width, { ink, soft, line, accent }) {
-    const [top, bottom] = [at * (PANEL + GAP), at * (PANEL + GAP) + PANEL];
-    const column = answer?.columns.find((each) => each.name === name);
-    const values = column ? [...column.minimum, ...column.maximum].filter((value) => value !== null) : [];
+  function drawPanel(pen, x, lines, [top, bottom], width, colours) {
+    const columns = lines.map(({ name }) => answer?.columns.find((each) => each.name === name));
+    const values = columns
+      .flatMap((column) => (column ? [...column.minimum, ...column.maximum] : []))
+      .filter((value) => value !== null);
     const y = makeScale(values, [bottom - 4, top + 20], { padding: 0.05, maxTicks: 4 });
     pen.textAlign = "right";
-    pen.fillStyle = soft;
+    pen.fillStyle = colours.soft;
     const ticks = values.length ? y.ticks : [];
     for (const tick of ticks) pen.fillText(formatShort(tick), LEFT - 6, y.at(tick) + 4);
-    pen.strokeStyle = line;
+    pen.strokeStyle = colours.line;
     strokeLine(pen, LEFT, bottom, width, bottom);
-    pen.textAlign = "left";
-    pen.fillStyle = ink;
-    pen.fillText(units[name] ? `${name} (${units[name]})` : name, LEFT + 4, top + 11);
-    if (!column) return;
+    drawNames(pen, lines, [LEFT + 4, top + 11], colours);
     pen.save();
     pen.beginPath();
-    pen.rect(LEFT, top, width - LEFT, PANEL);
+    pen.rect(LEFT, top, width - LEFT, bottom - top);
     pen.clip();
-    pen.strokeStyle = accent;
-    pen.lineWidth = 1.3;
-    pen.beginPath();
-    let isDown = false;
-    answer.rows.forEach((row, part) => {
-      const [low, high] = [column.minimum[part], column.maximum[part]];
-      if (low === null) isDown = false;
-      else {
-        // The line enters a part at one extreme and leaves it at the other.
-        const [first, second] = part % 2 ? [high, low] : [low, high];
-        pen[isDown ? "lineTo" : "moveTo"](x.at(row), y.at(first));
-        pen.lineTo(x.at(row), y.at(second));
-        isDown = true;
-      }
+    columns.forEach((column, at) => {
+      pen.strokeStyle = colours[lines[at].colour ?? "accent"];
+      if (column) drawEnvelope(pen, x, y, column, answer.rows);
     });
-    pen.stroke();
     pen.restore();
   }
 
@@ -240,19 +238,11 @@ export function makeSignalPlot({ id, preview }, onRange, signal) {
   return {
     node: el("figure", { class: "chart" }, plot, position),
     show(chosen) {
-      names = chosen.slice(0, MOST_COLUMNS);
-      canvas.hidden = !names.length;
+      panels = chosen.slice(0, MOST_PANELS);
+      canvas.hidden = !panels.length;
       draw();
       load();
     },
     showAll: () => move(0, samples),
   };
-}
-
-function strokeLine(pen, fromX, fromY, toX, toY) {
-  pen.lineWidth = 1;
-  pen.beginPath();
-  pen.moveTo(fromX, fromY);
-  pen.lineTo(toX, toY);
-  pen.stroke();
 }

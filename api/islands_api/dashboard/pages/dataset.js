@@ -2,25 +2,47 @@
 
 import { makeColumnChoice } from "../components/column_choice.js";
 import { listFacts } from "../components/dataset.js";
+import { makeDiagnosisForm } from "../components/diagnosing/diagnosis_form.js";
 import { makeRunForm } from "../components/run_form.js";
-import { makeSignalPlot } from "../components/signal_plot.js";
+import { HINT, makeSignalPlot } from "../components/signal_plot.js";
 import { getJson } from "../lib/api.js";
 import { el, makeFacts } from "../lib/dom.js";
 import { formatBytes, formatCount, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
 
-const HINT = "Click, then wheel: zoom. Drag: move. Keys: arrows, +, −, Home.";
+/** Return the function that requests columns of a data set for a plot. */
+const askDataset = (id, signal) => (query, names) => {
+  for (const name of names) query.append("column", name);
+  return getJson(`v1/datasets/${encodeURIComponent(id)}/samples?${query}`, { signal });
+};
 
 function makeContent(dataset, signal) {
   const { preview } = dataset;
-  const form = makeRunForm(dataset);
-  const plot = makeSignalPlot(dataset, form.setRows, signal);
+  const units = Object.fromEntries(preview.columns.map(({ name, unit }) => [name, unit]));
+  const makeLine = (name, colour) => ({ name, unit: units[name], colour });
+  let simulated = null;
+  const forms = [makeRunForm(dataset), makeDiagnosisForm(dataset, showSimulated, signal)];
+  const setRows = (rows) => forms.forEach((form) => form.setRows(rows));
+  const plot = makeSignalPlot({ ...preview, ask: askDataset(dataset.id, signal) }, setRows, signal);
   const choice = makeColumnChoice(preview, update);
 
-  function update() {
+  function showSignals() {
     const { inputs, output } = choice.getChoice();
-    form.show({ inputs, output });
-    plot.show([...inputs, ...(output ? [output] : [])]);
+    const measured = simulated
+      ? [makeLine(output, "ink"), makeLine(simulated, "before")]
+      : [makeLine(output)];
+    plot.show([...inputs.map((name) => [makeLine(name)]), ...(output ? [measured] : [])]);
+  }
+
+  /** Draw a recorded simulation over the measured output. */
+  function showSimulated(column) {
+    simulated = column;
+    showSignals();
+  }
+
+  function update() {
+    forms.forEach((form) => form.show(choice.getChoice()));
+    showSignals();
   }
 
   // The plot has no width before the page contains it.
@@ -49,7 +71,7 @@ function makeContent(dataset, signal) {
       ),
       plot.node,
     ),
-    form.node,
+    ...forms.map((form) => form.node),
     el("section", { class: "card" }, el("h2", {}, "Columns"), choice.node),
     preview.inspection &&
       el("section", { class: "card" }, el("h2", {}, "Facts"), listFacts(preview.inspection)),

@@ -5,7 +5,7 @@ import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
 import { makeCoupledPanel } from "../components/coupled_model.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
-import { isSearch, makeFindingsPanel } from "../components/diagnosis.js";
+import { isDiagnosis, isSearch, makeFindingsPanels } from "../components/diagnosis.js";
 import {
   getIsolatedName,
   getName,
@@ -144,7 +144,7 @@ export function mountJob(host, { id, rank }, signal) {
   const bar = makeProgressBar();
   const factsHost = el("div");
   const failureHost = el("div");
-  const [resultHost, convergenceHost, modelsHost] = [el("div"), el("div"), el("div")];
+  const [resultHost, convergenceHost, modelsHost] = [el("div", { class: "stack" }), el("div"), el("div")];
   const aboutHost = el("div", { class: "about" });
   const titleBar = el(
     "div",
@@ -193,8 +193,9 @@ export function mountJob(host, { id, rank }, signal) {
     if (!isSearch(job)) {
       // Not replaced if present: a button in it may have the focus.
       const succeeded = job.state === "succeeded";
-      if (succeeded !== modelsHost.hasChildNodes())
-        modelsHost.replaceChildren(...(succeeded ? [makeFindingsPanel(job)] : []));
+      const findingsHost = isDiagnosis(job) ? resultHost : modelsHost;
+      if (succeeded !== findingsHost.hasChildNodes())
+        findingsHost.replaceChildren(...(succeeded ? makeFindingsPanels(job, signal) : []));
     } else if (job.state === "succeeded" && models === null) {
       models = hasSeveralOutputs(job)
         ? makeCoupledPanel(job, signal)

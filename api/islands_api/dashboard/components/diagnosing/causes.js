@@ -1,0 +1,71 @@
+/** Causes that a diagnosis has screened: score, confidence, and those that cannot be told apart. */
+
+import { el, makeFacts, makeScrollable, makeTable, svg } from "../../lib/dom.js";
+import { formatNumber } from "../../lib/numbers.js";
+
+/** Number of causes that are shown at first. */
+const SHOWN = 10;
+
+/** Make a bar whose length is a share of the largest score. */
+function makeBar(score, most) {
+  const width = Math.max(0, (100 * score) / most);
+  const bar = svg("rect", { width, height: 10, rx: 1 });
+  return svg(
+    "svg",
+    { class: "bar", viewBox: "0 0 100 10", preserveAspectRatio: "none", "aria-hidden": "true" },
+    bar,
+  );
+}
+
+/** Format a confidence as the sentences do: no cause is certain. */
+function formatConfidence(value) {
+  if (value >= 0.995) return "above 0.99";
+  return value < 0.005 ? "below 0.01" : value.toFixed(2);
+}
+
+function makeRow({ name, score, eta }, effect, most) {
+  const isNamed = effect !== undefined && effect.claimed !== false;
+  return [
+    el("span", { class: isNamed ? "named" : null }, name),
+    el("span", { class: "score" }, makeBar(score, most), formatNumber(score)),
+    `${Math.floor(100 * eta)} %`,
+    effect ? formatConfidence(effect.confidence) : "",
+    effect?.equivalents.join(", ") ?? "",
+  ];
+}
+
+function makeCauseTable(candidates, effects, most) {
+  const headings = [
+    ...["Cause", "Score"],
+    ...["Explained", "Confidence"].map((name) => [name, "figure"]),
+    "Cannot be told apart from",
+  ];
+  const rows = candidates.map((each) =>
+    makeRow(each, effects.find(({ name }) => name === each.name), most),
+  );
+  const table = makeTable("Screened causes, the best first", headings, rows);
+  table.classList.add("causes");
+  return makeScrollable("Screened causes", table);
+}
+
+/** Make the section of the causes of a result. */
+export function makeCauses({ candidates, effects, decisive_experiment: experiment }) {
+  if (!candidates.length) return null;
+  const most = Math.max(...candidates.map(({ score }) => score), 1e-9);
+  const make = (part) => makeCauseTable(part, effects, most);
+  const rest = candidates.slice(SHOWN);
+  const isUnsure = effects.some(({ equivalents }) => equivalents.length);
+  const about =
+    "Each effect alone is added to the calibrated simulation. The score is the decrease of −2 log-likelihood "
+    + "after a penalty on the parameters; only causes that passed all tests have a confidence.";
+  return el(
+    "section",
+    { class: "card" },
+    el("h2", {}, "Causes"),
+    el("p", { class: "soft small" }, about),
+    make(candidates.slice(0, SHOWN)),
+    rest.length > 0 &&
+      el("details", { class: "rest" }, el("summary", {}, `${rest.length} further causes`), make(rest)),
+    isUnsure && makeFacts([["Experiment that tells them apart", experiment ?? "none was found"]]),
+  );
+}

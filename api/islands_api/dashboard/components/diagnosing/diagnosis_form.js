@@ -1,0 +1,124 @@
+/** Form that starts a diagnosis of a simulation on a data set. */
+
+import { getJson } from "../../lib/api.js";
+import { el } from "../../lib/dom.js";
+import { makeField, makeJobForm, makeRowsField, quote } from "../job_request.js";
+import { makeSimulationChoice } from "./simulation_choice.js";
+
+const ABSENT = "Choose the input of the simulation and the measured output in the table of columns.";
+
+/** Return the form of a request for other programs. */
+function describe({ input, output, channels = [], rows, tolerance = {} }, simulated) {
+  const { simulation, argument, before } = simulated;
+  const options = [
+    ...["--input", quote(input), "--output", quote(output)],
+    ...channels.flatMap((each) => ["--channel", quote(each)]),
+    ...["--simulation", quote([simulation.kind, argument].filter(Boolean).join(":"))],
+    ...Object.entries(tolerance).flatMap(([name, value]) => ["--tolerance", quote(`${name}=${value}`)]),
+    ...(rows ? ["--rows", rows] : []),
+  ];
+  return { call: "diagnose", command: "diagnose", options, before };
+}
+
+/**
+ * Make the form of a data set; `show({inputs, output})` and `setRows([start, stop])` update it.
+ * `onSimulation` is called with the column of a recorded simulation, or null.
+ */
+export function makeDiagnosisForm({ id, name, preview }, onSimulation, signal) {
+  const usable = preview.columns.filter((column) => column.name !== preview.time && !column.problem);
+  const units = Object.fromEntries(usable.map((column) => [column.name, column.unit]));
+  const driver = el("select", { name: "input" });
+  const driverField = el(
+    "div",
+    { class: "fields", hidden: true },
+    makeField("diagnose", "Driven by", driver, "The other inputs are channels, such as a temperature."),
+  );
+  const rows = makeRowsField("diagnose", preview.samples, update);
+  const host = el("div", {}, el("p", { class: "loading" }, "Loading…"));
+  let [choice, simulated, column] = [{ inputs: [], output: "" }, null, null];
+
+  function makeRequest() {
+    const { inputs, output } = choice;
+    const found = simulated?.read();
+    if (!inputs.length || output === "" || !found) return null;
+    const channels = inputs.filter((each) => each !== driver.value);
+    const { simulation, tolerance = {} } = found;
+    return {
+      dataset: id,
+      input: driver.value,
+      output,
+      ...(channels.length && { channels }),
+      simulation,
+      ...(Object.keys(tolerance).length && { tolerance }),
+      name,
+      ...(rows.get() && { rows: rows.get() }),
+    };
+  }
+
+  function explain(request) {
+    if (!choice.inputs.length || choice.output === "") return ABSENT;
+    if (request === null) return "Complete the simulation.";
+    return `${request.output} against the simulation of ${request.input}`;
+  }
+
+  function update() {
+    form.update();
+    const { column: found = null } = (details.open && makeRequest()?.simulation) || {};
+    if (found === column) return;
+    column = found;
+    onSimulation(column);
+  }
+
+  function setRecord() {
+    const taken = [...choice.inputs, choice.output];
+    const columns = usable.map((each) => each.name).filter((each) => !taken.includes(each));
+    simulated?.setRecord({ columns, units: [units[driver.value], units[choice.output]] });
+    update();
+  }
+
+  async function open() {
+    if (!form.node.isConnected) details.append(form.node);
+    try {
+      if (simulated === null) {
+        const { items } = await getJson("v1/simulations", { signal });
+        simulated = makeSimulationChoice(items, update, signal);
+        host.replaceChildren(simulated.node);
+      }
+    } catch (error) {
+      if (!signal.aborted) host.replaceChildren(el("p", { class: "complaint" }, error.message));
+    }
+    setRecord();
+  }
+
+  const form = makeJobForm({
+    action: "Diagnose",
+    path: "v1/discrepancies",
+    makeRequest,
+    describe: (request) => describe(request, simulated.read()),
+    explain,
+    fields: (row) => [
+      driverField,
+      host,
+      el("details", {}, el("summary", {}, "Rows"), el("div", { class: "fields" }, rows.nodes)),
+      row,
+    ],
+  });
+  form.node.addEventListener("input", update);
+  driver.addEventListener("change", setRecord);
+  const title = el("summary", {}, el("h2", {}, "Diagnose a simulation"));
+  const purpose = "What does a simulation of this output lack? Its error is split into named causes.";
+  const details = el("details", { class: "card" }, title, el("p", { class: "soft" }, purpose));
+  details.addEventListener("toggle", open);
+  return {
+    node: details,
+    show(newChoice) {
+      choice = newChoice;
+      const kept = driver.value;
+      driver.replaceChildren(...choice.inputs.map((each) => el("option", { value: each }, each)));
+      if (choice.inputs.includes(kept)) driver.value = kept;
+      driverField.hidden = choice.inputs.length < 2;
+      setRecord();
+    },
+    setRows: rows.setVisible,
+  };
+}

@@ -1,0 +1,33 @@
+/** Plot of the measured, simulated and extended output of a finished diagnosis, and of its residuals. */
+
+import { getJson } from "../../lib/api.js";
+import { el } from "../../lib/dom.js";
+import { HINT, makeSignalPlot } from "../signal_plot.js";
+
+/** Colours of the simulated outputs, and names of their residuals: before and after the extension. */
+const [COLOURS, RESIDUALS] = [["before", "accent"], ["residual before", "residual after"]];
+
+/** Return the function that requests the outputs of a job for a plot. */
+const askOutputs = (job, signal) => async (query) => {
+  const path = `v1/jobs/${encodeURIComponent(job)}/outputs?${query}`;
+  const { outputs, residuals, ...part } = await getJson(path, { signal });
+  const named = residuals.map((each, at) => ({ ...each, name: RESIDUALS[at] }));
+  return { ...part, columns: [...outputs, ...named] };
+};
+
+/** Make the plot of a job with its result; a result of an earlier version has none. */
+export function makeOutputsPlot(job, { record, verdict, gain, estimation_samples: heldOut }, signal) {
+  if (heldOut === undefined) return null;
+  const ask = askOutputs(job.id, signal);
+  const plot = makeSignalPlot({ samples: record.samples, dt: record.dt, heldOut, ask }, () => {}, signal);
+  const after = verdict === "gross error" ? "corrected" : "extended";
+  const names = gain === null ? ["simulated"] : ["simulated", after];
+  const makeLine = (name, at) => ({ name, unit: record.units.output, colour: COLOURS[at] ?? "ink" });
+  const simulated = names.map(makeLine);
+  const residuals = names.map((_name, at) => makeLine(RESIDUALS[at], at));
+  // The plot has no width before the page contains it.
+  requestAnimationFrame(() => plot.show([[makeLine("measured"), ...simulated], residuals]));
+  const all = el("button", { type: "button", class: "quiet", on: { click: plot.showAll } }, "Show all rows");
+  const text = `Shaded: held out, not used for fitting. ${HINT}`;
+  return el("div", { class: "outputs" }, plot.node, el("p", { class: "soft small" }, text, all));
+}

@@ -1,0 +1,167 @@
+/** Choice of the simulation of a diagnosis: its kind, and the fields of that kind. */
+
+import { getJson } from "../../lib/api.js";
+import { el, setText } from "../../lib/dom.js";
+import { getServiceUrl, makeField, quote } from "../job_request.js";
+import { makeEquationsEditor } from "./equations_editor.js";
+import { makeParameterFields } from "./parameter_fields.js";
+
+const FORM = "diagnose";
+
+const LABELS = {
+  column: "A column of the file",
+  ode: "Differential equations as text",
+  linear: "A linear model",
+  model: "An identified model of a job",
+};
+
+const makeSelect = (name, options) =>
+  el("select", { name }, options.map(([value, text]) => el("option", { value }, text)));
+
+function makeColumnFields(columns) {
+  const column = makeSelect("column", columns.map((name) => [name, name]));
+  const hint = columns.length
+    ? "The recorded output of the simulation."
+    : "The file has no column besides the chosen ones.";
+  return {
+    node: el("div", { class: "fields" }, makeField(FORM, "Column", column, hint)),
+    read: () =>
+      column.value && { simulation: { kind: "column", column: column.value }, argument: column.value },
+  };
+}
+
+function makePhysicalFields({ kind, parameters }, units) {
+  const fields = makeParameterFields(parameters, { hasValues: true, units });
+  const file = `${kind}.json`;
+  return {
+    node: fields.node,
+    read() {
+      const { parameters: given, tolerance } = fields.read();
+      if (!Object.keys(given).length) return { simulation: { kind }, tolerance };
+      const before = [`echo ${quote(JSON.stringify(given))} > ${file}`];
+      return { simulation: { kind, parameters: given }, tolerance, argument: file, before };
+    },
+  };
+}
+
+function makeLinearFields() {
+  const makeNumber = (name, value, max) => el("input", { name, type: "number", min: 0, max, step: 1, value });
+  const [order, delay] = [makeNumber("order", 2, 10), makeNumber("delay", 0, 1000)];
+  return {
+    node: el(
+      "div",
+      { class: "fields" },
+      makeField(FORM, "Order", order, "Number of poles, and of zeros. All coefficients are estimated."),
+      makeField(FORM, "Delay", delay, "Samples by which the input acts late."),
+    ),
+    read: () =>
+      order.value !== "" && {
+        simulation: { kind: "linear", order: Number(order.value), delay: Number(delay.value) },
+        argument: `${order.value}:${delay.value || 0}`,
+      },
+  };
+}
+
+/** Make the choice of an identified model, from the newest jobs. */
+function makeModelFields(onChange, signal) {
+  const jobs = makeSelect("model", []);
+  const fields = makeField(FORM, "Job", jobs, "Its recommended model is simulated.");
+  const node = el("div", { class: "fields" }, fields);
+  const message = el("p", { class: "soft", role: "status" }, "Loading…");
+  node.append(el("span"), message);
+  let [path, model] = ["", null];
+
+  async function load() {
+    [path, model] = [jobs.value, null];
+    onChange();
+    if (!path) return;
+    const found = await getJson(`${path}/export?format=json`, { signal });
+    if (path !== jobs.value) return;
+    model = found;
+    onChange();
+  }
+
+  const loadSafely = () => load().catch((error) => signal.aborted || setText(message, error.message));
+  async function open() {
+    const { items } = await getJson("v1/jobs?state=succeeded&limit=200", { signal });
+    const found = items.filter(({ kind, summary }) => kind === "identification" && summary?.rank);
+    const options = found.map(({ id, name, summary }) => {
+      const text = `${name || id.slice(0, 8)}: ${summary.equation}`;
+      return el("option", { value: `v1/jobs/${id}/models/${summary.rank}` }, text);
+    });
+    jobs.replaceChildren(...options);
+    setText(message, options.length ? "" : "No job has identified a model of one output yet.");
+    await load();
+  }
+  jobs.addEventListener("change", loadSafely);
+  return {
+    node,
+    open: () => open().catch((error) => signal.aborted || setText(message, error.message)),
+    read: () =>
+      model && {
+        simulation: { kind: "model", model, name: "model.json" },
+        argument: "model.json",
+        before: [`curl '${getServiceUrl()}/${path}/export?format=json' -o model.json`],
+      },
+  };
+}
+
+/**
+ * Make the choice from the listed simulations. `setRecord({columns, units})` states what could be a recorded
+ * simulation, and the units of input and output. `read()` returns the simulation, the tolerance and the parts
+ * of its command, or a false value if it is incomplete; `onChange()` is called at every change.
+ */
+export function makeSimulationChoice(simulations, onChange, signal) {
+  const byKind = new Map(simulations.map((each) => [each.kind, each]));
+  // A recorded simulation is shown beside the measured output before anything runs.
+  const kinds = [...byKind.keys()].sort((a, b) => (b === "column") - (a === "column"));
+  const kind = makeSelect("simulation", kinds.map((each) => [each, LABELS[each] ?? each]));
+  let record = { columns: [], units: ["", ""] };
+  const templates = simulations.filter(({ equations }) => equations);
+  const makers = {
+    column: () => makeColumnFields(record.columns),
+    linear: makeLinearFields,
+    ode: () => makeEquationsEditor(templates, onChange, signal),
+    model: () => makeModelFields(onChange, signal),
+  };
+  const made = new Map();
+  const host = el("div");
+  const summary = el("p", { class: "soft small" });
+
+  function getFields() {
+    const make = makers[kind.value] ?? (() => makePhysicalFields(byKind.get(kind.value), record.units));
+    if (!made.has(kind.value)) made.set(kind.value, make());
+    return made.get(kind.value);
+  }
+
+  function show() {
+    const { summary: words, estimated } = byKind.get(kind.value);
+    setText(summary, `${words}.${estimated && ` Estimated unless given: ${estimated}.`}`);
+    const fields = getFields();
+    if (fields.node !== host.firstChild) host.replaceChildren(fields.node);
+    fields.open?.();
+    onChange();
+  }
+
+  /** Make only those fields anew that depend on what has changed: a text or values may have been entered. */
+  function setRecord(newRecord) {
+    const hasChanged = (part) => String(record[part]) !== String(newRecord[part]);
+    const [columns, units] = [hasChanged("columns"), hasChanged("units")];
+    record = newRecord;
+    if (!made.size && !record.columns.length) kind.value = kinds.find((each) => each !== "column");
+    for (const each of kinds)
+      if ((each === "column" && columns) || (byKind.get(each).parameters.length && units)) made.delete(each);
+    if (!made.has(kind.value)) show();
+  }
+
+  kind.addEventListener("change", show);
+  const hint = "A service runs no code of its users: record the output of an FMU or a function in a column.";
+  const node = el(
+    "div",
+    { class: "simulation" },
+    el("div", { class: "fields" }, makeField(FORM, "Simulation", kind, hint)),
+    summary,
+    host,
+  );
+  return { node, setRecord, read: () => getFields().read() };
+}
