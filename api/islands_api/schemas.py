@@ -6,10 +6,25 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from islands.io.models import NARX
-from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, PRIORITIES, JobState
+from islands_service.domain.job import (
+    DISCREPANCY,
+    IDENTIFICATION,
+    MAX_NAME_LENGTH,
+    MAX_TAG_LENGTH,
+    MAX_TAGS,
+    MONITORING,
+    PRIORITIES,
+    JobState,
+)
 from islands_service.domain.job_spec import Discrepancy, Identification
 
 _JOB_ID = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
+#: Regular expression of a character of a line of text.
+LINE = r"[^\x00-\x1f\x7f]"
+
+#: Regular expression of a tag.
+TAG_PATTERN = r"^[^\x00-\x20\x7f,]([^\x00-\x1f\x7f,]*[^\x00-\x20\x7f,])?$"
+
 #: Example of the id of a data set.
 DATASET_ID = "9f86d081884c7d659a2feaa0c55ad015-csv"
 _SPEC: dict[str, Any] = {
@@ -37,13 +52,39 @@ class ResponseModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="allow")
 
 
+#: Name of a job.
+JobName = Annotated[
+    str,
+    Field(max_length=MAX_NAME_LENGTH, pattern=rf"^{LINE}*$", description="Human-readable name; one line."),
+]
+
+#: Tag of a job.
+Tag = Annotated[
+    str, Field(max_length=MAX_TAG_LENGTH, pattern=TAG_PATTERN, description="One line without a comma.")
+]
+
+#: Tags of a job.
+Tags = Annotated[
+    tuple[Tag, ...], Field(max_length=MAX_TAGS, description="Words by which the list of jobs is filtered.")
+]
+
+
+class JobLabels(BaseModel):
+    """New name and new tags of a job. What is absent is not changed."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"name": "stage 3, cold", "tags": ["rig-2"]}]}
+    )
+
+    name: JobName | None = None
+    tags: Tags | None = None
+
+
 class JobMetadata(BaseModel):
     """Fields of a job that do not influence its result."""
 
-    name: Annotated[
-        str,
-        Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="Human-readable name; one line."),
-    ] = ""
+    name: JobName = ""
+    tags: Tags = ()
     priority: Annotated[
         int,
         Field(
@@ -56,7 +97,7 @@ class JobMetadata(BaseModel):
     @property
     def spec(self) -> dict[str, Any]:
         """Fields that determine the result."""
-        return self.model_dump(mode="json", exclude_unset=True, exclude={"name", "priority"})
+        return self.model_dump(mode="json", exclude_unset=True, exclude={"name", "tags", "priority"})
 
 
 class JobRequest(JobMetadata, Identification):
@@ -140,8 +181,12 @@ class JobView(ResponseModel):
     )
 
     id: str
-    kind: str = Field(description=f"{IDENTIFICATION} or {DISCREPANCY}.")
+    kind: str = Field(description=f"{IDENTIFICATION}, {DISCREPANCY} or {MONITORING}.")
     name: str
+    tags: tuple[str, ...] = ()
+    dataset_name: str | None = Field(
+        default=None, description="Name of the first data set at the submission; null if it is unknown."
+    )
     state: JobState
     priority: int
     version: int = Field(description="Increases with every change; the number of the last event.")

@@ -21,6 +21,7 @@ GUARDED = {
     ("GET", "/v1/jobs"): "read",
     ("POST", "/v1/jobs"): "write",
     ("GET", "/v1/jobs/{job}"): "read",
+    ("PATCH", "/v1/jobs/{job}"): "write",
     ("DELETE", "/v1/jobs/{job}"): "write",
     ("POST", "/v1/jobs/{job}/cancel"): "write",
     ("POST", "/v1/jobs/{job}/resume"): "write",
@@ -86,7 +87,7 @@ def send_request(service, method, path, headers):
         body = {"json": {"dataset": "0-csv"}}
     if (method, path) == ("POST", "/v1/monitors"):
         body = {"json": {"diagnosis": "0" * 32}}
-    if path.startswith("/v1/admin") and method in ("POST", "PATCH"):
+    if method == "PATCH" or (path.startswith("/v1/admin") and method == "POST"):
         body = {"json": {}}
     if (method, path) in {("POST", "/v1/webhooks"), ("POST", "/v1/datasets/fetch")}:
         body = {"json": {"url": "https://127.0.0.1"}}

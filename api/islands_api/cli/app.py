@@ -11,7 +11,8 @@ SERVICE_COMMANDS = core.make_commands(
     {
         "serve": "Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next "
         "start.",
-        "jobs": "Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
+        "jobs": "Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, resume, "
+        "result.",
         "monitors": "Monitors of a service: create, add records, list, show, delete.",
         "keys": "API keys of a service: create, list, revoke.",
         "admin": "Operation of a service: audit, owners, jobs, backup, restore.",

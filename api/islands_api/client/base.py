@@ -90,6 +90,7 @@ class BaseClient(Generic[H]):
     job = Endpoint(calls.job)
     jobs = Endpoint(calls.jobs)
     datasets = Endpoint(calls.datasets)
+    label = Endpoint(calls.label)
     resume = Endpoint(calls.resume)
     delete = Endpoint(calls.delete)
     delete_dataset = Endpoint(calls.delete_dataset)

@@ -74,6 +74,7 @@ def submit(
     recordings: Sequence[DatasetRef | Mapping[str, Any]] = (),
     validation: float | DatasetRef | Mapping[str, Any] | None = None,
     name: str = "",
+    tags: str | Sequence[str] = (),
     priority: int = 0,
     idempotency_key: str | None = None,
     **settings: Any,
@@ -98,6 +99,8 @@ def submit(
         Further recordings of the same system: data sets, or ``{"dataset": ID, "rows": "START:STOP"}``.
     validation : float or data set or mapping, optional
         Fraction of the end of every recording, a data set, or a mapping as for ``recordings``.
+    tags : str or sequence of str
+        Words by which `jobs` finds the job.
     settings
         Settings that differ from those of the preset: `islands.evolution.settings.Settings`.
 
@@ -120,6 +123,7 @@ def submit(
         if isinstance(validation, float | int) or validation is None
         else make_part(validation),
         "name": name or None,
+        "tags": as_list(tags) or None,
         "priority": priority or None,
         "settings": settings or None,
     }
@@ -141,9 +145,27 @@ def await_change(which: JobView, seconds: float) -> RequestSpec[JobView]:
     return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}", read, params={"wait": seconds}, headers=headers)
 
 
-def jobs(state: str | None = None, cursor: str | None = None, limit: int = 50) -> RequestSpec[JobPage]:
-    """Return a page of jobs, newest first."""
-    given = {"state": state, "cursor": cursor, "limit": limit}
+def jobs(
+    state: str | None = None,
+    cursor: str | None = None,
+    limit: int = 50,
+    *,
+    kind: str | None = None,
+    tag: str | None = None,
+    q: str | None = None,
+) -> RequestSpec[JobPage]:
+    """Return a page of jobs, newest first.
+
+    Parameters
+    ----------
+    state, kind, tag : str, optional
+        Only jobs that have it.
+    cursor : str, optional
+        ``next`` of the previous page.
+    q : str, optional
+        Words that a job has in its name, tags, name of the data set, equation or verdict, in any case.
+    """
+    given = {"state": state, "kind": kind, "tag": tag, "q": q, "cursor": cursor, "limit": limit}
     params = {key: value for key, value in given.items() if value is not None}
     return RequestSpec("GET", "/v1/jobs", read_as(JobPage), params=params)
 
@@ -152,6 +174,15 @@ def datasets(cursor: str | None = None, limit: int = 50) -> RequestSpec[DatasetP
     """Return a page of data sets, newest first."""
     params = {"limit": limit, **({} if cursor is None else {"cursor": cursor})}
     return RequestSpec("GET", "/v1/datasets", read_as(DatasetPage), params=params)
+
+
+def label(
+    which: JobRef, name: str | None = None, tags: str | Sequence[str] | None = None
+) -> RequestSpec[JobView]:
+    """Replace the name or the tags of a job; what is None is kept."""
+    given = {"name": name, "tags": None if tags is None else as_list(tags)}
+    body = {key: value for key, value in given.items() if value is not None}
+    return RequestSpec("PATCH", f"/v1/jobs/{quote_id(which)}", read_as(JobView), json=body)
 
 
 def cancel(which: JobRef) -> RequestSpec[JobView]:

@@ -35,6 +35,7 @@ def diagnose(
     recordings: Sequence[DatasetRef | Mapping[str, Any]] = (),
     validation: DatasetRef | Mapping[str, Any] | None = None,
     name: str = "",
+    tags: str | Sequence[str] = (),
     priority: int = 0,
     idempotency_key: str | None = None,
 ) -> RequestSpec[JobView]:
@@ -59,6 +60,8 @@ def diagnose(
         Further recordings of the same system: data sets, or ``{"dataset": ID, "rows": "START:STOP"}``.
     validation : data set or mapping, optional
         A recording that is held out as a whole, instead of the last quarter of the record.
+    tags : str or sequence of str
+        Words by which `jobs` finds the job.
 
     Raises
     ------
@@ -81,6 +84,7 @@ def diagnose(
         "recordings": [make_part(each) for each in recordings] or None,
         "validation": None if validation is None else make_part(validation),
         "name": name or None,
+        "tags": as_list(tags) or None,
         "priority": priority or None,
     }
     return make_submission("/v1/discrepancies", given, idempotency_key)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import structlog
 
 from islands_api.web.concurrency import BlockingExecutor
-from islands_service.domain.job import TERMINAL, Event
+from islands_service.domain.job import LABELLED, TERMINAL, Event
 from islands_service.outage_log import OutageLog
 from islands_service.store import Store
 from islands_service.store.database import StoreError
@@ -103,7 +103,9 @@ class JobEventHub:
                     await feed.changed.wait()
         return feed.version > version
 
-    async def events(self, job: str, version: int, after: int, alive: float) -> AsyncGenerator[Event | None]:
+    async def events(
+        self, job: str, version: int, after: int, alive: float, has_ended: bool = False
+    ) -> AsyncGenerator[Event | None]:
         """Yield the events of a job after an event number until it has ended; yield None if idle for a while.
 
         Parameters
@@ -115,6 +117,8 @@ class JobEventHub:
             Number of the last event that the client has.
         alive : float
             Seconds without an event after which None is yielded.
+        has_ended : bool
+            Whether the job has ended at the known version.
         """
         with self.subscribe(job, version) as feed:
             last = after
@@ -124,7 +128,9 @@ class JobEventHub:
                 for event in unread:
                     yield event
                     last = event.number
-                    if event.kind in TERMINAL and last >= newest:
+                    if event.kind != LABELLED:
+                        has_ended = event.kind in TERMINAL
+                    if has_ended and last >= newest:
                         return
                 if last >= feed.version and not await self.wait(feed, last, alive):
                     yield None

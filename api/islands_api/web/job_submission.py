@@ -56,7 +56,15 @@ async def submit_job(
     IslandsError
         The job could only fail, or its owner has used up a quota.
     """
-    submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
+    submission = Submission(
+        caller.owner,
+        request.spec,
+        kind,
+        request.name,
+        request.priority,
+        key,
+        tags=tuple(dict.fromkeys(request.tags)),
+    )
     return await accept_job(state, caller, request, submission)
 
 

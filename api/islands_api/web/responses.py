@@ -45,6 +45,8 @@ def job_document(job: Job, max_run_seconds: int, place: QueuePlace | None = None
         "id": job.id,
         "kind": job.kind,
         "name": job.name,
+        "tags": job.tags,
+        "dataset_name": job.dataset_name,
         "state": job.state,
         "priority": job.priority,
         "version": job.version,

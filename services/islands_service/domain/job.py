@@ -63,6 +63,9 @@ DISCREPANCY = "discrepancy"
 #: Kind of a job that analyses a record of a monitor.
 MONITORING = "monitoring"
 
+#: Kinds of jobs.
+KINDS = (IDENTIFICATION, DISCREPANCY, MONITORING)
+
 #: Artefact with the HTML report of a result.
 REPORT = "report.html"
 
@@ -72,11 +75,20 @@ EXTENDED = "extended.json"
 #: Artefact of a discrepancy job with the measured and the simulated outputs.
 OUTPUTS = "outputs.npy"
 
+#: Kind of the event of a new name or new tags, the only one that is no step of the job.
+LABELLED = "labelled"
+
 #: Phase of a queued job whose last attempt has ended early. The note of its progress has the reason.
 WAITING_PHASE = "waiting"
 
 #: Valid priorities.
 PRIORITIES = range(-100, 101)
+
+#: Largest length of the name of a job.
+MAX_NAME_LENGTH = 200
+
+#: Largest number of tags of a job, and largest length of a tag. A tag has no comma.
+MAX_TAGS, MAX_TAG_LENGTH = 20, 40
 
 
 class JobNotFoundError(IslandsError):
@@ -145,6 +157,8 @@ class Submission:
         Islands that run at once, which count towards the quota of the owner.
     monitor : str, optional
         Monitor whose record the job analyses, after the records that were submitted before.
+    tags : tuple of str
+        Words of the owner by which it finds its jobs.
     """
 
     owner: str
@@ -155,12 +169,15 @@ class Submission:
     idempotency_key: str | None = None
     islands: int = 1
     monitor: str | None = None
+    tags: tuple[str, ...] = ()
 
     @property
     def request(self) -> str:
         """The request as canonical text: equal texts are equal requests."""
         asked = {"kind": self.kind, "spec": self.spec, "name": self.name, "priority": self.priority}
-        return json.dumps(asked, sort_keys=True)
+        # Requests of earlier versions have no tags.
+        tags = {"tags": self.tags} if self.tags else {}
+        return json.dumps({**asked, **tags}, sort_keys=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +206,10 @@ class Job:
         Seconds since 1970 by the clock of the database.
     versions : mapping
         Version of islands that accepted the ``job``, and that wrote its ``checkpoint`` and its ``result``.
+    tags : tuple of str
+        In the order in which the owner gave them.
+    dataset_name : str or None
+        Name of the data set at the submission; None if it is unknown.
     """
 
     id: str
@@ -212,6 +233,8 @@ class Job:
     started: float | None
     finished: float | None
     versions: Mapping[str, str | None]
+    tags: tuple[str, ...] = ()
+    dataset_name: str | None = None
 
     @property
     def datasets(self) -> tuple[str, ...]:

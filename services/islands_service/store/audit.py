@@ -22,6 +22,7 @@ class Action(StrEnum):
     CANCEL = "cancel-job"
     CANCEL_AS_ADMINISTRATOR = "cancel-job-as-administrator"
     RESUME = "resume-job"
+    LABEL = "label-job"
     DELETE = "delete-job"
     UPLOAD = "upload-dataset"
     DELETE_DATASET = "delete-dataset"
@@ -53,7 +54,8 @@ class AuditEntry:
     address : str
         Address of the client, ``command line``, or ``retention``.
     details : str or None
-        New values of a changed owner, the host of a new webhook, or the source of a data set, as JSON.
+        New values of a changed owner, new name and tags of a job, the host of a new webhook, or the source of
+        a data set, as JSON.
     """
 
     at: float

@@ -1,4 +1,4 @@
-"""Operations of owners on their jobs: submit, get, list, cancel, resume, delete.
+"""Operations of owners on their jobs: submit, get, list, label, cancel, resume, delete.
 
 An owner has access only to its own jobs.
 """
@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Row, bindparam, insert, select, tuple_
 
 from islands_service.domain.job import (
     ISLANDS_VERSION,
+    LABELLED,
     RESUMABLE,
     TERMINAL,
     Event,
@@ -22,6 +23,7 @@ from islands_service.domain.job import (
     JobStateError,
     Requester,
     Submission,
+    find_datasets,
 )
 from islands_service.store.audit import Action, record_change
 from islands_service.store.backends import dialect
@@ -35,6 +37,7 @@ from islands_service.store.job_rows.job_events import (
     update_job,
     without_note,
 )
+from islands_service.store.job_rows.job_search import describe_labels, has_tag, has_words, join_tags
 from islands_service.store.job_rows.monitor_records import count_record
 from islands_service.store.job_rows.queue_statistics import QueueStatistics, read_queue_statistics
 from islands_service.store.job_rows.submission_checks import (
@@ -43,7 +46,7 @@ from islands_service.store.job_rows.submission_checks import (
     find_accepted_job,
     request_digest,
 )
-from islands_service.store.tables import events, jobs, owners
+from islands_service.store.tables import datasets, events, jobs, owners
 
 #: Largest number of jobs of a page.
 MAX_PAGE_SIZE = 200
@@ -52,6 +55,9 @@ MAX_PAGE_SIZE = 200
 _OWNED_JOB = select(jobs).where(jobs.c.id == bindparam("id"), jobs.c.owner == bindparam("owner"))
 _ANY_JOB = select(jobs).where(jobs.c.id == bindparam("id"))
 _RUN_LIMIT = select(owners.c.max_run_seconds).where(owners.c.name == bindparam("of_owner")).scalar_subquery()
+_DATASET_NAME = select(datasets.c.name).where(
+    datasets.c.owner == bindparam("owner"), datasets.c.id == bindparam("id")
+)
 _INSERT_JOB = (
     insert(jobs)
     .values(
@@ -119,6 +125,8 @@ class Jobs:
             check_quotas(connection, submission.owner, most_active, submission.islands, most_islands)
             monitor = submission.monitor
             number = None if monitor is None else count_record(connection, submission.owner, monitor)
+            name = _find_dataset_name(connection, submission)
+            tags = join_tags(submission.tags)
             values = {
                 "id": uuid4().hex,
                 "owner": submission.owner,
@@ -132,6 +140,9 @@ class Jobs:
                 "islands": submission.islands,
                 "monitor_id": monitor,
                 "record_number": number,
+                "tags": tags,
+                "dataset_name": name,
+                "search_labels": describe_labels(submission.name, tags, name),
             }
             row = connection.execute(_INSERT_JOB, values).one()
             append_event(connection, row, "queued")
@@ -169,11 +180,29 @@ class Jobs:
         state: JobState | None = None,
         after: tuple[float, str] | None = None,
         limit: int = 50,
+        *,
+        kind: str | None = None,
+        tag: str | None = None,
+        words: Sequence[str] = (),
     ) -> JobRows:
-        """Return the jobs of an owner, or of all for None, newest first, that follow a position."""
+        """Return the jobs of an owner, or of all for None, newest first, that follow a position.
+
+        Parameters
+        ----------
+        state, kind, tag : str, optional
+            Only jobs that have it.
+        words : sequence of str
+            Only jobs that have each of these words, or parts of words, in their name, tags, name of the data
+            set, equation or verdict, in any case.
+        """
         query = select(jobs) if owner is None else select(jobs).where(jobs.c.owner == owner)
         if state is not None:
             query = query.where(jobs.c.state == state)
+        if kind is not None:
+            query = query.where(jobs.c.kind == kind)
+        if tag is not None:
+            query = query.where(has_tag(tag))
+        query = query.where(*has_words(words))
         if after is not None:
             query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
         query = query.order_by(jobs.c.created.desc(), jobs.c.id.desc()).limit(min(limit, MAX_PAGE_SIZE) + 1)
@@ -182,6 +211,37 @@ class Jobs:
         more = len(found) > min(limit, MAX_PAGE_SIZE)
         found = found[: min(limit, MAX_PAGE_SIZE)]
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
+
+    def label(
+        self,
+        owner: str,
+        job: str,
+        name: str | None = None,
+        tags: Sequence[str] | None = None,
+        by: Requester | None = None,
+    ) -> Job:
+        """Replace the name or the tags of a job in any state; what is None is kept.
+
+        Raises
+        ------
+        JobNotFoundError
+        """
+
+        def operation(connection: Connection) -> Job:
+            current = _read_owned(connection, owner, job, locked=True)
+            new_name = current.name if name is None else name
+            new_tags = current.tags if tags is None else join_tags(tags)
+            if (new_name, new_tags) == (current.name, current.tags):
+                return job_from_row(current)
+            text = describe_labels(new_name, new_tags, current.dataset_name)
+            row = update_job(connection, job, name=new_name, tags=new_tags, search_labels=text)
+            append_event(connection, row, LABELLED)
+            changed = job_from_row(row)
+            details = json.dumps({"name": changed.name, "tags": changed.tags})
+            record_change(connection, Action.LABEL, owner, job, by, details)
+            return changed
+
+        return self._database.write(operation)
 
     def cancel(self, owner: str | None, job: str, by: Requester | None = None) -> Job:
         """Cancel a queued job, or request cancellation of a running one; a repeated request has no effect.
@@ -295,6 +355,15 @@ class Jobs:
         """Return statistics of the jobs of all owners."""
         with self._database.read() as connection:
             return read_queue_statistics(connection)
+
+
+def _find_dataset_name(connection: Connection, submission: Submission) -> str | None:
+    """Return the name of the first data set of a job."""
+    found = find_datasets(submission.spec)
+    if not found:
+        return None
+    name: str | None = connection.execute(_DATASET_NAME, {"owner": submission.owner, "id": found[0]}).scalar()
+    return name
 
 
 def _read_owned(connection: Connection, owner: str | None, job: str, locked: bool = False) -> Row[Any]:

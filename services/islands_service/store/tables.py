@@ -80,6 +80,13 @@ jobs = Table(
     # of a deleted monitor are kept.
     Column("monitor_id", String(32)),
     Column("record_number", BigInteger),
+    # Tags, each in commas.
+    Column("tags", Text, nullable=False, server_default=""),
+    # Name of the data set at the submission.
+    Column("dataset_name", String(255)),
+    # Text that a search reads, folded by `job_search`: of the labels, and of the result.
+    Column("search_labels", Text, nullable=False, server_default=""),
+    Column("search_result", Text, nullable=False, server_default=""),
     UniqueConstraint("owner", "idempotency_key"),
     Index(None, "owner", "created", "id"),
     Index(None, "owner", "state", "created", "id"),
@@ -297,7 +304,7 @@ audit = Table(
     # Key of the request; null without one.
     Column("key_id", String(16)),
     Column("address", String(64), nullable=False),
-    # New values of a changed owner, or the host of a new webhook.
+    # See `AuditEntry.details`.
     Column("details", Text),
     Index(None, "at"),
     Index(None, "owner", "at"),

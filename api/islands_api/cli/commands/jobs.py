@@ -22,15 +22,18 @@ from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
-from islands_service.domain.job import IDENTIFICATION, JobState
+from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, JobState
 
 jobs = typer.Typer(
-    help="Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
+    help="Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, resume, result.",
     no_args_is_help=True,
     add_completion=False,
 )
 
 Name = Annotated[str, typer.Option("--name", help="Name of the job, for display.")]
+Tags = Annotated[
+    list[str] | None, typer.Option("--tag", help="Tag of the job, for the list; may be repeated.")
+]
 Priority = Annotated[int, typer.Option("--priority", help="Of your own jobs, higher ones run first.")]
 IdempotencyKey = Annotated[
     str | None,
@@ -38,9 +41,6 @@ IdempotencyKey = Annotated[
 ]
 Watch = Annotated[bool, typer.Option("--watch", help="Wait for the job and print its result.")]
 Id = Annotated[str, typer.Argument(help="The job's id.")]
-
-#: Largest length of a job's name.
-_MAX_NAME_LENGTH = 200
 
 
 @jobs.command()
@@ -60,6 +60,7 @@ def submit(
     model: ModelClass = NARX,
     search: SearchOptions = DEFAULTS,
     name: Name = "",
+    tags: Tags = None,
     priority: Priority = 0,
     idempotency_key: IdempotencyKey = None,
     url: Url = LOCAL,
@@ -98,6 +99,7 @@ def submit(
             recordings=[make_part(other, rows) for other in others],
             validation=validation_data,
             name=_make_name(name, records),
+            tags=tags or (),
             priority=priority,
             idempotency_key=idempotency_key,
             **search.changes,
@@ -120,6 +122,7 @@ def diagnose(
     reading: ReadingOptions = DEFAULT_READING,
     seed: Seed = 0,
     name: Name = "",
+    tags: Tags = None,
     priority: Priority = 0,
     idempotency_key: IdempotencyKey = None,
     url: Url = LOCAL,
@@ -152,6 +155,7 @@ def diagnose(
             recordings=[make_part(other, rows) for other in others],
             validation=held_out or None,
             name=_make_name(name, records),
+            tags=tags or (),
             priority=priority,
             idempotency_key=idempotency_key,
         )
@@ -161,6 +165,12 @@ def diagnose(
 @jobs.command("list")
 def list_jobs(
     state: Annotated[str | None, typer.Option("--state", help=", ".join(JobState))] = None,
+    kind: Annotated[str | None, typer.Option("--kind", help=", ".join(KINDS))] = None,
+    tag: Annotated[str | None, typer.Option("--tag", help="Only jobs with this tag.")] = None,
+    search: Annotated[
+        str | None,
+        typer.Option("--search", help="Words in the name, tags, data set, equation or verdict, in any case."),
+    ] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of jobs to list.")] = 50,
     url: Url = LOCAL,
     key: ApiKey = None,
@@ -168,7 +178,8 @@ def list_jobs(
 ) -> None:
     """List the jobs, newest first."""
     with open_client(url, key) as client:
-        views.show_jobs(read_pages(partial(client.jobs, state), limit), as_json)
+        read_page = partial(client.jobs, state, kind=kind, tag=tag, q=search)
+        views.show_jobs(read_pages(read_page, limit), as_json)
 
 
 @jobs.command()
@@ -184,6 +195,34 @@ def watch(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) 
     with open_client(url, key) as client:
         now = client.job(job)
     _follow(url, key, now, as_json)
+
+
+@jobs.command()
+def rename(
+    job: Id,
+    name: Annotated[str, typer.Argument(help="The new name; an empty one for none.")],
+    url: Url = LOCAL,
+    key: ApiKey = None,
+    as_json: Json = False,
+) -> None:
+    """Change the name of a job."""
+    with open_client(url, key) as client:
+        views.show_labels(client.label(job, name), as_json)
+
+
+@jobs.command()
+def tag(
+    job: Id,
+    tags: Annotated[
+        list[str] | None, typer.Argument(help="The new tags; without any, all are removed.")
+    ] = None,
+    url: Url = LOCAL,
+    key: ApiKey = None,
+    as_json: Json = False,
+) -> None:
+    """Replace the tags of a job."""
+    with open_client(url, key) as client:
+        views.show_labels(client.label(job, tags=tags or []), as_json)
 
 
 @jobs.command()
@@ -231,7 +270,7 @@ def result(
 def _make_name(name: str, records: Sequence[Path]) -> str:
     """Return the name of a job; if it is empty, the file names of the recordings."""
     files = ", ".join(record.name for record in records)
-    return name or "".join(each for each in files if each.isprintable())[:_MAX_NAME_LENGTH]
+    return name or "".join(each for each in files if each.isprintable())[:MAX_NAME_LENGTH]
 
 
 def _parse_validation(text: str | None) -> Path | str | float | None:

@@ -60,6 +60,15 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(job.problem["detail"], markup=False)
 
 
+def show_labels(job: JobView, as_json: bool) -> None:
+    """Show the name and the tags of a job."""
+    if as_json:
+        print_json(job.model_dump(mode="json"))
+        return
+    tags = f", tags: {', '.join(job.tags)}" if job.tags else ", no tags"
+    output.print(f"job {job.id}: {job.name or 'no name'}{tags}", markup=False)
+
+
 def describe_kept_models(job: JobView) -> str:
     """Return what a search has kept that did not end by itself, and how to get it; empty for other jobs."""
     summary = job.summary or {}
@@ -97,7 +106,7 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
         generation = "-" if done is None else f"{done}/{status.get('generations', '-')}"
         best = _format_number(status.get("best_error"))
         output.print(_LINE.format(job.id, job.state, generation, best), markup=False)
-        name = f"{job.name}{_format_verdict(job)}"
+        name = " ".join([f"{job.name}{_format_verdict(job)}", *(f"[{tag}]" for tag in job.tags)])
         output.print(_SECOND_LINE.format(f"{job.created:%Y-%m-%d %H:%M}", name), markup=False)
 
 

@@ -15,7 +15,7 @@ from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import StrictRoute
 from islands_api.web.responses import json_text
 from islands_api.web.routes.jobs import Id
-from islands_service.domain.job import TERMINAL, Event, Job
+from islands_service.domain.job import LABELLED, TERMINAL, Event, Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=StrictRoute)
 
@@ -24,7 +24,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_
 _KEEP_ALIVE_SECONDS = 7.0
 
 #: Kinds of events of a job.
-_EVENT_KINDS = ("queued", "running", "progress", "cancelling", "succeeded", "failed", "cancelled")
+_EVENT_KINDS = ("queued", "running", "progress", "cancelling", LABELLED, *TERMINAL)
 
 _STREAM_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {
@@ -94,7 +94,8 @@ class _EventStream(StreamingResponse):
 
 async def _stream(state: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:
     with state.metrics.streams.track_inprogress():
-        async with aclosing(state.hub.events(job.id, job.version, last, _KEEP_ALIVE_SECONDS)) as events:
+        known = job.id, job.version, last, _KEEP_ALIVE_SECONDS, job.state in TERMINAL
+        async with aclosing(state.hub.events(*known)) as events:
             async for event in events:
                 yield b": alive\n\n" if event is None else _encode(event)
 

@@ -1,10 +1,20 @@
-"""Jobs: submit, list, get, wait, cancel, resume, delete, history."""
+"""Jobs: submit, list, get, wait, label, cancel, resume, delete, history."""
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 
-from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
+from islands.errors import SettingsError
+from islands_api.schemas import (
+    LINE,
+    TAG_PATTERN,
+    HistoryPage,
+    JobLabels,
+    JobPage,
+    JobRequest,
+    JobView,
+)
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import (
@@ -29,7 +39,7 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, JSONItems, job_document
-from islands_service.domain.job import IDENTIFICATION, TERMINAL, Job, JobState
+from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_TAG_LENGTH, TERMINAL, Job, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 
@@ -58,6 +68,9 @@ _MIN_POINTS = 50
 _MAX_ISLAND_ERRORS = 100_000
 
 
+#: Maximum number of words of a search: each is looked for in every job.
+_MAX_WORDS = 10
+
 #: Query parameter of lists of jobs.
 StateFilter = Annotated[JobState | None, Query(alias="state", description="Only jobs in this state.")]
 
@@ -78,13 +91,32 @@ async def jobs(
     caller: Reader,
     state: AppStateDep,
     job_state: StateFilter = None,
+    kind: Annotated[
+        str | None,
+        Query(pattern=f"^({'|'.join(KINDS)})$", description=f"Only jobs of this kind: {', '.join(KINDS)}."),
+    ] = None,
+    tag: Annotated[
+        str | None,
+        Query(max_length=MAX_TAG_LENGTH, pattern=TAG_PATTERN, description="Only jobs with this tag."),
+    ] = None,
+    q: Annotated[
+        str,
+        Query(
+            max_length=200,
+            pattern=rf"^{LINE}*$",
+            description="Only jobs with each of these words, or parts of words, in their name, tags, name of "
+            "the data set, equation or verdict, in any case.",
+        ),
+    ] = "",
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:
     """List jobs of all kinds, newest first."""
-    page = await state.run_blocking(
-        state.store.jobs.page, caller.owner, job_state, decode_cursor(cursor), limit
-    )
+    words = q.split()
+    if len(words) > _MAX_WORDS:
+        raise SettingsError(f"q has {len(words)} words, and {_MAX_WORDS} is the most: take fewer")
+    read_page = partial(state.store.jobs.page, kind=kind, tag=tag, words=words)
+    page = await state.run_blocking(read_page, caller.owner, job_state, decode_cursor(cursor), limit)
     items = await describe_jobs(state, page.jobs)
     return JSONDocument({"items": items, "next": encode_cursor(page.after)})
 
@@ -112,6 +144,15 @@ async def job(
     if matches_etag(if_none_match, etag(found)):
         return Response(status_code=304, headers=headers)
     return JSONDocument(await describe_job(state, found), headers=headers)
+
+
+@router.patch("/{job}", response_model=JobView, responses={200: {"headers": {"ETag": ETAG}}})
+async def label(job: Id, labels: JobLabels, caller: Writer, state: AppStateDep) -> Any:
+    """Change the name or the tags of a job in any state. They have no effect on its result."""
+    changed = await state.run_blocking(
+        state.store.jobs.label, caller.owner, job, labels.name, labels.tags, caller.requester
+    )
+    return JSONDocument(await describe_job(state, changed), headers={"ETag": etag(changed)})
 
 
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)

@@ -1,9 +1,9 @@
-"""Differences between SQLite and PostgreSQL: clock of the database, snapshots, upserts, advisory locks."""
+"""Differences between SQLite and PostgreSQL: clock, search in texts, snapshots, upserts, advisory locks."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Float, Table, func, select
+from sqlalchemy import Connection, Float, Integer, Table, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.functions import FunctionElement
@@ -25,6 +25,23 @@ def _sqlite(_element: now, _compiler: Any, **_: Any) -> str:
 def _postgresql(_element: now, _compiler: Any, **_: Any) -> str:
     # SQL's own now() is constant within a transaction, and a group commit may take a while.
     return "EXTRACT(EPOCH FROM clock_timestamp())::float8"
+
+
+class position(FunctionElement[int]):  # noqa: N801 - an SQL function
+    """Position of a text in another one, from 1; 0 if it is absent. LIKE differs between the databases."""
+
+    type = Integer()
+    inherit_cache = True
+
+
+@compiles(position, "sqlite")
+def _sqlite_position(element: position, compiler: Any, **arguments: Any) -> str:
+    return f"instr({compiler.process(element.clauses, **arguments)})"
+
+
+@compiles(position, "postgresql")
+def _postgresql_position(element: position, compiler: Any, **arguments: Any) -> str:
+    return f"strpos({compiler.process(element.clauses, **arguments)})"
 
 
 #: First statement of a transaction whose statements all see one state, by dialect.

@@ -7,6 +7,7 @@ from sqlalchemy import Connection, Row, insert, update
 
 from islands_service.domain.job import TERMINAL, Job, JobState
 from islands_service.store.backends.dialect import now
+from islands_service.store.job_rows.job_search import split_tags
 from islands_service.store.tables import events, jobs
 from islands_service.store.tenants.deliveries import queue_deliveries
 
@@ -73,6 +74,8 @@ def job_from_row(row: Row[Any]) -> Job:
             "checkpoint": row.checkpoint_version,
             "result": row.result_version,
         },
+        split_tags(row.tags),
+        row.dataset_name,
     )
 
 

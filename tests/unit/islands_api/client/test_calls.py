@@ -270,6 +270,19 @@ def test_failed_job_contains_its_problem(client: Any, service: Service, me: Any,
     assert client.jobs(state="failed").items[0].id == job.id
 
 
+def test_job_is_found_by_its_labels(client: Any, me: Any) -> None:
+    job = client.submit(me.dataset, **SPEC, name="first", tags="rig 2")
+    client.submit(me.dataset, **SPEC)
+    assert job.tags == ("rig 2",)
+    assert client.label(job, name="second").tags == ("rig 2",)
+    changed = client.label(job, tags=["a", "b"])
+    assert (changed.name, changed.tags) == ("second", ("a", "b"))
+    for filters in ({"tag": "b"}, {"q": "SECOND"}, {"tag": "a", "q": "b", "kind": "identification"}):
+        assert [each.id for each in client.jobs(**filters).items] == [job.id]
+    assert client.jobs(tag="rig 2").items == client.jobs(kind="discrepancy").items == ()
+    assert client.label(job, name="", tags=()).name == ""
+
+
 # Problems.
 
 

@@ -43,7 +43,7 @@ def fill(store: Store) -> None:
     deleted = submitted(store, idempotency_key="deleted")
     store.jobs.cancel(ALICE, deleted.id, Requester("192.0.2.1", "0123456789abcdef"))
     store.jobs.delete(ALICE, deleted.id, Requester("command line"))
-    submitted(store, priority=-7)
+    submitted(store, priority=-7, tags=("rig 2",))
     store.leases.report(claimed(store, EXPIRED), brought_on(5))
     submitted(store, BOB, priority=100, spec={"value": 0.1 + 0.2})
 

@@ -191,6 +191,33 @@ def test_islands_of_earlier_jobs_are_those_of_their_specification(empty_database
     assert dict(map(tuple, found)) == {"a": 8, "b": 1, "c": 1, "d": 1}
 
 
+def test_jobs_of_an_earlier_release_are_found_by_a_search(empty_database):
+    summary = {"equation": "y(k) = 0.9 y(k-1) + tanh(u(k-1))", "words": "As a simulation: good."}
+    database = Database(empty_database)
+    with database.exclusive() as connection:
+        upgrade(connection, "0010")
+        tables = tables_of(connection)
+        texts = {"id": "e" * 32, "owner": ALICE, "kind": "", "name": "Stage Ä", "request_sha256": ""}
+        numbers = dict.fromkeys(
+            ("priority", "version", "attempt", "stalled", "lease_epoch", "lease_until"), 0
+        )
+        job = {"spec": json.dumps({"dataset": "d-csv"}), "state": "succeeded", "summary": json.dumps(summary)}
+        times = {"created": 0.0, "updated": 0.0}
+        connection.execute(
+            tables["jobs"].insert(), {**texts, **numbers, **job, **times, "cancel_requested": False}
+        )
+        stored = {"owner": ALICE, "id": "d-csv", "name": "Piezo.csv", "suffix": ".csv", "blob": "b" * 64}
+        connection.execute(
+            tables["datasets"].insert(), {**stored, "bytes": 1, "preview": "{}", "created": 0.0}
+        )
+    database.close()
+    with Store(empty_database) as store:
+        for words in (["stage", "ä"], ["piezo.csv"], ["TANH("]):
+            (found,) = store.jobs.page(ALICE, words=words).jobs
+            assert (found.dataset_name, found.tags) == ("Piezo.csv", ())
+        assert store.jobs.page(ALICE, words=["simulation"]).jobs == ()
+
+
 def test_records_of_a_monitor_are_moved_to_rows(empty_database):
     """The analysis continues with the same states, and clients find the same records."""
     record, rejected = {"name": "a", "sha256": "1", "noise": 0.1 + 0.2}, {"name": "b", "sha256": "2"}

@@ -231,6 +231,21 @@ def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) 
 
 
 @pytest.mark.ci
+def test_jobs_are_renamed_tagged_and_found(run: Run, service: Service, owner: str) -> None:
+    job, other = ahead(service, owner, name="one"), ahead(service, owner, name="two")
+    assert run("rename", job, "[red] stage")[1] == f"job {job}: [red] stage, no tags\n"
+    assert run("tag", job, "rig 2", "cold")[1] == f"job {job}: [red] stage, tags: rig 2, cold\n"
+    for filters in (["--tag", "cold"], ["--search", "STAGE rig"]):
+        out = run("list", "--kind", "identification", *filters)[1]
+        assert job in out
+        assert "[red] stage [rig 2] [cold]" in out
+        assert other not in out
+    assert run("tag", job)[1] == f"job {job}: [red] stage, no tags\n"
+    code, _, err = run("list", "--tag", "a,b")
+    assert code == 2
+    assert "tag" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -1,0 +1,126 @@
+"""Contract of the store with clients that name, tag, filter and search their jobs, on every database."""
+
+import json
+
+import pytest
+
+from islands_service.domain.job import JobNotFoundError, JobOutcome, JobState, Requester
+from islands_service.store.audit import Action
+from support.stores import ALICE, BLOB, BOB, FAILED, FOUND, claimed, contents, job_in, kinds, submitted
+
+
+def found(store, owner=ALICE, **filters):
+    return {job.id for job in store.jobs.page(owner, **filters).jobs}
+
+
+def ended(store, summary, **given):
+    """Submit a job that ends with a summary; return its id."""
+    job = submitted(store, **given)
+    store.leases.finish(claimed(store), JobOutcome(JobState.SUCCEEDED, {}, summary=summary))
+    return job.id
+
+
+@pytest.mark.parametrize("state", JobState)
+def test_a_job_is_labelled_in_every_state(store, state):
+    job = job_in(store, state, name="before", tags=("a",))
+    before = kinds(store, job.id)
+    changed = store.jobs.label(ALICE, job.id, "Bühne 3", ("b", "c d", "b"))
+    assert (changed.name, changed.tags) == ("Bühne 3", ("b", "c d"))
+    assert (changed.state, changed.spec, changed.summary) == (state, job.spec, job.summary)
+    assert store.jobs.get(ALICE, job.id) == changed
+    assert kinds(store, job.id) == [*before, "labelled"]
+
+
+def test_labels_that_are_not_given_are_kept(store):
+    job = submitted(store, name="name", tags=("a", "b"))
+    assert store.jobs.label(ALICE, job.id, name="other").tags == ("a", "b")
+    assert store.jobs.label(ALICE, job.id, tags=()).name == "other"
+    assert store.jobs.get(ALICE, job.id).tags == ()
+
+
+def test_the_same_labels_change_nothing(store):
+    job = submitted(store, name="name", tags=("a", "b"))
+    before = contents(store)
+    assert store.jobs.label(ALICE, job.id, "name", ("a", "b"), Requester("192.0.2.1")) == job
+    assert contents(store) == before
+
+
+def test_a_label_is_in_the_audit_trail(store):
+    job = submitted(store, name="name")
+    store.jobs.label(ALICE, job.id, tags=("a",), by=Requester("192.0.2.1", "key"))
+    (entry,) = store.audit.entries()
+    assert (entry.action, entry.owner, entry.subject, entry.key_id) == (Action.LABEL, ALICE, job.id, "key")
+    assert json.loads(entry.details) == {"name": "name", "tags": ["a"]}
+
+
+def test_only_the_owner_labels_a_job(store):
+    job = submitted(store)
+    with pytest.raises(JobNotFoundError):
+        store.jobs.label(BOB, job.id, "mine")
+
+
+def test_a_running_job_continues_after_a_label(store):
+    job = submitted(store)
+    lease = claimed(store)
+    store.jobs.label(ALICE, job.id, "renamed", ("a",))
+    store.leases.finish(lease, FOUND)
+    done = store.jobs.get(ALICE, job.id)
+    assert (done.state, done.name, done.tags) == (JobState.SUCCEEDED, "renamed", ("a",))
+
+
+def test_a_repeated_request_finds_the_job_after_a_label(store):
+    job = submitted(store, name="name", tags=("a",), idempotency_key="k")
+    store.jobs.label(ALICE, job.id, "renamed", ())
+    assert submitted(store, name="name", tags=("a",), idempotency_key="k").id == job.id
+
+
+def test_a_tag_selects_the_jobs_that_have_exactly_it(store):
+    one, both = submitted(store, tags=("rig",)).id, submitted(store, tags=("rig 2", "rig")).id
+    submitted(store, tags=("Rig", "ri", "rig%"))
+    submitted(store, name="rig")
+    assert found(store, tag="rig") == {one, both}
+    assert found(store, tag="rig 2") == {both}
+    assert found(store, tag="r_g") == found(store, tag="2") == found(store, BOB, tag="rig") == set()
+
+
+def test_filters_are_combined(store):
+    job = submitted(store, kind="discrepancy", name="stage", tags=("a",)).id
+    submitted(store, name="stage", tags=("a",))
+    submitted(store, kind="discrepancy", name="stage")
+    chosen = {"kind": "discrepancy", "tag": "a", "words": ["stage"]}
+    assert found(store, state=JobState.QUEUED, **chosen) == {job}
+    assert found(store, state=JobState.RUNNING, **chosen) == set()
+
+
+def test_words_are_found_in_labels_data_set_and_result(store):
+    dataset, _ = store.datasets.add(ALICE, "Füllstand_1.csv", ".csv", BLOB, 1, {})
+    summary = {"equation": "y(k) = 0.9 y(k-1) + TANH(u(k-1))", "words": "unread", "size": 2}
+    job = ended(store, summary, name="Straße 100%", tags=("Rig 2",), spec={"dataset": dataset.id})
+    assert store.jobs.get(ALICE, job).dataset_name == "Füllstand_1.csv"
+    other = ended(store, {"simulation": "duffing", "verdict": "named", "effects": ["thermal-drift"]})
+    for words in (["strasse"], ["100%"], ["rig", "2"], ["FU\u0308LLSTAND_1"], ["tanh("], ["stra", "tanh"]):
+        assert found(store, words=words) == {job}
+    assert found(store, words=["thermal", "duffing"]) == {other}
+    for words in (["unread"], ["straße", "thermal"], ["fullstand"], ["rig%2"], ["100_"]):
+        assert found(store, words=words) == set()
+
+
+def test_a_search_follows_the_labels_and_the_result(store):
+    job = submitted(store, name="before").id
+    store.leases.finish(claimed(store), FAILED)
+    store.jobs.label(ALICE, job, "after")
+    assert (found(store, words=["before"]), found(store, words=["after"])) == (set(), {job})
+    store.jobs.resume(ALICE, job)
+    store.leases.finish(claimed(store), JobOutcome(JobState.SUCCEEDED, {}, summary={"equation": "sin"}))
+    assert found(store, words=["after", "sin"]) == {job}
+
+
+def test_pages_of_a_search_hold_each_job_once(store):
+    wanted = [submitted(store, tags=("a",) if number % 3 else ()).id for number in range(20)]
+    seen, after = [], None
+    while True:
+        page = store.jobs.page(ALICE, after=after, limit=4, tag="a")
+        seen += [job.id for job in page.jobs]
+        if (after := page.after) is None:
+            break
+    assert sorted(seen) == sorted(each for number, each in enumerate(wanted) if number % 3)
