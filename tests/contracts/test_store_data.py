@@ -135,7 +135,7 @@ def test_page_contains_only_a_summary_of_each_preview(store):
     """A list of 200 data sets with 1000 columns each would have tens of megabytes."""
     wide = {**PREVIEW, "samples": 9, "dt": 0.1, "time": None, "columns": PREVIEW["columns"] * 1000}
     dataset, _ = store.datasets.add(ALICE, "a.csv", ".csv", BLOB, 12, wide)
-    summary = {"samples": 9, "columns": 1000, "time": None, "dt": 0.1, "warnings": 0}
+    summary = {"samples": 9, "columns": 1000, "time": None, "dt": 0.1, "warnings": 0, "reading": {}}
     assert store.datasets.page(ALICE)[0] == (replace(dataset, preview=summary),)
     # Rows of earlier versions have no summary.
     store.database.write(lambda connection: connection.execute(update(datasets).values(summary=None)))

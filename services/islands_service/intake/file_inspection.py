@@ -13,6 +13,7 @@ from islands_service.intake.confined_answer import ask_confined
 from islands_service.intake.confined_process import enter, refuse, send_document
 
 if TYPE_CHECKING:
+    from islands.inspection.record_note import RecordNote
     from islands.io.records import Preview
     from islands.io.records.reading_options import ReadingOptions
     from islands.io.records.table import Table
@@ -64,7 +65,8 @@ async def inspect_file(
     Returns
     -------
     mapping
-        An `islands.io.records.preview.Preview` as a document, with the keys ``inspection`` and ``reading``.
+        An `islands.io.records.preview.Preview` as a document, with the keys ``notes`` in place of
+        ``problems``, ``inspection`` and ``reading``.
 
     Raises
     ------
@@ -123,17 +125,42 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
     elif options.gaps is None:
         _check_usable(table, {column.name: column.problem for column in found.columns}, request)
     measured, inspected, noted = _measure(table, found, path, request, options)
-    warnings = merge_notes(found.warnings, assumed or inspected)
-    # The inspection ends some notes with the option that changes them.
-    found = replace(found, warnings=(*warnings, *(each for each in noted if not each.startswith(warnings))))
+    if measured is not None:
+        stated = [note.text for note in noted]
+        solved = [text for text in found.problems if text not in stated]
+        found = replace(found, warnings=tuple(text for text in found.warnings if text not in solved))
+    notes = _merge_notes(merge_notes(found.warnings, assumed or inspected), found.problems, noted)
     if options.resample is not None:
         found = replace(found, dt=options.resample)
-    return {**asdict(found), "inspection": measured, "reading": options.changes()}
+    described = asdict(replace(found, warnings=tuple(note.text for note in notes)))
+    del described["problems"]
+    return {
+        **described,
+        "notes": [note.as_document() for note in notes],
+        "inspection": measured,
+        "reading": options.changes(),
+    }
+
+
+def _merge_notes(
+    warnings: tuple[str, ...], problems: Sequence[str], noted: Sequence["RecordNote"]
+) -> list["RecordNote"]:
+    """Return notes for all warnings, and the notes of an inspection that state something else.
+
+    The inspection ends some notes with the option that changes them.
+    """
+    from islands.inspection.record_note import make_note  # noqa: PLC0415
+
+    found = []
+    for text in warnings:
+        same = next((note for note in noted if note.text.startswith(text)), None)
+        found.append(same or make_note(text, text in problems))
+    return [*found, *(note for note in noted if note not in found)]
 
 
 def _measure(
     table: "Table", found: "Preview", path: Path, request: InspectionRequest, options: "ReadingOptions"
-) -> tuple[dict[str, Any] | None, tuple[str, ...], tuple[str, ...]]:
+) -> tuple[dict[str, Any] | None, tuple[str, ...], tuple["RecordNote", ...]]:
     """Return the choice of columns with the facts about the record, how it was read, and notes about it.
 
     There are no facts without a choice or a sampling; the reason of the choice then says why. All are empty
@@ -156,8 +183,8 @@ def _measure(
         return None, (), ()
     document = inspected.as_document()
     assumed = () if inspected.record is None else inspected.record.reading
-    measured = {"rows": rows, "choice": document["choice"], "facts": document["facts"]}
-    return measured, assumed, inspected.warnings
+    measured = {"rows": rows, **{name: document[name] for name in ("choice", "facts", "remedy", "sampling")}}
+    return measured, assumed, inspected.notes
 
 
 def _check_columns(names: Sequence[str], file: str) -> None:

@@ -84,11 +84,19 @@ class Datasets:
         most_bytes: int | None = None,
         by: Requester | None = None,
         source: str | None = None,
+        origin: str | None = None,
     ) -> tuple[StoredDataset, bool]:
         """Add a data set; return it, and whether it is new. One that was deleted is restored.
 
+        Parameters
+        ----------
+        origin : str, optional
+            Data set whose bytes it has. It must still exist, since the bytes of deleted ones are removed.
+
         Raises
         ------
+        DatasetNotFoundError
+            The origin has been deleted.
         QuotaError
             The data sets of the owner would exceed its quota, ``most_bytes`` unless another one is set.
         """
@@ -96,6 +104,8 @@ class Datasets:
 
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
             dialect.lock_owner(connection, owner)
+            if origin is not None:
+                _find_row(connection, owner, origin)
             existing = _read_row(connection, owner, identity)
             if existing is not None and existing.deleted is None:
                 restart = update(datasets).where(datasets.c.owner == owner, datasets.c.id == identity)
@@ -169,12 +179,7 @@ class Datasets:
         DatasetNotFoundError
         """
         with self._database.read() as connection:
-            row = _read_row(connection, owner, dataset)
-        if row is None or (row.deleted is not None and not deleted):
-            raise DatasetNotFoundError(
-                f"there is no data set {dataset!r}: upload it first, or list the existing ones"
-            )
-        return _make_dataset(row)
+            return _make_dataset(_find_row(connection, owner, dataset, deleted))
 
     def page(
         self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
@@ -240,6 +245,7 @@ def summarise_preview(preview: Mapping[str, Any]) -> dict[str, Any]:
         "time": preview.get("time"),
         "dt": preview.get("dt"),
         "warnings": len(preview.get("warnings", ())),
+        "reading": preview.get("reading", {}),
     }
 
 
@@ -276,6 +282,15 @@ _DATASET = select(datasets).where(datasets.c.owner == bindparam("owner"), datase
 
 def _read_row(connection: Connection, owner: str, dataset: str) -> Row[Any] | None:
     return connection.execute(_DATASET, {"owner": owner, "id": dataset}).one_or_none()
+
+
+def _find_row(connection: Connection, owner: str, dataset: str, deleted: bool = False) -> Row[Any]:
+    row = _read_row(connection, owner, dataset)
+    if row is None or (row.deleted is not None and not deleted):
+        raise DatasetNotFoundError(
+            f"there is no data set {dataset!r}: upload it first, or list the existing ones"
+        )
+    return row
 
 
 #: Rows for a page. Those of earlier versions have no summary, and it is made from their preview.

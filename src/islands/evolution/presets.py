@@ -102,6 +102,9 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 #: Preset that is chosen among `KINDS` by trials on the record. It is the default of all commands.
 AUTO = "auto"
 
+#: Summary of the preset `AUTO`.
+AUTO_SUMMARY = "Tries models of several kinds on the record, and states its choice with the reason"
+
 #: Preset of several outputs, unless another one is chosen.
 COUPLED_PRESET = "narx"
 
@@ -176,6 +179,19 @@ def resolve_kinds(changes: Mapping[str, Any]) -> Mapping[str, Settings]:
     if "constraints" in changes and constraint(changes["constraints"]).sums:
         return {"hysteresis": settings["hysteresis"]}
     return settings
+
+
+def common_settings(preset: str) -> dict[str, Any]:
+    """Return the settings of a preset; of `AUTO` those that all kinds have in common.
+
+    Raises
+    ------
+    SettingsError
+        The preset is unknown.
+    """
+    searches = list(resolve_kinds({}).values()) if preset == AUTO else [resolve_settings(preset, {})]
+    first, *others = ({name: getattr(each, name) for name in _SETTING_NAMES} for each in searches)
+    return {name: value for name, value in first.items() if all(other[name] == value for other in others)}
 
 
 def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:

@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,10 @@ from islands.errors import (
 )
 from islands.inspection.channel import channels
 from islands.inspection.column_roles import ColumnChoice, choose_columns
-from islands.inspection.findings import (
-    MOST_ROWS,
-    InspectedColumn,
-    InspectedSampling,
-    RecordInspection,
-)
+from islands.inspection.findings import InspectedColumn, InspectedSampling, RecordInspection
+from islands.inspection.gross_errors import find_input_codes
 from islands.inspection.record_facts import RecordFacts, measure_facts
+from islands.inspection.record_note import MOST_ROWS, RecordNote, make_note
 from islands.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
 from islands.io.records.column_names import find_column, split_structures
 from islands.io.records.preview import ColumnPreview, Preview, preview_table
@@ -155,7 +152,7 @@ def _inspect_dataset(record: Dataset) -> RecordInspection:
     )
     sampling = InspectedSampling(None, record.samples, record.dt, None, (), (), (), NO_BREAKS, "")
     choice = ColumnChoice(record.input_names, record.output_name, None, "Inputs and output are as given.")
-    return RecordInspection("", columns, sampling, choice, measure_facts(record), (), "", record)
+    return RecordInspection("", columns, sampling, choice, measure_facts(record), (), "", record=record)
 
 
 def _describe_values(
@@ -194,7 +191,7 @@ class _FileInspection:
             values |= errors
         stamps, sampling = self._describe_sampling(read, size)
         warnings = [warning for warning in self.found.warnings if warning != sampling.problem]
-        record, facts, remedy = None, RecordFacts(()), self.reading
+        record, facts, remedy, problem = None, RecordFacts(()), self.reading, ""
         if choice.output:
             repaired, problem = self._read_repaired(choice, self.reading)
             is_repaired = self.reading.gaps is not None or self.reading.resample is not None
@@ -203,24 +200,35 @@ class _FileInspection:
             if repaired is not None and is_aligned:
                 sampling = _describe_aligned(repaired, sampling)
                 warnings = list(merge_notes(warnings, repaired.reading))
+            if repaired is not None:
+                # Options of reading have solved them.
+                warnings = [each for each in warnings if each not in self.found.problems]
+                sampling = replace(sampling, problem="")
             if is_repaired or is_aligned:
                 record = repaired
             else:
                 record = self._cut(values, choice, sampling.dt or 1.0, stamps)
             facts = measure_facts(record) if record is not None else facts
-            warnings += [problem, *excluded]
             if repaired is None and not is_repaired:
                 remedy = self._find_remedy(choice, sampling.dt)
-        if sampling.dt is None and facts.facts:
-            warnings.append(_NO_SAMPLING_TIME)
+        unknown = _NO_SAMPLING_TIME if sampling.dt is None and facts.facts else ""
+        breaks = () if stamps is None else stamps.breaks
+        rows = {
+            **excluded,
+            problem: self._find_problem_rows(values, choice, breaks),
+            sampling.problem: breaks,
+        }
+        texts = [sampling.problem, *warnings, problem, *excluded, unknown]
+        first = next((columns.first for columns in read.values()), 0)
         return RecordInspection(
             str(self.path),
             self._describe_columns(values, choice),
             sampling,
             choice,
             facts,
-            tuple(dict.fromkeys(filter(None, [sampling.problem, *warnings]))),
+            _make_notes(texts, {sampling.problem, problem, *self.found.problems}, rows, first),
             self._make_command(choice, remedy),
+            _find_changes(self.reading, remedy),
             record,
         )
 
@@ -237,10 +245,10 @@ class _FileInspection:
 
     def _find_gross_errors(
         self, read: Mapping[str, Columns], choice: ColumnChoice
-    ) -> tuple[Mapping[str, NDArray[np.float64]], Sequence[str]]:
-        """Return the chosen columns without their gross errors, and warnings about them."""
+    ) -> tuple[Mapping[str, NDArray[np.float64]], Mapping[str, Sequence[int]]]:
+        """Return the chosen columns without their gross errors, and warnings about them with the samples."""
         if not choice.output:
-            return {}, ()
+            return {}, {}
         names = [find_column(name, self.table.names) for name in choice.inputs]
         columns = replace(
             read[choice.output], numbers={name: read[name].numbers[name] for name in (*names, choice.output)}
@@ -250,11 +258,36 @@ class _FileInspection:
                 columns, names, choice.output, replace(self.reading, outliers=EXCLUDE)
             )
         except RecordError:
-            return {}, ()  # the reading of the record reports it
-        treatment = "are left out (option outliers: keep uses them)"
+            return {}, {}  # the reading of the record reports it
+        treatment = f"are left out ({name_option('outliers', KEEP)} uses them)"
         if self.reading.outliers == KEEP:
-            treatment = "are used (option outliers: exclude leaves them out)"
-        return found.numbers, [f"{errors} {treatment}" for errors in excluded]
+            treatment = f"are used ({name_option('outliers', EXCLUDE)} leaves them out)"
+        samples = {
+            name: np.flatnonzero(np.isnan(found.numbers[name]) & ~np.isnan(columns.numbers[name])).tolist()
+            for name in columns.numbers
+        }
+        return found.numbers, {
+            f"{errors} {treatment}": next(
+                (rows for name, rows in samples.items() if errors.startswith(f"gross errors of {name}: ")), []
+            )
+            for errors in excluded
+        }
+
+    def _find_problem_rows(
+        self, values: Mapping[str, NDArray[np.float64]], choice: ColumnChoice, breaks: Sequence[int]
+    ) -> Sequence[int]:
+        """Return the samples for which the chosen record is refused, in the order of its checks."""
+        names = [find_column(name, self.table.names) for name in choice.inputs]
+        if self.reading.outliers != KEEP:
+            for name in names:
+                for samples in find_input_codes(values[name]).values():
+                    return [int(sample) for sample in samples]
+        missing = np.zeros(0, dtype=np.int64)
+        if names:
+            missing = np.flatnonzero(
+                ~np.isfinite(np.column_stack([values[name] for name in names])).all(axis=1)
+            )
+        return missing.tolist() if missing.size else breaks
 
     def _align(
         self, usable: Mapping[str, NDArray[np.float64]], read: Mapping[str, Columns]
@@ -405,6 +438,20 @@ class _FileInspection:
             if name != "header":
                 words.append(",".join(value) if isinstance(value, list) else str(value))
         return shlex.join([*words, "--out", "result"])
+
+
+def _make_notes(
+    texts: Sequence[str], problems: Collection[str], rows: Mapping[str, Sequence[int]], first: int
+) -> tuple[RecordNote, ...]:
+    """Return notes of different texts; ``rows`` are the samples that they concern, counted from ``first``."""
+    return tuple(
+        make_note(text, text in problems, [first + row for row in rows.get(text, ())])
+        for text in dict.fromkeys(filter(None, texts))
+    )
+
+
+def _find_changes(reading: ReadingOptions, remedy: ReadingOptions) -> dict[str, Any]:
+    return {name: value for name, value in remedy.changes().items() if value != getattr(reading, name)}
 
 
 def _quote_commas(name: str) -> str:

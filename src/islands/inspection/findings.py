@@ -7,12 +7,10 @@ from islands.data.dataset import Dataset
 from islands.inspection.column_roles import ColumnChoice
 from islands.inspection.fact import Fact
 from islands.inspection.record_facts import RecordFacts
+from islands.inspection.record_note import RecordNote
 
 #: Schema of the document.
 SCHEMA = "islands.inspection/1"
-
-#: Rows that a document lists of one kind.
-MOST_ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +54,7 @@ class InspectedSampling:
         Root mean square deviation of the steps, relative to ``dt``; None without a time column.
     gaps, repeated, backward : tuple of str
         Rows before which samples are missing, that repeat a time stamp, and whose time stamp is earlier than
-        the one before: ``line 14``. The first ``MOST_ROWS`` of each.
+        the one before: ``line 14``. The first `islands.inspection.record_note.MOST_ROWS` of each.
     counts : dict
         Number of all rows of each kind, and of missing samples.
     problem : str
@@ -89,10 +87,13 @@ class RecordInspection:
         Inputs and output that the facts describe.
     facts : RecordFacts
         Empty if inputs, output or sampling time are unknown.
-    warnings : tuple of str
+    notes : tuple of RecordNote
         Problems of the record, with remedies, and remarks on what was inferred.
     command : str
         Next command; empty if inputs and output are unknown.
+    remedy : dict
+        Options of reading in addition to the given ones with which the record can be used; empty if it can
+        be used without, or if none of those that were tried helps.
     record : Dataset or None
         The record that the facts describe, cut where samples are missing.
     """
@@ -102,8 +103,9 @@ class RecordInspection:
     sampling: InspectedSampling
     choice: ColumnChoice
     facts: RecordFacts
-    warnings: tuple[str, ...]
+    notes: tuple[RecordNote, ...]
     command: str
+    remedy: dict[str, Any] = field(default_factory=dict)
     record: Dataset | None = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -111,6 +113,11 @@ class RecordInspection:
             f"{', '.join(self.choice.inputs)} to {self.choice.output}" if self.choice.output else "no record"
         )
         return f"<RecordInspection of {self.file}: {chosen}, {len(self.facts.facts)} facts>"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the notes."""
+        return tuple(note.text for note in self.notes)
 
     def find(self, name: str, signal: str | None = None) -> Fact:
         """Return the fact of a name, such as ``dead-time``, about a signal if several have it.
@@ -132,5 +139,7 @@ class RecordInspection:
             "choice": asdict(self.choice),
             "facts": [fact.as_document() for fact in self.facts.facts],
             "warnings": list(self.warnings),
+            "notes": [note.as_document() for note in self.notes],
+            "remedy": self.remedy,
             "command": self.command,
         }

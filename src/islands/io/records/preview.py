@@ -47,6 +47,8 @@ class ColumnPreview:
     missing : int
         Number of samples without a value. Those of an output are skipped; `read_record` refuses those of an
         input without ``gaps``.
+    dt : float or None
+        Sampling time of the column in seconds; None if it is unknown.
     problem : str
         The message with which `read_record` refuses this column as an output, and as an input without
         missing values; empty if it accepts the column. A non-uniform time column is reported as a warning of
@@ -61,6 +63,7 @@ class ColumnPreview:
     mean: float | None
     deviation: float | None
     missing: int
+    dt: float | None
     problem: str
 
 
@@ -80,6 +83,8 @@ class Preview:
         Number of samples of the largest group of columns of equal length.
     warnings : tuple of str
         Problems that make `read_record` fail for any choice of columns, and remarks on inferred properties.
+    problems : tuple of str
+        The warnings that are problems.
     """
 
     columns: tuple[ColumnPreview, ...]
@@ -87,6 +92,7 @@ class Preview:
     dt: float | None
     samples: int
     warnings: tuple[str, ...]
+    problems: tuple[str, ...] = ()
 
 
 def preview(path: str | Path, options: ReadingOptions = DEFAULT_READING) -> Preview:
@@ -109,6 +115,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
     problems = unread | unmatched
     time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file, options)
     names, clocks, seconds = _find_clocks(table, columns, groups, time, dt, options)
+    # Of all columns but those with cells between the samples, the clock is that of the rows.
     own = {name: each for name, each in zip(names, clocks, strict=True) if each.kind == "cells"}
     if own and dt is None and seconds is not None and (common := common_step(clocks)) is not None:
         # The rows are those of several clocks, and irregular for this reason.
@@ -118,11 +125,10 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         problems[table.clocks[time]] = ""
     for name, column in columns.items():
         problems.setdefault(name, _find_problem(column, name, name == time))
+    duplicate = _error_message(check_unique, table.names, file)
+    too_short = _error_message(check_length, columns[main]) if main else ""
     warnings = (
-        _error_message(check_unique, table.names, file),
-        *unequal,
-        _error_message(check_length, columns[main]) if main else "",
-        sampling_problem,
+        *(duplicate, *unequal, too_short, sampling_problem),
         describe_clocks(names, clocks, seconds) if own else "",
         _describe_time_unit(table, columns, time, options),
         *table.remarks(tuple(columns)),
@@ -132,6 +138,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         columns=tuple(
             _preview_column(
                 *(name, _find_unit(name, structure, columns.get(name)), columns.get(name), problems[name]),
+                _find_step(own[name], seconds) if name in own else dt,
                 name in own,
             )
             for name, structure in split_structures(table.names).items()
@@ -141,6 +148,7 @@ def preview_table(table: Table, file: str, options: ReadingOptions = DEFAULT_REA
         dt=dt,
         samples=len(columns[main].rows) if main else 0,
         warnings=tuple(filter(None, warnings)),
+        problems=tuple(filter(None, (duplicate, too_short, sampling_problem))),
     )
 
 
@@ -283,8 +291,12 @@ def _find_unit(name: str, structure: str, column: Columns | None) -> str:
     return parse_unit(name.removeprefix(structure)) or ("" if column is None else column.units.get(name, ""))
 
 
+def _find_step(clock: ColumnClock, seconds: float | None) -> float | None:
+    return None if seconds is None else float(f"{clock.step * seconds:.12g}")
+
+
 def _preview_column(
-    name: str, unit: str, column: Columns | None, problem: str, has_clock: bool
+    name: str, unit: str, column: Columns | None, problem: str, dt: float | None, has_clock: bool
 ) -> ColumnPreview:
     values = np.empty(0) if column is None else column.numbers[name]
     known = values[~np.isnan(values)]
@@ -292,9 +304,9 @@ def _preview_column(
     missing = 0 if has_clock else len(values) - len(known)
     samples = None if column is None else len(known) if has_clock else len(values)
     if not len(known):
-        return ColumnPreview(name, unit, samples, None, None, None, None, missing, problem)
+        return ColumnPreview(name, unit, samples, None, None, None, None, missing, dt, problem)
     with np.errstate(over="ignore", invalid="ignore"):
         numbers = float(known.min()), float(known.max()), float(known.mean()), float(known.std())
     if not np.isfinite(numbers).all():
-        return ColumnPreview(name, unit, samples, None, None, None, None, missing, problem)
-    return ColumnPreview(name, unit, samples, *numbers, missing, problem)
+        return ColumnPreview(name, unit, samples, None, None, None, None, missing, dt, problem)
+    return ColumnPreview(name, unit, samples, *numbers, missing, dt, problem)

@@ -78,9 +78,10 @@ def test_an_inspection_measures_facts_without_gross_errors_and_warns(tmp_path, v
     found = islands.inspect_record(file, ["u"], "y")
     assert found.find("dead-time").value == 1
     assert f"{errors} (line 152, line 153, line 702) are left out" in found.warnings[0]
-    assert "option outliers: keep" in found.warnings[0]
+    assert found.warnings[0].endswith('are left out (outliers="keep" uses them)')
+    assert found.notes[0].rows == (150, 151, 700)
     kept = islands.inspect_record(file, ["u"], "y", reading=ReadingOptions(outliers="keep"))
-    assert "are used (option outliers: exclude leaves them out)" in kept.warnings[0]
+    assert 'are used (outliers="exclude" leaves them out)' in kept.warnings[0]
     assert "--outliers keep" in kept.command
 
 
