@@ -23,6 +23,9 @@ class Column(ResponseModel):
         default=0,
         description="Samples without a value. Those of an output are skipped; an input needs `gaps`.",
     )
+    dt: float | None = Field(
+        default=None, description="Sampling time of the column in seconds. None if it is unknown."
+    )
     problem: str = Field(
         default="", description="Why the column can be neither input nor output. Empty if it can."
     )
@@ -51,6 +54,41 @@ class ChosenColumns(ResponseModel):
     reason: str
 
 
+class AdviceView(ResponseModel):
+    """Option that a note advises."""
+
+    option: str = Field(
+        description="Option of reading, for `POST /v1/datasets/{dataset}/readings`, or the `dt` of a job.",
+        examples=["gaps"],
+    )
+    value: str | float | None = Field(description="None if only the user knows it.", examples=["split"])
+
+
+class NoteView(ResponseModel):
+    """Problem of a record, or remark on how it is read."""
+
+    text: str
+    is_problem: bool = Field(
+        description="Whether the record cannot be used as it is; otherwise the note states what was inferred."
+    )
+    rows: tuple[int, ...] = Field(
+        default=(), description="First rows that it concerns, from 0 without the header."
+    )
+    advice: tuple[AdviceView, ...] = Field(default=(), description="Options that the text names.")
+
+
+class SamplingView(ResponseModel):
+    """Regularity of the time stamps of a record. Rows are named as in the file, the first of each kind."""
+
+    jitter: float | None = Field(
+        default=None, description="Root mean square deviation of the steps, relative to the sampling time."
+    )
+    gaps: tuple[str, ...] = Field(default=(), description="Rows before which samples are missing.")
+    repeated: tuple[str, ...] = Field(default=(), description="Rows that repeat a time stamp.")
+    backward: tuple[str, ...] = Field(default=(), description="Rows whose time is before that of the last.")
+    counts: dict[str, int] = Field(default_factory=dict, description="Number of rows of each kind.")
+
+
 class Inspection(ResponseModel):
     """Facts about the record in a file."""
 
@@ -59,6 +97,12 @@ class Inspection(ResponseModel):
     )
     choice: ChosenColumns
     facts: tuple[RecordFact, ...]
+    sampling: SamplingView | None = None
+    remedy: dict[str, Any] = Field(
+        default_factory=dict,
+        description="Options of reading with which the record can be used. Empty if it can be used as it is, "
+        "or if none of the options that were tried helps.",
+    )
 
 
 class Preview(ResponseModel):
@@ -69,6 +113,9 @@ class Preview(ResponseModel):
     time: str | None = Field(default=None, description="Name of the time column.")
     dt: float | None = Field(default=None, description="Sampling time in seconds. None if it is unknown.")
     warnings: tuple[str, ...] = ()
+    notes: tuple[NoteView, ...] = Field(
+        default=(), description="The warnings with their rows and the options that they advise."
+    )
     reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
     inspection: Inspection | None = Field(
         default=None,
@@ -90,7 +137,22 @@ class Samples(ResponseModel):
 _EXPIRES = "Earliest deletion, if no job names the data set until then. None if it is kept."
 
 
-class FetchRequest(BaseModel):
+class ReadingRequest(BaseModel):
+    """Request to read a data set in another way."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"reading": {"gaps": "split", "resample": 0.01}}]}
+    )
+
+    inputs: Annotated[list[Name], Field(max_length=16, description="Columns to check as inputs.")] = []
+    output: Annotated[Name | None, Field(description="Column to check as the output.")] = None
+    dt: Annotated[FiniteFloat | None, Field(description="Sampling time in seconds.", gt=0.0)] = None
+    reading: Annotated[
+        dict[str, Any], Field(description='Options of reading: `{"names": ["t", "u", "y"]}`.')
+    ] = {}
+
+
+class FetchRequest(ReadingRequest):
     """Request for the download of a record."""
 
     model_config = ConfigDict(
@@ -116,12 +178,6 @@ class FetchRequest(BaseModel):
         str | None,
         Field(max_length=200, description="File name; by default the last part of the URL's path."),
     ] = None
-    inputs: Annotated[list[Name], Field(max_length=16, description="Columns to check as inputs.")] = []
-    output: Annotated[Name | None, Field(description="Column to check as the output.")] = None
-    dt: Annotated[FiniteFloat | None, Field(description="Sampling time in seconds.", gt=0.0)] = None
-    reading: Annotated[
-        dict[str, Any], Field(description='Options of reading: `{"names": ["t", "u", "y"]}`.')
-    ] = {}
 
 
 class DatasetView(ResponseModel):
@@ -152,6 +208,7 @@ class DatasetSummary(ResponseModel):
     time: str | None = Field(description="Name of the time column.")
     dt: float | None = Field(description="Sampling time in seconds. None if it is unknown.")
     warnings: int = Field(description="Number of warnings.")
+    reading: dict[str, Any] = Field(default_factory=dict, description="Options of reading.")
 
 
 class DatasetPage(ResponseModel):

@@ -307,6 +307,23 @@ class Envelope(ResponseModel):
     maximum: tuple[float | None, ...]
 
 
+class PresetView(ResponseModel):
+    """Preset of a search."""
+
+    name: str = Field(examples=["narx"])
+    summary: str
+    settings: dict[str, Any] = Field(
+        description="Its settings. Of `auto` those that do not depend on the record."
+    )
+
+
+class PresetPage(ResponseModel):
+    """Presets of a search, the default first."""
+
+    items: tuple[PresetView, ...]
+    settings: dict[str, dict[str, Any]] = Field(description="JSON schema of each setting, with its meaning.")
+
+
 class Names(ResponseModel):
     """List of names."""
 

@@ -47,6 +47,8 @@ GUARDED = {
     ("POST", "/v1/datasets/fetch"): "write",
     ("GET", "/v1/datasets/{dataset}"): "read",
     ("GET", "/v1/datasets/{dataset}/samples"): "read",
+    ("POST", "/v1/datasets/{dataset}/readings"): "write",
+    ("GET", "/v1/presets"): "read",
     ("DELETE", "/v1/datasets/{dataset}"): "write",
     ("GET", "/metrics"): "metrics",
     ("GET", "/v1/admin/keys"): "admin",
@@ -83,6 +85,8 @@ def send_request(service, method, path, headers):
         body = {"json": held("0-csv")}
     if path == "/v1/simulations/equations":
         body = {"json": {"text": ""}}
+    if method == "POST" and path.endswith("/readings"):
+        body = {"json": {}}
     if method == "POST" and path.endswith("/records"):
         body = {"json": {"dataset": "0-csv"}}
     if (method, path) == ("POST", "/v1/monitors"):

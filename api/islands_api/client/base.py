@@ -82,6 +82,8 @@ class BaseClient(Generic[H]):
     upload = Endpoint(dataset_calls.upload)
     fetch = Endpoint(dataset_calls.fetch)
     samples = Endpoint(dataset_calls.samples)
+    read_again = Endpoint(dataset_calls.read_again)
+    presets = Endpoint(calls.presets)
     submit = Endpoint(calls.submit)
     diagnose = Endpoint(diagnosis_calls.diagnose)
     simulations = Endpoint(diagnosis_calls.simulations)

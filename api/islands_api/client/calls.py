@@ -24,6 +24,7 @@ from islands_api.schemas import (
     ModelPage,
     ModelView,
     Names,
+    PresetPage,
 )
 from islands_api.webhook_schemas import WebhookView
 
@@ -224,6 +225,11 @@ def report(which: JobRef) -> RequestSpec[bytes]:
 def extended(which: JobRef) -> RequestSpec[bytes]:
     """Return the extended simulation of a discrepancy job: ``extended.json``."""
     return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/extended", lambda response: response.content)
+
+
+def presets() -> RequestSpec[PresetPage]:
+    """Return the presets of a search with their settings, and the meaning of the settings."""
+    return RequestSpec("GET", "/v1/presets", read_as(PresetPage))
 
 
 def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:

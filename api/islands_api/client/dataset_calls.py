@@ -65,6 +65,30 @@ def fetch(
     return RequestSpec("POST", "/v1/datasets/fetch", read_as(DatasetView), json={"url": url, **given})
 
 
+def read_again(
+    dataset: DatasetRef,
+    reading: Mapping[str, Any],
+    inputs: str | Sequence[str] = (),
+    output: str | None = None,
+    dt: float | None = None,
+) -> RequestSpec[DatasetView]:
+    """Return the data set of the same bytes that are read with other options.
+
+    Parameters
+    ----------
+    dataset : str or DatasetView
+    reading : mapping
+        All options of `islands.read_record` that are not at their defaults, such as ``{"gaps": "split"}``.
+        The notes of a data set name those that help.
+    inputs, output, dt
+        As for `upload`.
+    """
+    asked = {"inputs": as_list(inputs), "output": output, "dt": dt}
+    given = {field: value for field, value in asked.items() if value}
+    path = f"/v1/datasets/{quote_id(dataset)}/readings"
+    return RequestSpec("POST", path, read_as(DatasetView), json={"reading": dict(reading), **given})
+
+
 def samples(
     dataset: DatasetRef,
     columns: str | Sequence[str],

@@ -17,6 +17,7 @@ from islands_api.web.routes import (
     monitors,
     owners,
     page,
+    presets,
     service,
     simulations,
     webhooks,
@@ -37,6 +38,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     owners.router,
     administered_jobs.router,
     webhooks.router,
+    presets.router,
     service.router,
     page.router,
 )

@@ -12,7 +12,7 @@ from pydantic import FiniteFloat, TypeAdapter, ValidationError
 from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.io.records.reading_options import ReadingOptions
-from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest, Samples
+from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest, ReadingRequest, Samples
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
@@ -30,7 +30,7 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
-from islands_api.web.uploads.dataset_storage import open_stored, store_dataset
+from islands_api.web.uploads.dataset_storage import open_stored, read_again, store_dataset
 from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
 from islands_api.web.uploads.uploaded_file import parse_file_name
 from islands_service.domain.job_spec import Name
@@ -117,6 +117,21 @@ async def fetch_dataset(asked: FetchRequest, caller: Writer, state: AppStateDep)
     async with fetch(state, caller, asked.url) as file:
         stored, new = await store_dataset(state, caller, file, name, compressed, request, source)
     return await _make_response(state, stored, new)
+
+
+@fetching.post(
+    "/{dataset}/readings", status_code=201, response_model=DatasetView, responses=_UPLOAD_RESPONSES
+)
+async def make_reading(dataset: Id, asked: ReadingRequest, caller: Writer, state: AppStateDep) -> Any:
+    """Read a data set in another way, without another upload: with gaps split, resampled, or without repair.
+
+    The response is the data set of the same bytes that are read with these options, all others being at their
+    defaults. It is checked like an upload. A note of a data set names the options that help.
+    """
+    stored = await state.run_blocking(state.store.datasets.get, caller.owner, dataset)
+    reading = _read_options(json.dumps(asked.reading))
+    request = InspectionRequest(tuple(asked.inputs), asked.output, asked.dt, reading=reading)
+    return await _make_response(state, *(await read_again(state, caller, stored, request)))
 
 
 async def _make_response(state: AppState, stored: StoredDataset, new: bool) -> JSONDocument:

@@ -13,6 +13,27 @@ from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
 
 
+async def read_again(
+    state: AppState, caller: Principal, dataset: StoredDataset, inspection: InspectionRequest
+) -> tuple[StoredDataset, bool]:
+    """Inspect a data set with other options of reading, and store that as a data set of the same bytes.
+
+    Raises
+    ------
+    RecordError, SettingsError, QuotaError, BlobNotFoundError, ObjectStoreError, StorageFullError
+    """
+    settings, owner = state.settings, caller.owner
+    async with open_stored(state, owner, dataset) as path:
+        preview = await inspect_file(
+            path, inspection, settings.inspection_memory, settings.inspection_seconds
+        )
+    content = dataset.name, dataset.suffix, dataset.blob, dataset.bytes, preview
+    return await state.run_blocking(
+        state.store.datasets.add,
+        *(owner, *content, settings.max_stored, caller.requester, dataset.source, dataset.id),
+    )
+
+
 @asynccontextmanager
 async def open_stored(state: AppState, owner: str, dataset: StoredDataset) -> AsyncIterator[Path]:
     """Provide the file of a data set to a process that reads it, with a slot of its owner.
