@@ -20,6 +20,7 @@ from islands.errors import RecordError
 from islands.io.records.column_names import append_unit, find_column, time_column
 from islands.io.records.formats.text.encoding import decode
 from islands.io.records.formats.text.long_table import describe_long_table
+from islands.io.records.formats.text.milliseconds import append_milliseconds, find_milliseconds
 from islands.io.records.formats.text.missing_words import MissingWords, is_missing, parse_words
 from islands.io.records.formats.text.number_parsing import describe_numbers, parse_numbers
 from islands.io.records.formats.text.other_rows import describe_left_out, keep_samples
@@ -248,6 +249,10 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
         left_out = (above, *left_out)
     names, cells = _trim(start.names, kept.cells)
     clocks = _find_clocks(names, cells, missing)
+    if milliseconds := find_milliseconds(names, cells, clocks, missing):
+        (clock,) = clocks
+        left_out = (*left_out, f"column {milliseconds} is read as the milliseconds of column {clock}")
+        names, cells = _join_milliseconds(names, cells, names.index(clock), names.index(milliseconds))
     units = _find_units(names, cells, clocks, missing)
     titles = {name: append_unit(name, unit) for name, unit in units.items()}
     table = DelimitedText(
@@ -370,6 +375,21 @@ def _trim(names: tuple[str, ...], cells: list[list[str]]) -> tuple[tuple[str, ..
     if found > width and not any(any(row[width:]) for row in cells):
         return names, [row[:width] for row in cells]
     return names, cells
+
+
+def _join_milliseconds(
+    names: tuple[str, ...], cells: Sequence[list[str]], stamp: int, milliseconds: int
+) -> tuple[tuple[str, ...], list[list[str]]]:
+    """Append the milliseconds to the time stamps, and remove their column."""
+    joined = [
+        [
+            append_milliseconds(cell, row[milliseconds]) if place == stamp else cell
+            for place, cell in enumerate(row)
+            if place != milliseconds
+        ]
+        for row in cells
+    ]
+    return (*names[:milliseconds], *names[milliseconds + 1 :]), joined
 
 
 def _find_units(

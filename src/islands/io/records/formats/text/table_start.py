@@ -223,15 +223,36 @@ def _find_samples(
         cells = _split(lines[at], separator)
         return len(cells) if _is_sample(cells, missing) else 0
 
-    filled = (at for at in range(top, len(lines)) if lines[at].strip())
-    block = list(islice(filled, _SAMPLES))
-    while block and block[0] < top + _MOST_LINES:
-        for separator in SEPARATORS:
-            first = width(block[0], separator)
-            if first > 1 and all(width(at, separator) == first for at in block):
-                return separator, _extend_upwards(lines, top, block[0], separator)
-        block = [*block[1:], *islice(filled, 1)]
+    def are_samples(block: Sequence[int], separator: str) -> bool:
+        first = width(block[0], separator)
+        return first > 1 and all(width(at, separator) == first for at in block)
+
+    def have_flags(block: Sequence[int], separator: str) -> bool:
+        return _have_flags([_split(lines[at], separator) for at in block], missing)
+
+    for fits in (are_samples, have_flags):
+        filled = (at for at in range(top, len(lines)) if lines[at].strip())
+        block = list(islice(filled, _SAMPLES))
+        while block and block[0] < top + _MOST_LINES:
+            for separator in SEPARATORS:
+                if fits(block, separator):
+                    return separator, _extend_upwards(lines, top, block[0], separator)
+            block = [*block[1:], *islice(filled, 1)]
     return None
+
+
+def _have_flags(rows: Sequence[Sequence[str]], missing: Collection[str]) -> bool:
+    """Return whether rows are samples, apart from columns that repeat a word, such as the flags of alarms."""
+    if len(rows) < _SAMPLES or len({len(cells) for cells in rows}) > 1:
+        return False
+    flags = set()
+    for place, column in enumerate(zip(*rows, strict=True)):
+        if any(is_text(cell, missing) and not is_missing(cell, missing) for cell in column):
+            flags.add(place)
+            if place == 0 or len(set(column)) > 1:
+                return False
+    kept = [[cell for place, cell in enumerate(cells) if place not in flags] for cells in rows]
+    return all(len(cells) > 1 and _is_sample(cells, missing) for cells in kept)
 
 
 def _extend_upwards(lines: Sequence[str], top: int, samples: int, separator: str) -> int:

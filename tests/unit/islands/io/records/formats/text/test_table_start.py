@@ -46,6 +46,20 @@ def test_a_row_of_units_belongs_to_the_names(above, units, names):
     assert found.first == len(above) + 2
 
 
+def test_samples_may_have_several_columns_that_repeat_a_word():
+    rows = [f"{k};{k / 100:.2f};{k % 7};LLLL;LL" for k in range(8)]
+    found = start("Vendor;Graph", "Channel;Name;Range", "CH1;Speed;10V", "", "No;t_s;u;Alarm;Out", *rows)
+    assert (found.header, found.names) == (4, ("No", "t_s", "u", "Alarm", "Out"))
+
+
+def test_descriptions_of_numbered_channels_are_no_samples():
+    names = ("bias", "flow", "p1", "p2", "p3")
+    channels = [f"{100 + k};{name};DC voltage;10" for k, name in enumerate(names)]
+    rows = [f"{k};{k / 100:.2f};LLLL;LL" for k in range(8)]
+    above = ("Logger", "Channel;Name;Function;Range", *channels, "")
+    assert start(*above, "No;t_s;Alarm;Out", *rows).header == len(above)
+
+
 def test_units_in_names_take_precedence_over_the_row_of_units():
     assert start("t_s;u (mV);y", "ms;V;m", *SAMPLES[:8]).names == ("t_s", "u (mV)", "y [m]")
 
