@@ -147,7 +147,7 @@ def _find_rest(model: Model, u: Sequence[float]) -> float:
     for root in roots:
         near = _differentiate(model, u, root)
         # At a kink the slopes are unknown; such a root is kept.
-        if np.isnan(near.outputs).any() or near.is_stable:
+        if np.isnan(near.outputs).any() or (np.isfinite(near.outputs).all() and near.is_stable):
             stable.append(root)
     if len(stable) == 1:
         return stable[0]
@@ -221,7 +221,11 @@ def _find_roots(model: Model, u: Sequence[float], where: str) -> list[float]:
             f"every output is an equilibrium at {where}, as in models of hysteresis: there is no static "
             "characteristic; give the output y"
         )
-    roots = excess.roots()
+    try:
+        with np.errstate(over="ignore"):
+            roots = excess.roots()
+    except np.linalg.LinAlgError:
+        raise ModelError(f"the model overflows at {where}: give smaller inputs") from None
     scale = _ROUNDING * np.maximum(1.0, np.abs(roots)) ** 0.5
     return sorted({float(root.real) for root in roots[np.abs(roots.imag) <= scale]})
 

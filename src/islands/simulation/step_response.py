@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.models.narx import Model, require_narx
 from islands.models.operating_point import find_equilibrium
 from islands.models.protocol import DynamicModel
+from islands.simulation.input_response import make_resting_record
 from islands.simulation.predictors import BOUND, free_run
 
 #: Steps of the model before the step of the input, besides the largest lag.
@@ -111,15 +111,9 @@ def _simulate(
 ) -> StepResponse:
     before = model.maximum_lag + _BEFORE
     u = np.vstack([np.tile(start, (before, 1)), np.tile(end, (count, 1))])
-    y = np.full(before + count, np.nan)
-    y[: model.maximum_lag] = rest
-    dt = 1.0 if model.dt is None else model.dt
-    # The columns are those that were measured: inputs that are read one sample early are advanced.
-    # The signals are at the rate of the model.
-    done = model.preprocessing and model.preprocessing.without_offsets
-    record = Dataset(u, y, dt, model.column_names, model.output_name, preprocessing=done)
+    record = make_resting_record(model, u, rest)
     scale = max(1.0, abs(rest), float(np.abs(u).max()))
     simulated = free_run(model, record, bound=BOUND * scale).y
     simulated[: model.maximum_lag] = rest
-    time = dt * np.arange(-before, count, dtype=np.float64)
+    time = record.dt * np.arange(-before, count, dtype=np.float64)
     return StepResponse(time, u[:, channel], simulated, model.column_names[channel], model.output_name)

@@ -17,6 +17,9 @@ Signal = NDArray[np.float64]
 #: Seed of a NumPy generator. A sequence with a spawn key gives independent streams for the same seed.
 Seed = int | np.random.SeedSequence
 
+#: Part of a step by which rounding may move its beginning.
+_ROUNDING = 1e-9
+
 
 def filtered_noise(
     dt: float,
@@ -145,6 +148,19 @@ def sweep(dt: float, duration: float, amplitude: float, first: float, last: floa
     """Return a linear chirp from ``first`` to ``last`` Hz that starts at zero."""
     time = _make_time(dt, duration)
     return amplitude * np.sin(2 * np.pi * (first + (last - first) / (2 * duration) * time) * time)
+
+
+def triangle(dt: float, duration: float, amplitude: float, frequency: float) -> Signal:
+    """Return a triangle wave that starts at zero and rises; frequency in Hz."""
+    # Position in the period from the preceding trough, of which zero is a quarter.
+    position = (frequency * _make_time(dt, duration) + 0.25) % 1.0
+    return amplitude * (1.0 - 4.0 * np.abs(position - 0.5))
+
+
+def steps(dt: float, duration: float, amplitude: float, frequency: float) -> Signal:
+    """Return a staircase 0, amplitude, 0, -amplitude, each for a quarter of a period; frequency in Hz."""
+    quarters = np.floor(4.0 * frequency * _make_time(dt, duration) + _ROUNDING).astype(np.int64)
+    return amplitude * np.array([0.0, 1.0, 0.0, -1.0])[quarters % 4]
 
 
 def hold_signal(

@@ -44,6 +44,7 @@ def test_two_inputs_have_one_equilibrium_per_pair():
         (model(**{"y(k-1)": 1.0, "u(k-1)": 1.0}), "it drifts"),
         (model(**{"y(k-1)": 1.5, "u(k-1)": 1.0}), "all are unstable"),
         (model(**{"y(k-1)": 1.1, "y(k-1)^3": -0.1, "u(k-1) - u(k-2)": 1.0}), "several stable .*: -1, 1;"),
+        (model(**{"y(k-1)": 0.5, "y(k-1)^2": 1e-300, "u(k-1)": 1e308}), "overflows"),
         (model(**{"y(k-1)": 1.0, "max(y(k-1), y(k-2))": 1.0, "min(y(k-1), y(k-2))": -1.0}), "every output"),
     ],
 )

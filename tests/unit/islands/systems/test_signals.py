@@ -179,3 +179,15 @@ def test_signal_without_a_sample_is_refused(duration):
 def test_cutoff_above_half_the_sampling_frequency_is_refused(cutoff):
     with pytest.raises(SettingsError, match=r"half the sampling frequency, 500\.0 Hz"):
         signals.filtered_noise(DT, 1.0, cutoff, seed=0)
+
+
+def test_a_triangle_starts_at_zero_and_turns_at_its_amplitude():
+    u = signals.triangle(DT, 2.0, amplitude=3.0, frequency=1.0)
+    assert find_turning_points(u) == pytest.approx([0.0, 3.0, -3.0, 3.0, -3.0, u[-1]])
+    assert np.abs(np.diff(u)) == pytest.approx(4.0 * 3.0 * DT)
+
+
+def test_steps_rest_for_a_quarter_of_a_period_each():
+    u = signals.steps(DT, 2.0, amplitude=3.0, frequency=1.0)
+    assert u[::250].tolist() == [0.0, 3.0, 0.0, -3.0] * 2
+    assert np.flatnonzero(np.diff(u)).tolist() == [250 * k - 1 for k in range(1, 8)]
