@@ -33,6 +33,7 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/models/{rank}/figures"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}/figures/{figure}.svg"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}/simulation"): "read",
+    ("POST", "/v1/jobs/{job}/models/{rank}/simulate"): "read",
     ("GET", "/v1/jobs/{job}/result"): "read",
     ("GET", "/v1/jobs/{job}/figures"): "read",
     ("GET", "/v1/jobs/{job}/figures/{figure}.svg"): "read",
@@ -87,6 +88,8 @@ def send_request(service, method, path, headers):
         body = {"json": {"text": ""}}
     if method == "POST" and path.endswith("/readings"):
         body = {"json": {}}
+    if path.endswith("/simulate"):
+        body = {"json": {"samples": 10}}
     if method == "POST" and path.endswith("/records"):
         body = {"json": {"dataset": "0-csv"}}
     if (method, path) == ("POST", "/v1/monitors"):

@@ -14,6 +14,7 @@ from islands_api.client import (
     dataset_calls,
     diagnosis_calls,
     monitor_calls,
+    simulation_calls,
     webhook_calls,
 )
 from islands_api.client.calls import RequestSpec, T
@@ -103,6 +104,7 @@ class BaseClient(Generic[H]):
     history = Endpoint(calls.history)
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)
+    simulate = Endpoint(simulation_calls.simulate)
     create_monitor = Endpoint(monitor_calls.create_monitor)
     monitors = Endpoint(monitor_calls.monitors)
     monitor = Endpoint(monitor_calls.monitor)

@@ -5,16 +5,19 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from logging import ERROR
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
 
 from fastapi import Depends, Request
 
+from islands.data.dataset import Dataset
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.limits.owner_counts import OwnerCounts
 from islands_api.web.limits.owner_slots import OwnerSlots
 from islands_api.web.limits.rate import RateLimiter
+from islands_api.web.model_simulation import SimulatedModel
 from islands_api.web.prometheus import ServiceMetrics
+from islands_api.web.recent_values import RecentValues
 from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
@@ -36,6 +39,16 @@ MAX_CONCURRENT_INSPECTIONS = 2
 
 #: Maximum number of uploads of one owner that are inspected at once: an inspection may take two minutes.
 MAX_INSPECTIONS_PER_OWNER = 1
+
+#: Maximum number of simulations at once, and of one owner: each takes a core for milliseconds.
+MAX_CONCURRENT_SIMULATIONS, MAX_SIMULATIONS_PER_OWNER = 2, 1
+
+#: Maximum numbers of simulated models, some kilobytes each, and of their records in memory: 50 000 samples of
+#: one input are 0.8 MB.
+MAX_KEPT_MODELS, MAX_KEPT_RECORDS = 64, 8
+
+#: A job, its version, which changes with its result, and the rank of a model.
+ModelKey: TypeAlias = tuple[str, int, int]
 
 #: Maximum number of figure processes at once; each takes a core.
 MAX_CONCURRENT_DRAWINGS = 1
@@ -60,6 +73,15 @@ class AppState:
     )
     figure_slots: OwnerSlots = field(
         default_factory=lambda: OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS)
+    )
+    simulation_slots: OwnerSlots = field(
+        default_factory=lambda: OwnerSlots(MAX_CONCURRENT_SIMULATIONS, MAX_SIMULATIONS_PER_OWNER)
+    )
+    simulated_models: RecentValues[ModelKey, SimulatedModel] = field(
+        default_factory=lambda: RecentValues(MAX_KEPT_MODELS)
+    )
+    simulated_records: RecentValues[ModelKey, Dataset] = field(
+        default_factory=lambda: RecentValues(MAX_KEPT_RECORDS)
     )
     drawings: OwnerCounts = field(default_factory=lambda: OwnerCounts("requests for figures"))
     streams: OwnerCounts = field(default_factory=lambda: OwnerCounts("event streams"))

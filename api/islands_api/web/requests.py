@@ -19,6 +19,7 @@ from fastapi import Header, Query, Request, Response
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
+from starlette.types import Receive, Scope
 
 from islands.errors import IslandsError, SettingsError
 from islands_api.web.auth import Principal, authenticate, check_scope
@@ -69,6 +70,9 @@ class BodyRoute(StrictRoute):
     media: ClassVar[str]
     advice: ClassVar[str] = "send it again"
 
+    #: Largest number of array elements of a body in JSON.
+    max_elements: ClassVar[int] = _MAX_ELEMENTS
+
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return a handler that checks the caller and the media type before it reads the body."""
         handler = super().get_route_handler()
@@ -105,7 +109,7 @@ class BodyRoute(StrictRoute):
         """Return the request with limits on its body."""
         settings = request.app.state.islands.settings
         body = BodyReader(request.receive, settings.body_timeout, settings.body_rate)
-        yield _StrictRequest(request.scope, body.receive)
+        yield _StrictRequest(request.scope, body.receive, self.max_elements)
 
 
 class JSONRoute(BodyRoute):
@@ -148,18 +152,28 @@ class FormRoute(BodyRoute):
 
 
 class _StrictRequest(Request):
+    def __init__(self, scope: Scope, receive: Receive, max_elements: int) -> None:
+        super().__init__(scope, receive)
+        self._max_elements = max_elements
+
     async def json(self) -> Any:
         if not hasattr(self, "_json"):
             body = await self.body()
             if len(body) < _LARGE_BODY:
-                self._json = read_json(body)
+                self._json = read_json(body, self._max_elements)
             else:
-                self._json = await self.app.state.islands.run_blocking(read_json, body)
+                self._json = await self.app.state.islands.run_blocking(read_json, body, self._max_elements)
         return self._json
 
 
-def read_json(body: bytes) -> Any:
+def read_json(body: bytes, max_elements: int = _MAX_ELEMENTS) -> Any:
     """Parse JSON strictly according to RFC 8259.
+
+    Parameters
+    ----------
+    body : bytes
+    max_elements : int
+        Largest number of array elements.
 
     Raises
     ------
@@ -170,7 +184,7 @@ def read_json(body: bytes) -> Any:
         The body has too many names or array elements.
     """
     document = _parse_json(body)
-    _check_extent(document)
+    _check_extent(document, max_elements)
     return document
 
 
@@ -192,7 +206,7 @@ def _parse_json(body: bytes) -> Any:
         raise MalformedBodyError(f"the body is not valid JSON: {error}") from error
 
 
-def _check_extent(document: Any) -> None:
+def _check_extent(document: Any, max_elements: int) -> None:
     """Refuse a document whose validation would take long."""
     names = elements = 0
     level, depth = [document], 0
@@ -202,7 +216,7 @@ def _check_extent(document: Any) -> None:
             raise _make_depth_error()
         names += sum(len(each) for each in level if isinstance(each, dict))
         elements += sum(len(each) for each in level if isinstance(each, list))
-        for count, most, what in ((names, _MAX_NAMES, "names"), (elements, _MAX_ELEMENTS, "array elements")):
+        for count, most, what in ((names, _MAX_NAMES, "names"), (elements, max_elements, "array elements")):
             if count > most:
                 raise PayloadTooLargeError(
                     f"the body has {count} {what} or more, and {most} is the most: send only the documented "

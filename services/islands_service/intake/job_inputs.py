@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset, join
 from islands.data.split import hold_out
+from islands.io.records.row_range import parse_rows
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
 from islands_service.intake.record_reading import RecordRequest, read_confined
 from islands_service.settings import service_settings
@@ -47,6 +49,28 @@ def read_record_and_validation(
     if isinstance(spec.validation, Part):
         return record, _read_part(spec, spec.validation, datasets, blobs)
     return record, spec.validation
+
+
+def read_beginning(
+    spec: Identification, datasets: dict[str, StoredDataset], blobs: Blobs, most: int
+) -> Dataset:
+    """Read the first recording of a job, at most its first ``most`` samples, with the inputs as measured.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as specified.
+    BlobNotFoundError
+        The data folder has lost a file.
+    """
+    part = spec.estimation[0]
+    samples = datasets[part.dataset].preview.get("samples")
+    # Columns of different lengths have no number of samples; such a recording is read as it is specified.
+    if samples is not None:
+        first, stop, _ = (parse_rows(part.rows) or slice(None)).indices(samples)
+        part = Part(dataset=part.dataset, rows=f"{first}:{min(stop, first + most)}")
+    measured = tuple(parse_channel_name(name).base for name in spec.inputs)
+    return _read_part(spec.model_copy(update={"inputs": measured}), part, datasets, blobs)
 
 
 def _read_part(
