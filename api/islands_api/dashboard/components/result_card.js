@@ -5,6 +5,7 @@ import { el, makeFacts } from "../lib/dom.js";
 import { formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeEquation } from "./models.js";
+import { makeTryModel } from "./try_model.js";
 
 /** Beginnings of the sentences of the summary that are the verdict. */
 const VERDICT = ["As a simulation", "Fails at"];
@@ -67,5 +68,6 @@ export function makeResultCard(job, unit, signal) {
     facts,
     chart.node,
     verdict.map((line) => el("p", {}, line)),
+    makeTryModel(path, job.spec, signal),
   );
 }

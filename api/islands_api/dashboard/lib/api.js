@@ -95,8 +95,9 @@ export const getJson = async (path, options = {}) =>
   readBody(await sendRequest(path, options), "json", options.signal);
 
 /** Send a JSON document; return the one in the response. */
-export const postJson = (path, document) =>
+export const postJson = (path, document, options = {}) =>
   getJson(path, {
+    ...options,
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify(document),
@@ -114,10 +115,15 @@ export const getBlob = async (path, options = {}) =>
 export async function download(path, name) {
   const response = await sendRequest(path);
   const match = /filename="([^"]+)"/.exec(response.headers.get("content-disposition") ?? "");
-  const url = URL.createObjectURL(await readBody(response, "blob"));
+  saveBlob(await readBody(response, "blob"), match?.[1] ?? name);
+}
+
+/** Save bytes as a file. */
+export function saveBlob(blob, name) {
+  const url = URL.createObjectURL(blob);
   const link = document.createElement("a");
   link.href = url;
-  link.download = match?.[1] ?? name;
+  link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }

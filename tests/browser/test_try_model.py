@@ -1,0 +1,144 @@
+"""Response of a model to inputs of choice on the page of a job, while sliders move."""
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from islands_service.coordinator.identification_job import run_identification_job
+from islands_service.settings import ServiceSettings
+from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
+from support.played import stored
+from support.reading import unreadable
+from support.service_processes import Service
+from support.stores import LONG, taken
+
+pytestmark = pytest.mark.ci
+
+#: Data of the path of the response.
+DRAWN = "() => document.querySelector('.try path[data-name=y_um]').getAttribute('d')"
+
+
+@pytest.fixture(scope="module")
+def service(guarded: Callable[..., Any]) -> Iterator[Service]:
+    """A service without coordinators."""
+    with guarded("--coordinators", 0) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def finished(service: Service) -> str:
+    """A succeeded job, executed by the test process."""
+    job = service.submit(20, name="piezo")
+    with stored(service) as store:
+        lease = taken(store, job)
+        blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
+        outcome = run_identification_job(make_run(lease, store, blobs, lambda: None, LONG))
+        store.leases.finish(lease, outcome)
+    return job
+
+
+@pytest.fixture
+def tried(opened: Callable[..., Any], finished: str, expect: Any) -> Callable[..., Any]:
+    """Function that opens the section, and returns the page with a first response."""
+
+    def open_section(**options: Any) -> Any:
+        page = opened(f"#/jobs/{finished}", **options)
+        button = page.get_by_role("button", name="Try it")
+        button.click()
+        expect(button).to_have_attribute("aria-expanded", "true")
+        # The first simulation of a service loads the kernels.
+        expect(page.locator(".try [role=status]")).to_contain_text("y_um: ", timeout=60_000)
+        return page
+
+    return open_section
+
+
+def test_a_slider_changes_the_response_and_the_warning(tried: Callable[..., Any], expect: Any) -> None:
+    page = tried()
+    expect(page.locator(".try .warnings li")).to_have_count(0)
+    before = page.evaluate(DRAWN)
+    slider = page.get_by_role("slider", name="Amplitude")
+    value, text = page.get_by_label("Amplitude (").input_value(), slider.get_attribute("aria-valuetext")
+    assert text.endswith(" V")
+    slider.press("End")
+    expect(page.locator(".try .warnings li").first).to_contain_text("in the estimation data")
+    assert float(page.get_by_label("Amplitude (").input_value()) == pytest.approx(2 * float(value), rel=1e-3)
+    assert slider.get_attribute("aria-valuetext") != text
+    assert page.evaluate(DRAWN) != before
+    page.get_by_label("Amplitude (").fill(value)
+    expect(page.locator(".try .warnings li")).to_have_count(0)
+    assert page.evaluate(DRAWN) == before
+
+
+def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect: Any) -> None:
+    page = tried()
+    asked: list[Any] = []
+    page.on("request", lambda each: each.url.endswith("/simulate") and asked.append(each.post_data_json))
+    slider = page.get_by_role("slider", name="Offset")
+    slider.evaluate(
+        """slider => {
+          for (let at = 0; at <= 50; at += 1) {
+            slider.value = Number(slider.min) + (at / 50) * (slider.max - slider.min);
+            slider.dispatchEvent(new Event("input", { bubbles: true }));
+          }
+        }"""
+    )
+    typed = float(page.get_by_label("Offset (").input_value())
+    while len(asked) < 2:
+        page.wait_for_event("requestfinished")
+    # The request that runs at the first change, and one for all changes meanwhile.
+    assert len(asked) == 2
+    assert asked[-1]["inputs"]["u_V"]["offset"] == typed
+    expect(page.get_by_text("Before the first sample", exact=False)).to_be_visible()
+
+
+def test_every_excitation_has_a_response(tried: Callable[..., Any], expect: Any) -> None:
+    page = tried()
+    for kind in ("triangle", "steps", "sweep", "hold", "record"):
+        with page.expect_response(lambda answer: answer.url.endswith("/simulate")) as answer:
+            page.get_by_label("Signal").select_option(kind)
+        assert answer.value.status == 200
+        assert answer.value.request.post_data_json["inputs"]["u_V"]["kind"] == kind
+    expect(page.locator(".try .loop canvas")).to_be_visible()
+    expect(page.get_by_role("img", name="Output over input: u_V (V) from")).to_be_visible()
+
+
+def test_an_invalid_value_is_named_and_not_requested(tried: Callable[..., Any], expect: Any) -> None:
+    page = tried()
+    page.get_by_label("Samples").fill("60000")
+    expect(page.locator(".try [role=status]")).to_contain_text("missing or out of its range")
+    page.get_by_label("Samples").fill("100")
+    expect(page.locator(".try [role=status]")).to_contain_text("y_um: ")
+
+
+def test_the_response_is_saved_with_every_digit(tried: Callable[..., Any]) -> None:
+    page = tried()
+    with page.expect_response(lambda answer: answer.url.endswith("/simulate")) as answered:
+        page.get_by_label("Samples").fill("300")
+    document = json.loads(answered.value.body())
+    page.wait_for_function("document.querySelector('.try form button:enabled')")
+    page.wait_for_timeout(200)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save as CSV").click()
+    heading, *rows = download.value.path().read_text().splitlines()
+    assert heading == "t_s,u_V,y_um"
+    columns = zip(*([float(cell) for cell in row.split(",")] for row in rows), strict=True)
+    assert [list(each) for each in columns] == [
+        document["time_s"],
+        document["inputs"]["u_V"],
+        document["output"],
+    ]
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+def test_the_section_fits_and_has_sufficient_contrast(
+    tried: Callable[..., Any], scheme: str, width: int
+) -> None:
+    page = tried(width=width, color_scheme=scheme)
+    page.get_by_role("slider", name="Amplitude").press("End")
+    page.locator(".try .warnings li").first.wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert unreadable(page) == []
