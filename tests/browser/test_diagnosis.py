@@ -123,7 +123,8 @@ def test_a_long_result_fits_on_a_narrow_screen(
     page = quiet(desk.url, width=380).go(f"#/jobs/{job}")
     for place in (f"#/jobs/{job}", "#/jobs"):
         page.goto(f"{desk.url}/{place}")
-        expect(page.locator(".progress-text", has_text="second-hysteresis").first).to_be_visible()
+        text = page.locator(".progress-text, .wide .line", has_text="second-hysteresis")
+        expect(text.first).to_be_visible()
         wide, seen = (page.evaluate(f"document.documentElement.{each}Width") for each in ("scroll", "client"))
         assert wide <= seen
 
@@ -137,8 +138,10 @@ def test_the_list_shows_the_verdict_of_a_diagnosis(
         store.leases.finish(taken(store, jobs[0]), make_outcome(desk))
         store.leases.finish(taken(store, jobs[1]), make_outcome(desk, **nothing))
     page = quiet(desk.url).go()
-    for job, words in zip(jobs, ("named: thermal-drift", "nothing"), strict=True):
-        expect(page.locator(f"tr[data-job='{job}'] .progress-text")).to_have_text(words)
+    sentence = desk.job(jobs[0])["summary"]["words"].splitlines()[0]
+    for job, cause in zip(jobs, ("thermal-drift", ""), strict=True):
+        expect(page.locator(f"tr[data-job='{job}'] .verdict")).to_have_text(sentence)
+        assert page.locator(f"tr[data-job='{job}'] .line").text_content() == cause
     page.get_by_role("link", name="two").first.click()
     expect(page.get_by_role("button", name="Save the report")).to_be_visible()
     assert page.get_by_role("button", name="Save the extended simulation").count() == 0

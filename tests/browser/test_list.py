@@ -36,11 +36,10 @@ def test_a_new_job_appears_and_changes_its_state(
         expect(row(page, job)).to_contain_text("125 / 500")
         assert bar.evaluate("bar => bar.value") == pytest.approx(0.25)
         best = desk.job(job)["progress"]["best_error"]
-        assert row(page, job).locator("td").nth(2).text_content() == f"{best:#.3g}"
+        expect(row(page, job)).to_contain_text(f"best error {best:#.3g}")
         store.leases.finish(lease, JobOutcome(JobState.FAILED, problem={"title": "t", "detail": "d"}))
     expect(state).to_have_text("failed")
     expect(page.get_by_role("status")).to_have_text("\u2068tank, level 3\u2069: failed")
-    assert row(page, job).locator("td").last.text_content() == "1"
 
 
 def test_a_name_cannot_reverse_the_text_around_it(
@@ -48,7 +47,7 @@ def test_a_name_cannot_reverse_the_text_around_it(
 ) -> None:
     """A right-to-left override would turn "report\u202efdp.exe" into "reportexe.pdf" and all that follows."""
     job = desk.submit(500, name="report\u202efdp")
-    link = row(quiet(desk.url).go(), job).get_by_role("link")
+    link = row(quiet(desk.url).go(), job).locator("th a")
     expect(link.locator("bdi")).to_have_text("report\u202efdp")
     assert link.locator("bdi").evaluate("node => getComputedStyle(node).unicodeBidi") == "isolate"
     desk.ask("POST", f"/v1/jobs/{job}/cancel")
@@ -102,7 +101,7 @@ def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
 def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], desk: Service) -> None:
     job = desk.submit(500, name=HOSTILE)
     page = quiet(desk.url).go()
-    link = row(page, job).get_by_role("link")
+    link = row(page, job).locator("th a")
     assert link.text_content() == HOSTILE
     link.click()
     page.get_by_role("heading", level=1, name=HOSTILE, exact=True).wait_for()
@@ -151,7 +150,7 @@ def test_pages_show_each_job_once_while_jobs_are_added(
 def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], desk: Service) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go()
-    link = row(page, job).get_by_role("link")
+    link = row(page, job).locator("th a")
     link.focus()
     new = desk.submit(500)
     row(page, new).wait_for()

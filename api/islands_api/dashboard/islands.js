@@ -24,8 +24,9 @@ const ROUTES = [
   },
   {
     pattern: /^\/jobs$/,
-    view: (_match, query) => `jobs ${query}`,
+    view: () => "jobs",
     mount: (host, _match, query, signal) => mountJobs(host, Object.fromEntries(query), signal),
+    details: (_match, query) => Object.fromEntries(query),
   },
   {
     pattern: /^\/data\/([^/]+)$/,
@@ -70,7 +71,7 @@ function show() {
     return;
   }
   if (target.view === current.view && current.update) {
-    current.update(target.details(target.match));
+    current.update(target.details(target.match, target.query));
     return;
   }
   const first = current.view === null;

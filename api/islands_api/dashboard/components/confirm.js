@@ -3,7 +3,7 @@
 import { el } from "../lib/dom.js";
 
 /** Ask for confirmation; resolve to true if confirmed. Escape cancels. */
-export function askConfirmation(title, text, action) {
+export function askConfirmation(title, text, action, refusal = "Keep it") {
   return new Promise((resolve) => {
     const close = (value) => ({ click: () => dialog.close(value) });
     const dialog = el(
@@ -14,7 +14,7 @@ export function askConfirmation(title, text, action) {
       el(
         "div",
         { class: "row end" },
-        el("button", { type: "button", autofocus: true, on: close("no") }, "Keep it"),
+        el("button", { type: "button", autofocus: true, on: close("no") }, refusal),
         el("button", { type: "button", class: "danger", on: close("yes") }, action),
       ),
     );

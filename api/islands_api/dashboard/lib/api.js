@@ -95,13 +95,16 @@ export const getJson = async (path, options = {}) =>
   readBody(await sendRequest(path, options), "json", options.signal);
 
 /** Send a JSON document; return the one in the response. */
-export const postJson = (path, document, options = {}) =>
+export const sendJson = (method, path, document, options = {}) =>
   getJson(path, {
     ...options,
-    method: "POST",
+    method,
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify(document),
   });
+
+/** Post a JSON document; return the one in the response. */
+export const postJson = (path, document, options) => sendJson("POST", path, document, options);
 
 /** Request text. */
 export const getText = async (path, options = {}) =>

@@ -6,6 +6,8 @@ import { makeConvergencePanel } from "../components/convergence.js";
 import { makeCoupledPanel } from "../components/coupled_model.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
 import { isDiagnosis, isSearch, makeFindingsPanels } from "../components/diagnosis.js";
+import { canResume, makeFailureCard } from "../components/job_failure.js";
+import { makeRenameButton, makeTagEditor } from "../components/job_labels.js";
 import {
   getIsolatedName,
   getName,
@@ -42,7 +44,7 @@ const ACTIONS = [
   },
   {
     name: "Resume",
-    when: (job) => ["failed", "cancelled"].includes(job.state),
+    when: canResume,
     act: (job) => getJson(`${getPath(job.id)}/resume`, { method: "POST" }),
   },
   {
@@ -129,13 +131,6 @@ function makeJobFacts(job, unit) {
   ]);
 }
 
-function makeFailureCard(job) {
-  if (job.state !== "failed" || !job.problem) return null;
-  const { title, detail } = job.problem;
-  const heading = el("h2", {}, title ?? "The job failed");
-  return el("section", { class: "card failure" }, heading, el("p", {}, detail ?? ""));
-}
-
 /** Show a job in a host until the signal aborts; `update({rank})` shows another model. */
 export function mountJob(host, { id, rank }, signal) {
   const name = el("bdi", {}, "Job");
@@ -146,10 +141,13 @@ export function mountJob(host, { id, rank }, signal) {
   const failureHost = el("div");
   const [resultHost, convergenceHost, modelsHost] = [el("div", { class: "stack" }), el("div"), el("div")];
   const aboutHost = el("div", { class: "about" });
+  const changed = (job) => updateJob({ ...current, ...job });
+  const rename = makeRenameButton(heading, { getJob: () => current, changed });
+  const tags = makeTagEditor({ changed });
   const titleBar = el(
     "div",
     { class: "heading" },
-    el("div", { class: "title" }, heading, state.node),
+    el("div", { class: "title" }, heading, rename.node, state.node, tags.node),
     el("code", { class: "soft small" }, id),
   );
   let [current, unit, convergence, models] = [null, null, null, null];
@@ -183,6 +181,8 @@ export function mountJob(host, { id, rank }, signal) {
     current = job;
     document.title = `${getName(job)} · islands`;
     setText(name, getName(job));
+    rename.show(getIsolatedName(job));
+    tags.show(job);
     state.show(job);
     bar.show(job);
     buttons.show(job);

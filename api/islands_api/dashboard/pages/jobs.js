@@ -1,20 +1,13 @@
-/** Page with the list of jobs: newest first, filtered by state, in pages, updated continuously. */
+/** Page with the list of jobs: newest first, filtered and searched, in pages, updated continuously. */
 
 import { makeFileButton } from "../components/file_upload.js";
-import {
-  STATES,
-  getIsolatedName,
-  getName,
-  getState,
-  isEnded,
-  makeBadge,
-  makeProgressBar,
-} from "../components/job_state.js";
+import { makeJobFilters, makeJobsAddress } from "../components/job_filters.js";
+import { followRows, makeJobRow } from "../components/job_row.js";
+import { makeJobSelection } from "../components/job_selection.js";
+import { isEnded } from "../components/job_state.js";
 import { makePagedTable } from "../components/paged_table.js";
 import { getJson } from "../lib/api.js";
-import { makeAge } from "../lib/clock.js";
-import { announce, el, setText } from "../lib/dom.js";
-import { NONE, formatNumber } from "../lib/numbers.js";
+import { el } from "../lib/dom.js";
 import { poll } from "../lib/polling.js";
 
 /** Number of jobs on a page. */
@@ -25,51 +18,6 @@ const ACTIVE_POLL_SECONDS = 2;
 
 /** Seconds between two polls if all jobs on the page have ended. */
 const IDLE_POLL_SECONDS = 4;
-
-const makeAddress = (state, cursor) => {
-  const query = new URLSearchParams(Object.entries({ state, cursor }).filter(([, value]) => value));
-  return query.size ? `#/jobs?${query}` : "#/jobs";
-};
-
-function makeFilters(state) {
-  const link = (name, value) =>
-    el("a", { href: makeAddress(value), "aria-current": value === state ? "page" : null }, name);
-  const links = [link("all", ""), ...STATES.map((each) => link(each, each))];
-  return el("nav", { class: "filters", "aria-label": "Jobs by state" }, links);
-}
-
-/** Make the row of a job; `show(job)` updates it and announces a change of state to screen readers. */
-function makeRow(job) {
-  const state = makeBadge();
-  const bar = makeProgressBar({ showsReason: true });
-  const best = el("td", { class: "figure", "data-label": "best" });
-  const attempt = el("td", { class: "figure", "data-label": "attempt" });
-  const name = el("bdi");
-  const link = el("a", { href: `#/jobs/${job.id}` }, name);
-  let lastState = null;
-  const node = el(
-    "tr",
-    { "data-job": job.id },
-    el("td", {}, state.node),
-    el("th", { scope: "row" }, link, job.name && el("code", { class: "soft small" }, job.id.slice(0, 8))),
-    el("td", { class: "wide" }, bar.node),
-    best,
-    el("td", { class: "figure" }, makeAge(job.created)),
-    attempt,
-  );
-  function show(newJob) {
-    state.show(newJob);
-    bar.show(newJob);
-    setText(name, getName(newJob));
-    setText(best, formatNumber(newJob.progress?.best_error));
-    setText(attempt, newJob.attempt ? String(newJob.attempt) : NONE);
-    const newState = getState(newJob);
-    if (lastState !== null && lastState !== newState) announce(`${getIsolatedName(newJob)}: ${newState}`);
-    lastState = newState;
-  }
-  show(job);
-  return { node, show };
-}
 
 const makeCommandBlock = (title, text) =>
   el("div", {}, el("h3", {}, title), el("pre", { tabindex: "0" }, el("code", {}, text)));
@@ -127,36 +75,77 @@ function makeWelcomeCard() {
   );
 }
 
-function makeEmptyMessage(state, cursor) {
-  if (!state && !cursor) return makeWelcomeCard();
-  const text = cursor ? "No older jobs." : `No job is ${state}.`;
+function makeEmptyMessage(filters) {
+  const { state, cursor, kind, tag, q } = filters;
+  if (!Object.values(filters).some(Boolean)) return makeWelcomeCard();
+  const isOnlyState = state && !kind && !tag && !q;
+  let text = isOnlyState ? `No job is ${state}.` : "No job matches these filters.";
+  if (cursor) text = "No older jobs.";
   return el("p", { class: "empty" }, text, " ", el("a", { href: "#/jobs" }, "Show all jobs"));
 }
 
-/** Show the list in a host until the signal aborts. */
-export function mountJobs(host, { state = "", cursor = "" }, signal) {
+/** Return whether the rows must not move: the pointer is over them, a name is edited, a job is selected. */
+function isInUse(table, selection) {
+  const isPointed = matchMedia("(hover: hover)").matches && table.querySelector("tbody:hover") !== null;
+  return isPointed || table.querySelector("form") !== null || !selection.isEmpty();
+}
+
+/** Show the list in a host until the signal aborts; `update(filters)` shows another part of it. */
+export function mountJobs(host, firstFilters, signal) {
   document.title = "Jobs · islands";
-  const table = makePagedTable({
-    caption: "Jobs, newest first",
-    headings: [
-      ...["State", "Job", "Progress"],
-      ...["Best error", "Submitted", "Attempt"].map((name) => [name, "figure"]),
-    ],
-    makeRow,
-    makeEmptyMessage: () => makeEmptyMessage(state, cursor),
-    makeAddress: (next) => makeAddress(state, next),
-    cursor,
-  });
-  host.replaceChildren(
-    el("div", { class: "heading" }, el("h1", { tabindex: "-1" }, "Jobs"), makeFilters(state)),
-    ...table.nodes,
-  );
-  poll(async () => {
-    const filter = { ...(state && { state }), ...(cursor && { cursor }) };
-    const query = new URLSearchParams({ limit: PAGE_SIZE, ...filter });
+  const heading = el("h1", { tabindex: "-1" }, "Jobs");
+  const [bars, list] = [makeJobFilters(), el("div")];
+  let [filters, table, selection] = [null, null, null];
+
+  function refresh() {
+    table.release();
+    wake();
+  }
+
+  function showFilters({ state, kind, tag, q, cursor }) {
+    filters = { state, kind, tag, q, cursor };
+    bars.show(filters);
+    selection = makeJobSelection({ refresh });
+    table = makePagedTable({
+      caption: "Jobs, newest first",
+      headings: [
+        [selection.all, "choice"],
+        ...["State", "Job", "Result"],
+        ...["Error", "Terms", "Submitted"].map((name) => [name, "figure"]),
+      ],
+      makeRow: (job) => makeJobRow(job, selection),
+      makeEmptyMessage: () => makeEmptyMessage(filters),
+      makeAddress: (cursor) => makeJobsAddress({ ...filters, cursor }),
+      cursor: filters.cursor,
+      isHeld: (node) => isInUse(node, selection),
+    });
+    list.replaceChildren(selection.bar, ...table.nodes);
+  }
+
+  host.replaceChildren(el("div", { class: "heading" }, heading, ...bars.nodes), list);
+  followRows(list);
+  showFilters(firstFilters);
+  const wake = poll(async () => {
+    const asked = filters;
+    const given = Object.entries(asked).filter(([, value]) => value);
+    const query = new URLSearchParams([["limit", PAGE_SIZE], ...given]);
     const page = await getJson(`v1/jobs?${query}`, { signal });
-    if (!signal.aborted) table.show(page);
+    // The user may have changed the filters meanwhile.
+    if (asked !== filters) return 0;
+    if (!signal.aborted) {
+      table.show(page);
+      selection.keep(new Set([...list.querySelectorAll("tr[data-job]")].map((row) => row.dataset.job)));
+    }
     return page.items.every(isEnded) ? IDLE_POLL_SECONDS : ACTIVE_POLL_SECONDS;
   }, signal);
-  return {};
+  return {
+    update(newFilters) {
+      const isOtherPage = newFilters.cursor !== filters.cursor;
+      showFilters(newFilters);
+      wake();
+      if (!isOtherPage) return;
+      scrollTo(0, 0);
+      heading.focus({ preventScroll: true });
+    },
+  };
 }

@@ -1,0 +1,46 @@
+/** Words about a job for lists: its kind, its verdict, and what distinguishes it from similar jobs. */
+
+import { formatVerdict, isSearch } from "./diagnosis.js";
+
+/** Kinds of jobs in words. */
+export const KINDS = {
+  identification: "Identification",
+  discrepancy: "Diagnosis",
+  monitoring: "Record of a monitor",
+};
+
+/** Largest number of settings that a row lists. */
+const MAX_SETTINGS = 4;
+
+/** Return what a job has found: the equation of its recommended model, or the causes of a discrepancy. */
+export const getFinding = ({ summary }) => summary?.equation ?? summary?.effects?.join(", ") ?? "";
+
+/** Return the verdict of a job in words; empty if it has none. */
+export function getVerdict({ summary, ...job }) {
+  if (!summary) return "";
+  if (!isSearch(job)) return (summary.words ?? "").split("\n")[0] || formatVerdict(summary);
+  const [, verdict = ""] = /^As a simulation: ([^(\n]+)/m.exec(summary.words ?? "") ?? [];
+  return verdict.trim().replace(/\.$/, "");
+}
+
+function listSettings({ settings = {}, preset = "auto", model = "narx", seed = 0, rows, simulation }) {
+  const chosen = Object.entries(settings ?? {}).map(([name, value]) => `${name} ${value}`);
+  return [
+    simulation?.kind,
+    model === "narx" ? null : model,
+    preset === "auto" ? null : preset,
+    rows && `rows ${rows}`,
+    seed ? `seed ${seed}` : null,
+    ...chosen.slice(0, MAX_SETTINGS),
+    chosen.length > MAX_SETTINGS ? "…" : null,
+  ].filter(Boolean);
+}
+
+/** Describe a job by its kind, its data set unless it is called like it, its columns and its settings. */
+export function describeJob({ kind, name, dataset_name: dataset, spec }) {
+  const inputs = [spec.inputs ?? spec.input ?? []].flat();
+  const outputs = [spec.output ?? []].flat();
+  const columns = inputs.length ? `${inputs.join(", ")} → ${outputs.join(", ")}` : null;
+  const parts = [KINDS[kind] ?? kind, dataset === name ? null : dataset, columns, ...listSettings(spec)];
+  return parts.filter(Boolean).join(" · ");
+}
