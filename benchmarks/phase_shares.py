@@ -33,6 +33,7 @@ from islands.facade.identify import identify
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.warm_up import warm_up
 from islands.progress import Phase, never_stop
+from islands.reports.origin import Origin
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
 
@@ -137,7 +138,7 @@ def run_diagnosis(record: Dataset, simulation: str) -> Recording:
     recording(FORMULA)
     formula = explain_residual(found, 0, on_epoch=recording.epoch)
     recording("report")
-    DiagnosisResult.from_diagnosis(found, formula).write_report("record")
+    DiagnosisResult.from_diagnosis(found, formula).write_report(Origin("record"))
     recording.add("end")
     return recording
 

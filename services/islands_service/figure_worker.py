@@ -31,10 +31,12 @@ from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import any_model_from_json, model_from_json
+from islands.io.result_folder import result_document
 from islands.io.result_models import read_criterion, read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
+from islands.reports.origin import Origin
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
@@ -186,7 +188,13 @@ def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](found)) for name in search_figures(found)}
     entry = found.recommended
     model = {f"{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
-    return {**made, REPORT: identification_report(job.name or job.id, found, {**model, **made})}
+    equation = entry.model.equation().mathml
+    report = identification_report(_origin(job), result_document(found), equation, {**model, **made})
+    return {**made, REPORT: report}
+
+
+def _origin(job: Job) -> Origin:
+    return Origin.from_seconds(job.name or job.id, job.created, job.owner, job.id)
 
 
 def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
@@ -225,15 +233,15 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     data = match_coupled(model, parts.validation.map(lambda each: average_samples(each, model.average)))
     run = fitted.simulate(data)
     bands = fitted.bands(data) if fitted.prediction_bands else (None,) * outputs
-    made, figures = {}, []
+    made, figures = {}, dict[str, bytes]()
     for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
-        figures.append(_svg(draw_free_run(each, y, band=band)))
-        made[f"1/free-run-{number}.svg"] = figures[-1]
+        figures[each.output_name] = _svg(draw_free_run(each, y, band=band))
+        made[f"1/free-run-{number}.svg"] = figures[each.output_name]
         made[f"1/free-run-{number}.json"] = _free_run_document(each, y, run.outcome, band)
     words = str((job.summary or {}).get("words", "")).splitlines()
     sentences = [*words[:1], *words[2:]]  # the second one is the equations
     terms = stored.document["terms"]
-    made[REPORT] = coupled_report(job.name or job.id, model, document, terms, sentences, figures)
+    made[REPORT] = coupled_report(_origin(job), model, document, terms, sentences, figures)
     return made
 
 

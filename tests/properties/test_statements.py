@@ -19,6 +19,7 @@ from islands.io.result_text.statements import describe, find_statements
 from islands.io.result_text.summary_text import summary
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
+from islands.reports.origin import Origin
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
@@ -135,7 +136,8 @@ def test_no_two_sentences_of_a_result_contradict_each_other(choices):
 
 @given(CHOICES)
 def test_the_sentences_of_the_report_do_not_contradict_each_other(choices):
-    page = identification_report("job", make_result(choices), {}).decode()
+    document = result_document(make_result(choices))
+    page = identification_report(Origin("job"), document, "<math></math>", {}).decode()
     assert not find_contradictions(page)
 
 
@@ -195,7 +197,7 @@ def test_no_two_sentences_about_several_outputs_contradict_each_other(choices, l
     follows = [each["r2"][0] > 0.9 or (each["noise"] or 0.0) * 1.2 >= each["rmse"][0] for each in choices]
     simulates = not lost and all(follows)
     assert verdict.startswith("As a simulation: unsuitable") != simulates
-    page = coupled_report("job", model, document, base["models"][0]["terms"], sentences, [b"<svg/>"] * 2)
+    page = coupled_report(Origin("job"), model, document, base["models"][0]["terms"], sentences, {})
     assert not find_contradictions(page.decode())
 
 

@@ -12,8 +12,10 @@ import islands
 from islands.data.dataset import Dataset
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.results.notebook_html import render_sentences
+from islands.io.result_folder import result_document
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
+from islands.reports.origin import Origin
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.diagnosed_records import MEASURED_OUTPUTS, OTHERS, diagnose_difference
 from support.laws import LAWS
@@ -118,9 +120,8 @@ def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
         return _list_texts_of_diagnosis(name, result)
     if isinstance(result, islands.CoupledResult):
         document, sentences = result.document(), result.sentences()
-        figures = [b"<svg/>"] * len(result.results)
         terms = document["models"][0]["terms"]
-        report = coupled_report(name, result.model, document, terms, sentences, figures).decode()
+        report = coupled_report(Origin(name), result.model, document, terms, sentences, {}).decode()
         return {"summary": str(result), "service": "\n".join(sentences), "report": report}
     with tempfile.TemporaryDirectory() as folder:
         result.save(folder, figures=())
@@ -129,7 +130,9 @@ def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
         read, notebook = str(stored), stored._repr_html_()
     if read != str(result):
         raise AssertionError(f"{name}: the folder states something else than the run")
-    report = identification_report(name, result.search_result, {}).decode()
+    found = result.search_result
+    equation = found.recommended.model.equation().mathml
+    report = identification_report(Origin(name), result_document(found), equation, {}).decode()
     return {"summary": read, "notebook": notebook, "report": report}
 
 

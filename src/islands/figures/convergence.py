@@ -27,7 +27,7 @@ def draw_convergence(result: SearchResult) -> Figure:
     for position, size in enumerate(sizes):
         points = [(point.generation, point.best[size]) for point in history if size in point.best]
         generations, errors = zip(*points, strict=True)
-        shade = colormaps["viridis"](0.9 * position / max(1, len(sizes) - 1))
+        shade = colormaps["plasma"](0.6 * position / max(1, len(sizes) - 1))
         # A line through one point is invisible, so draw a marker.
         (line,) = axes.step(generations, np.sqrt(errors), where="post", color=shade, label=str(size))
         line.set(marker="o" if len(points) == 1 else "", markersize=3)

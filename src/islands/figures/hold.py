@@ -16,7 +16,7 @@ from islands.models.protocol import DynamicModel
 from islands.validation.physics import LEVELS, hold_response, percent_of_range
 
 #: Colours of the levels from lowest to highest, distinguishable for colour-blind readers and in grey print.
-_COLOURS = ("#440154", "#3b528b", "#21918c", "#4cb04f", "#c2a500")
+_COLOURS = ("#440154", "#3b528b", "#21918c", "#3d9a40", "#a68c00")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

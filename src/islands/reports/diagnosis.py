@@ -1,6 +1,7 @@
 """HTML report of a diagnosis: sentences, numbers and figures."""
 
 from functools import partial
+from math import floor
 
 from islands.diagnosis.detectability import NOTHING, SelfTest
 from islands.diagnosis.documents.result_json import diagnosis_document
@@ -14,7 +15,11 @@ from islands.io.result_text.diagnosis_statements import (
     describe_verdict,
     name_reference,
 )
+from islands.io.result_text.headlines import write_diagnosis_headline
+from islands.io.result_text.statements import Document
 from islands.parallel import ParallelMap
+from islands.reports.origin import Origin
+from islands.reports.record_table import list_record
 from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
@@ -26,6 +31,9 @@ _CAPTIONS = {
     "residual": "Structure of the residual",
     "ladder": "Gain of each effect alone",
 }
+
+#: Screened effects in the table of the report.
+_MAX_CANDIDATES = 15
 
 
 def _limits(tested: SelfTest) -> list[tuple[str, str, str]]:
@@ -74,8 +82,47 @@ def _draw(found: Diagnosis, name: str) -> str:
     return inline_figure(draw(found))
 
 
+def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[str, ...]], str]:
+    """Return the columns and the rows of the errors of the simulation, and a remark on them."""
+    if document["verdict"] == "gross error":
+        errors = document["record_findings"][0]["errors"]
+        columns: tuple[str, ...] = ("error", "RMSE, % of the standard deviation of the output")
+        rows: list[tuple[str, ...]] = [
+            ("calibrated, record as given", f"{100 * errors['before']:.3g}"),
+            ("calibrated, record corrected", f"{100 * errors['after']:.3g}"),
+        ]
+        return columns, rows, "Both are errors over the samples used for estimation."
+    unit, gain = document["record"]["units"]["output"], document["gain"]
+    columns = ("error", f"RMSE ({unit})" if unit else "RMSE")
+    rows = [("as given", f"{document['as_given_rmse']:.4g}")]
+    if gain:
+        columns += ("MAPE, % of the range",)
+        rows[0] += ("",)
+        rows += [
+            (name, f"{errors['rmse']:.4g}", f"{errors['mape']:.3g}")
+            for name, errors in (
+                (name_reference(document), gain["before"]),
+                ("calibrated, with the effects", gain["after"]),
+            )
+        ]
+    else:
+        rows.append(("calibrated", f"{document['calibrated_rmse']:.4g}"))
+    bound = " (upper bound)" if document["noise_floor_is"] == "an upper bound" else ""
+    noise = (f"noise floor{bound}", f"{document['noise_floor_rmse']:.4g}")
+    rows.append((*noise, f"{gain['noise_floor']['mape']:.3g}") if gain else noise)
+    return columns, rows, f"All but the noise floor are errors over {document['held_out_part']}."
+
+
+def _list_candidates(document: Document) -> list[tuple[str, str, str]]:
+    """Return the name, the gain and the share of the misfit of the best screened effects."""
+    return [
+        (each["name"], f"{each['score']:.1f}", f"{floor(100 * each['eta'])} %")
+        for each in document["candidates"][:_MAX_CANDIDATES]
+    ]
+
+
 def diagnosis_report(
-    name: str,
+    origin: Origin,
     found: Diagnosis,
     tested: SelfTest | None = None,
     proposal: ResidualFormula | None = None,
@@ -85,8 +132,7 @@ def diagnosis_report(
 
     Parameters
     ----------
-    name : str
-        Name of the record.
+    origin : Origin
     tested : SelfTest, optional
         Detection limits and false-alarm rate on the record.
     proposal : ResidualFormula, optional
@@ -98,14 +144,21 @@ def diagnosis_report(
     drawn = parallel_map(partial(_draw, found), names)
     figures = [(_CAPTIONS[each], figure) for each, figure in zip(names, drawn, strict=True)]
     document = diagnosis_document(found, None, tested, proposal)
+    columns, errors, remark = _tabulate_errors(document)
     text = TEMPLATES.get_template("diagnosis.html").render(
-        name=name,
+        origin=origin,
+        sha256=document["record"]["sha256"],
         document=document,
-        verdict=describe_verdict(document),
+        headline=describe_verdict(document),
+        lead=write_diagnosis_headline(document),
         causes=describe_causes(document),
         details=describe_details(document),
-        reference=name_reference(document),
+        error_columns=columns,
+        errors=errors,
+        error_remark=remark,
         figures=figures,
+        candidates=_list_candidates(document),
+        record=list_record(document["record"]),
         strengths=STRENGTHS,
         limits=[] if tested is None else _limits(tested),
         mistaken=[] if tested is None else _mistaken(tested),

@@ -18,6 +18,7 @@ from islands.io.models import any_model_from_json
 from islands.io.result_text.text_layout import LEGEND, MARK, term_table, wrap
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
+from islands.reports.origin import REPORT_FILE
 from islands.simulators.specification.table import EXTENDED_FILE
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
@@ -196,6 +197,7 @@ def _describe_phase(job: JobView) -> str:
 def download(client: Client, job: str, document: dict[str, Any], folder: Path) -> None:
     """Write a result, its models and its figures into a folder; delete those of an earlier result."""
     models = parse_models(document)
+    (folder / REPORT_FILE).unlink(missing_ok=True)
     for name, kind in (("models", "[0-9][0-9]*.json"), ("figures", "*.svg")):
         (folder / name).mkdir(parents=True, exist_ok=True)
         for old in (folder / name).glob(kind):
@@ -220,7 +222,7 @@ def download_diagnosis(client: Client, job: str, document: dict[str, Any], folde
     folder.mkdir(parents=True, exist_ok=True)
     for name in (EXTENDED_FILE, "discrepancy.json"):
         (folder / name).unlink(missing_ok=True)
-    (folder / "report.html").write_bytes(client.report(job))
+    (folder / REPORT_FILE).write_bytes(client.report(job))
     if document["extended_model"] is not None:
         (folder / EXTENDED_FILE).write_bytes(client.extended(job))
     _write_document(document, folder / "discrepancy.json")

@@ -11,6 +11,7 @@ from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.result_text.diagnosis_statements import describe_headline
 from islands.parallel import ParallelMap
 from islands.progress import report_part
+from islands.reports.origin import Origin
 from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints
 from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
@@ -78,7 +79,8 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
         report("writing the report", BEFORE_REPORT)
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
-        artefacts[REPORT] = _keep(found.write_report(names), run.blobs, run.check)
+        origin = Origin.from_seconds(names, run.job.created, run.job.owner, run.job.id)
+        artefacts[REPORT] = _keep(found.write_report(origin), run.blobs, run.check)
         left_out.remove(REPORT)
         artefacts[OUTPUTS] = _keep(_write_outputs(found), run.blobs, run.check)
         if (extended := found.extended_document) is not None:

@@ -45,11 +45,12 @@ from islands.facade.explain_residual import (
     FormulaProgress,
     explain_residual,
 )
-from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, REPORT_FILE, DiagnosisResult
+from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, DiagnosisResult
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.result_text.text_layout import wrap
 from islands.processes.pool import process_pool
 from islands.progress import Steps, StoppedError, report_part
+from islands.reports.origin import REPORT_FILE
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator

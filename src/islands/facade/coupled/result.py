@@ -36,6 +36,7 @@ from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.result_text.text_layout import term_table, wrap
 from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
 from islands.progress import Steps
+from islands.reports.origin import REPORT_FILE
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
@@ -246,6 +247,7 @@ class CoupledResult(FittedCoupledModel):
         steps = steps or Steps()
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / REPORT_FILE).unlink(missing_ok=True)
         for directory, name, result in zip(
             list_folders(self.model.output_names), self.model.output_names, self.results, strict=True
         ):

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from time import time
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from islands.facade.results.saved_simulation import SavedSimulation
 from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands.parallel import ParallelMap
 from islands.progress import Steps
+from islands.reports.origin import REPORT_FILE, Origin
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec
 
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
 
     from islands.io.data_frames import RecordLike
 
-#: Files of a folder besides `EXTENDED_FILE`: the document, which is written last, and the report.
-DIAGNOSIS_FILE, REPORT_FILE = "discrepancy.json", "report.html"
+#: Document of a folder, which is written last.
+DIAGNOSIS_FILE = "discrepancy.json"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -77,11 +79,11 @@ class DiagnosisResult(Diagnosis):
         """Text of ``extended.json``, the extended simulation; None if no effect was added."""
         return None if self.gain is None else extended_json(self.best, self.record)
 
-    def write_report(self, name: str, parallel_map: ParallelMap = map) -> bytes:
+    def write_report(self, origin: Origin, parallel_map: ParallelMap = map) -> bytes:
         """Return ``report.html``, with the name of the record: sentences, numbers and figures."""
         from islands.reports.diagnosis import diagnosis_report  # noqa: PLC0415 - many results have no report
 
-        return diagnosis_report(name, self, self.tested, self.formula, parallel_map)
+        return diagnosis_report(origin, self, self.tested, self.formula, parallel_map)
 
     def save(
         self,
@@ -109,7 +111,8 @@ class DiagnosisResult(Diagnosis):
         for file in (EXTENDED_FILE, DIAGNOSIS_FILE, REPORT_FILE):
             (folder / file).unlink(missing_ok=True)
         if not steps.skip(REPORT_FILE):
-            (folder / REPORT_FILE).write_bytes(self.write_report(name, parallel_map))
+            origin = Origin.from_seconds(name, time())
+            (folder / REPORT_FILE).write_bytes(self.write_report(origin, parallel_map))
         if (extended := self.extended_document) is not None:
             (folder / EXTENDED_FILE).write_text(extended, encoding="utf-8")
         complete = replace(self, left_out=(*self.left_out, *steps.left_out))

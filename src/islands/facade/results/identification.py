@@ -20,6 +20,7 @@ from islands.io.result_folder import content_sha256, result_document, write_resu
 from islands.io.result_text.statements import describe
 from islands.io.result_text.summary_text import summary
 from islands.progress import Steps
+from islands.reports.origin import REPORT_FILE
 from islands.simulation.predictors import Simulation
 from islands.validation.recommendation import Recommendation
 
@@ -212,10 +213,12 @@ class Result:
             The figures are optional steps, which a stop request leaves out.
         figures : sequence of str
             Names from ``islands.figures.names.ALL_FIGURES``. A figure that the result does not have, such as
-            the loop of a record without one, is left out. Figures of an earlier result are removed.
+            the loop of a record without one, is left out. Figures and a report of an earlier result are
+            removed.
         """
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / REPORT_FILE).unlink(missing_ok=True)
         self._draw_figures(folder / "figures", figures, steps or Steps())
         write_result(self.search_result, folder)
         return folder

@@ -401,7 +401,7 @@ def _describe_gain(facts: DiagnosisFacts) -> str:
         text = (
             f"{beginning} does not fall significantly: {without}, {after} with them, a reduction of {percent}"
         )
-    if (compared := _compare_with_output(facts)) is not None:
+    if (compared := compare_with_output(facts)) is not None:
         text += f"; what remains is {compared}"
     return f"{text}."
 
@@ -421,14 +421,14 @@ def _describe_error(facts: DiagnosisFacts) -> str:
     assert facts.error is not None
     given, calibrated = facts.document["as_given_rmse"], facts.error
     text = f"On {facts.held_out_part}, excluded from fitting, the RMSE is {facts.write_error(calibrated)}"
-    if (compared := _compare_with_output(facts)) is not None:
+    if (compared := compare_with_output(facts)) is not None:
         text += f", {compared}"
     if abs(given - calibrated) > _CALIBRATED * calibrated:
         text += f"; before the calibration it is {facts.write_error(given)}"
     return f"{text}."
 
 
-def _compare_with_output(facts: DiagnosisFacts) -> str | None:
+def compare_with_output(facts: DiagnosisFacts) -> str | None:
     """Write the error as a part of the output; None if it is unknown."""
     if facts.relative_error is None:
         return None

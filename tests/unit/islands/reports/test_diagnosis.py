@@ -15,6 +15,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.reports.diagnosis import diagnosis_report
+from islands.reports.origin import Origin
 
 EQUATIONS = Discovery("dx/dt = -x + a1*x**3; a1 = 0.2", ("jump",), ("cubic-stiffness",), 2.0)
 
@@ -39,7 +40,7 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
     given = as_cause, as_equivalent, replace(diagnosis, discovery=None)
     for texts in (
         [summarise(each) for each in given],
-        [diagnosis_report("record", each).decode() for each in given],
+        [diagnosis_report(Origin("record"), each).decode() for each in given],
     ):
         assert ["a1*x**3" in text for text in texts] == [True, True, False]
         assert ["explain the record as well" in text for text in texts] == [False, True, False]
@@ -56,9 +57,9 @@ def test_figures_are_drawn_by_the_map_and_keep_the_order_of_the_report(diagnosis
         figures = {name: function(name) for name in reversed(drawn)}
         return iter([figures[name] for name in drawn])
 
-    report = diagnosis_report("record", diagnosis, parallel_map=draw_backwards)
+    report = diagnosis_report(Origin("record"), diagnosis, parallel_map=draw_backwards)
     assert drawn == ["over-time", "loops", "residual", "ladder"]
-    assert report == diagnosis_report("record", diagnosis)
+    assert report == diagnosis_report(Origin("record"), diagnosis)
 
 
 @pytest.mark.ci

@@ -29,6 +29,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.export.fmu.compiler import find_compiler
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.reports.diagnosis import diagnosis_report
+from islands.reports.origin import Origin
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.equations import OdeSpec
@@ -194,7 +195,7 @@ def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() 
     document = diagnosis_document(found)
     assert document["discovered"]["equations"].startswith("dv/dt = ")
     assert found.discovery.equations in DiagnosisResult.from_diagnosis(found).summary
-    assert b"x*F" in diagnosis_report("record", found)
+    assert b"x*F" in diagnosis_report(Origin("record"), found)
 
 
 @pytest.mark.ci

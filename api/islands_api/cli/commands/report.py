@@ -1,0 +1,51 @@
+"""``islands report``: the report of a result folder or of a job, as one HTML file."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from islands.cli.console import output
+from islands.errors import SettingsError
+from islands.reports.origin import REPORT_FILE
+from islands_api.cli.service.client_options import LOCAL, ApiKey, Url, open_client
+
+#: Id of a job.
+_JOB_ID = re.compile("[0-9a-f]{32}")
+
+
+def report(
+    source: Annotated[
+        str, typer.Argument(metavar="DIR|JOB", help="Folder of a result or of a diagnosis, or id of a job.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="HTML file; by default report.html in the folder, or report-JOB.html here."
+        ),
+    ] = None,
+    url: Url = LOCAL,
+    key: ApiKey = None,
+) -> None:
+    """Write the report of a result as one HTML file that loads nothing.
+
+    It has the error and the free run first, then equation, parameters, validation and
+    residuals, and the other models in an appendix. It prints on A4. The figures are
+    those in the folder: 'islands fit --figures all' draws all of them.
+    """
+    folder = Path(source)
+    if folder.exists():
+        # The models take a second to import.
+        from islands.reports.saved_report import report_saved_result  # noqa: PLC0415
+
+        page = report_saved_result(folder)
+        path = out or (folder if folder.is_dir() else folder.parent) / REPORT_FILE
+    elif not _JOB_ID.fullmatch(source):
+        raise SettingsError(f"there is no folder {source}: give the folder of a result, or the id of a job")
+    else:
+        with open_client(url, key) as client:
+            page = client.report(source)
+        path = out or Path(f"report-{source[:8]}.html")
+    path.write_bytes(page)
+    output.print(path, markup=False, highlight=False, soft_wrap=True)

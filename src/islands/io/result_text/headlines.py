@@ -1,0 +1,86 @@
+"""Headlines of reports, from the documents of results alone: one sentence with the error in per cent."""
+
+from collections.abc import Sequence
+
+from islands.io.result_text.diagnosis_statements import DiagnosisFacts, compare_with_output
+from islands.io.result_text.statements import Document, ResultFacts, write_amount
+
+
+def write_headline(document: Document) -> str:
+    """State the size of the recommended model, and its free-run error on the validation data.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``result.json``.
+    """
+    facts = ResultFacts(document)
+    size, output = facts.model["size"], facts.record["names"]["output"]
+    terms = f"size {size}" if "kind" in facts.model else f"{size} term{'s' * (size != 1)}"
+    error = facts.error()
+    if error["rmse"] is None:
+        return f"The free run of a model of {terms} diverges on the validation data of {output}"
+    stated = _state_error(error, facts.unit)
+    return f"A model of {terms} simulates {output} with a {stated}"
+
+
+def write_coupled_headline(outputs: Sequence[Document]) -> str:
+    """State the free-run error of every output of a model of several on the validation data.
+
+    Parameters
+    ----------
+    outputs : sequence of mapping
+        Entries of ``outputs`` in ``result.json``.
+    """
+    errors = [each["metrics"]["validation"]["free_run"] for each in outputs]
+    names = " and ".join(each["name"] for each in outputs)
+    if any(each["rmse"] is None for each in errors):
+        return f"The free run of the equations of {names} diverges on the validation data"
+    stated = [
+        f"{each['name']} with a {_state_error(error, each['unit'])}"
+        for each, error in zip(outputs, errors, strict=True)
+    ]
+    return f"{len(outputs)} equations simulate {' and '.join(stated)}"
+
+
+def write_diagnosis_headline(document: Document) -> str:
+    """State the error of the simulation on the held-out data, and that of the extended simulation.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``discrepancy.json``.
+
+    Returns
+    -------
+    str
+        Empty if the errors are unknown.
+    """
+    facts = DiagnosisFacts(document)
+    if facts.is_gross:
+        errors = document["record_findings"][0]["errors"]
+        if errors is None:
+            return ""
+        return (
+            f"Error: {_percent(errors['before'])} of the standard deviation of the output with the record as "
+            f"given, {_percent(errors['after'])} with the record corrected."
+        )
+    if facts.gain is not None and facts.gain["before"]["mape"] is not None:
+        before, after = facts.gain["before"]["mape"], facts.gain["after"]["mape"]
+        return (
+            f"Mean absolute error on {facts.held_out_part}: {before:.3g} % of the output range without the "
+            f"effects, {after:.3g} % with them."
+        )
+    compared = compare_with_output(facts)
+    return "" if compared is None else f"Error on {facts.held_out_part}: {compared}."
+
+
+def _state_error(error: Document, unit: str) -> str:
+    # The error relative to the range is undefined for a constant output.
+    if error["mape"] is None:
+        return f"free-run error (RMSE) of {write_amount(error['rmse'], unit)}"
+    return f"mean absolute error of {error['mape']:.3g} % of its range"
+
+
+def _percent(fraction: float) -> str:
+    return f"{100 * fraction:.3g} %"
