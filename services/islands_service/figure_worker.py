@@ -15,6 +15,7 @@ from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC, EROFS
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.data.averaging import average_samples
@@ -25,6 +26,7 @@ from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.facade.coupled.result import read_fitted_model
+from islands.figures.drawn_numbers import tabulate_lines
 from islands.figures.free_run import draw_free_run
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.figures.style import save
@@ -185,9 +187,9 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStat
 
 def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     """Render the figures and the report of a search; return them by artefact name."""
-    made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](found)) for name in search_figures(found)}
+    made = _save_all({name: SEARCH_FIGURES[name](found) for name in search_figures(found)})
     entry = found.recommended
-    model = {f"{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
+    model = _save_all({name: FIGURES[name](entry, found.split) for name in model_figures(found)})
     equation = entry.model.equation().mathml
     report = identification_report(_origin(job), result_document(found), equation, {**model, **made})
     return {**made, REPORT: report}
@@ -200,8 +202,8 @@ def _origin(job: Job) -> Origin:
 def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
-    made = {f"{rank}/{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
-    return made | render_simulation(found, rank)
+    drawn = {f"{rank}/{name}": FIGURES[name](entry, found.split) for name in model_figures(found)}
+    return _save_all(drawn) | render_simulation(found, rank)
 
 
 def render_simulation(found: SearchResult, rank: int) -> dict[str, bytes]:
@@ -233,10 +235,11 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     data = match_coupled(model, parts.validation.map(lambda each: average_samples(each, model.average)))
     run = fitted.simulate(data)
     bands = fitted.bands(data) if fitted.prediction_bands else (None,) * outputs
-    made, figures = {}, dict[str, bytes]()
+    made, figures = dict[str, bytes](), dict[str, bytes]()
     for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
-        figures[each.output_name] = _svg(draw_free_run(each, y, band=band))
-        made[f"1/free-run-{number}.svg"] = figures[each.output_name]
+        name = f"1/free-run-{number}"
+        made |= _save_all({name: draw_free_run(each, y, band=band)})
+        figures[each.output_name] = made[f"{name}.svg"]
         made[f"1/free-run-{number}.json"] = _free_run_document(each, y, run.outcome, band)
     words = str((job.summary or {}).get("words", "")).splitlines()
     sentences = [*words[:1], *words[2:]]  # the second one is the equations
@@ -245,10 +248,14 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     return made
 
 
-def _svg(figure: Any) -> bytes:
-    stream = io.BytesIO()
-    save(figure, stream)
-    return stream.getvalue()
+def _save_all(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Return every figure as SVG and as a table of its lines, by artefact name."""
+    made = {}
+    for name, figure in figures.items():
+        stream = io.BytesIO()
+        save(figure, stream)
+        made |= {f"{name}.svg": stream.getvalue(), f"{name}.csv": tabulate_lines(figure).encode()}
+    return made
 
 
 def _free_run_document(

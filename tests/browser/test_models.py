@@ -1,11 +1,13 @@
 """Models of a job on the dashboard: equation, metrics, figures and exports."""
 
+import io
 import json
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.settings import ServiceSettings
@@ -292,3 +294,26 @@ def test_the_page_is_small_and_loads_quickly(
         files, data, first = page.evaluate(MEASURED)
         assert files + (data if place == "#/jobs" else 0) < MAX_BYTES
         assert first < max(MAX_PAINT_MS, MAX_PAINT_RATIO * plain)
+
+
+@pytest.mark.ci
+def test_a_figure_is_saved_as_svg_png_and_csv(
+    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+) -> None:
+    page = opened(f"#/jobs/{finished}", color_scheme="dark")
+    figure = page.locator("figure.rendered", has=page.get_by_role("heading", name="Residual correlations"))
+    figure.scroll_into_view_if_needed()
+    expect(figure.get_by_role("img")).to_have_css("filter", "invert(1) hue-rotate(180deg)")
+    made = {}
+    for form in ("SVG", "PNG", "CSV"):
+        with page.expect_download() as saved:
+            figure.get_by_role("link", name=f"Residual correlations as {form}").press("Enter")
+        assert saved.value.suggested_filename == f"residuals.{form.lower()}"
+        made[form] = saved.value.path().read_bytes()
+    path = f"/v1/jobs/{finished}/models/{page.locator('h3#model').inner_text().split()[-1]}/figures/residuals"
+    assert made["SVG"] == service.ask("GET", f"{path}.svg").content
+    assert made["CSV"] == service.ask("GET", f"{path}.csv").content
+    picture = Image.open(io.BytesIO(made["PNG"])).convert("RGB")
+    assert picture.width == 2100  # 7 inches at 300 per inch
+    assert picture.getpixel((2, 2)) == (255, 255, 255)
+    assert picture.getcolors(maxcolors=1) is None

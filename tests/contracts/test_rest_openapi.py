@@ -264,6 +264,10 @@ def test_every_figure_is_drawn_once_and_stored(service, document, finished):
             )
             assert ET.fromstring(answer.text).tag.endswith("svg")
             assert answer.headers["cache-control"] == "private, max-age=86400, immutable"
+            table = check_response(
+                document, service.client.get(f"/v1/jobs/{finished}{resource}/figures/{name}.csv")
+            )
+            assert table.text.startswith("panel,line,x,y\n1: ")
     drawn = [entry["ms"] for entry in service.logs if entry.get("path", "").endswith(".svg")]
     assert sum(ms > 300 for ms in drawn) == 2  # all figures of a search or a model are drawn together
     simulation = check_response(

@@ -245,12 +245,12 @@ def export(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[st
     return RequestSpec("GET", path, lambda response: response.text, params={"format": form})
 
 
-def figure(which: JobRef, name: str, rank: int | None = 1) -> RequestSpec[bytes]:
-    """Return a figure of a model as SVG, or of the search if the rank is None."""
+def figure(which: JobRef, name: str, rank: int | None = 1, form: str = "svg") -> RequestSpec[bytes]:
+    """Return a figure of a model, or of the search if the rank is None: svg, or csv with its lines."""
     of = "" if rank is None else f"/models/{rank}"
     return RequestSpec(
         "GET",
-        f"/v1/jobs/{quote_id(which)}{of}/figures/{quote_id(name)}.svg",
+        f"/v1/jobs/{quote_id(which)}{of}/figures/{quote_id(name)}.{quote_id(form)}",
         lambda response: response.content,
     )
 

@@ -104,11 +104,12 @@ def _describe_change(words: str, side: Sequence[_Hold]) -> str:
 
 
 def _draw_side(left: Axes, right: Axes, side: Sequence[_Hold]) -> None:
-    for held, colour in zip(side, _COLOURS, strict=True):
-        left.plot(*downsample(held.time, held.input), color=colour, lw=1.0)
+    for level, held, colour in zip(LEVELS, side, _COLOURS, strict=True):
+        name = f"held at {level:g}"
+        left.plot(*downsample(held.time, held.input), color=colour, lw=1.0, label=name)
         at_rest = held.time >= 0
         for part, shade, width in ((~at_rest, FRAME, 0.5), (at_rest, colour, 1.4)):
-            right.plot(*downsample(held.time[part], held.output[part]), color=shade, lw=width)
+            right.plot(*downsample(held.time[part], held.output[part]), color=shade, lw=width, label=name)
     for axes in (left, right):
         axes.axvline(0.0, color=FRAME, lw=0.6)
     lost = [held for held in side if not held.known.all()]

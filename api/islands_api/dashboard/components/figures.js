@@ -2,6 +2,7 @@
 
 import { getBlob } from "../lib/api.js";
 import { el } from "../lib/dom.js";
+import { makeFileLinks } from "./figure_files.js";
 
 const TITLES = {
   "free-run": "Free run",
@@ -29,9 +30,9 @@ function enqueue(task) {
 /** Make the figure at a path. */
 export function makeFigure(path, name, signal) {
   const title = TITLES[name] ?? name.replace(/^free-run-(\d)$/, "Free run of output $1");
-  const link = el("a", { class: "small", hidden: true, download: `${name}.svg` }, "SVG");
+  const files = el("span", { class: "files", hidden: true });
   const paper = el("div", { class: "paper" });
-  const node = el("figure", { class: "rendered" }, el("figcaption", {}, el("h4", {}, title), link), paper);
+  const node = el("figure", { class: "rendered" }, el("figcaption", {}, el("h4", {}, title), files), paper);
 
   async function load() {
     paper.replaceChildren(el("p", { class: "drawing", role: "status" }, "Drawing…"));
@@ -39,9 +40,10 @@ export function makeFigure(path, name, signal) {
       const image = await enqueue(() => getBlob(`${path}/${name}.svg`, { signal }));
       const url = URL.createObjectURL(image);
       signal.addEventListener("abort", () => URL.revokeObjectURL(url), { once: true });
-      link.href = url;
-      link.hidden = false;
-      paper.replaceChildren(el("img", { src: url, alt: `${title}, drawn by the service` }));
+      const picture = el("img", { src: url, alt: `${title}, drawn by the service` });
+      files.replaceChildren(...makeFileLinks(`${path}/${name}.csv`, name, title, picture));
+      files.hidden = false;
+      paper.replaceChildren(picture);
     } catch (error) {
       if (signal.aborted) return;
       const retry = el("button", { type: "button", on: { click: load } }, "Try again");

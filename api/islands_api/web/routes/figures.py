@@ -54,6 +54,12 @@ _SVG_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}
 }
 
+_CSV = "text/csv; charset=utf-8"
+
+_CSV_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
+}
+
 _HTML_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"text/html": {"schema": {"type": "string"}}}}
 }
@@ -125,6 +131,13 @@ async def search_figure(job: Id, figure: SearchFigure, caller: Reader, state: Ap
     return await _figure_response(state, caller, job, f"{figure}.svg", None)
 
 
+@router.get("/{job}/figures/{figure}.csv", response_class=Response, responses=_CSV_RESPONSES)
+async def search_figure_table(job: Id, figure: SearchFigure, caller: Reader, state: AppStateDep) -> Response:
+    """Return the points of the lines of a figure of the search."""
+    _check_figure(figure, await _list_search_figures(state, caller, job))
+    return await _figure_response(state, caller, job, f"{figure}.csv", None, _CSV)
+
+
 @router.get("/{job}/models/{rank}/figures", response_model=Names)
 async def model_figures(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
     """List the names of the figures of a model."""
@@ -140,6 +153,16 @@ async def model_figure(
     await get_model(state, caller, job, rank)
     _check_figure(figure, await _list_model_figures(state, job))
     return await _figure_response(state, caller, job, f"{rank}/{figure}.svg", rank)
+
+
+@router.get("/{job}/models/{rank}/figures/{figure}.csv", response_class=Response, responses=_CSV_RESPONSES)
+async def model_figure_table(
+    job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
+) -> Response:
+    """Return the points of the lines of a figure of a model."""
+    await get_model(state, caller, job, rank)
+    _check_figure(figure, await _list_model_figures(state, job))
+    return await _figure_response(state, caller, job, f"{rank}/{figure}.csv", rank, _CSV)
 
 
 @router.get("/{job}/models/{rank}/simulation", response_model=FreeRun)

@@ -44,6 +44,7 @@ FILES = {
     "components/diagnosis.js": _SCRIPT,
     "components/equation.js": _SCRIPT,
     "components/excitation_form.js": _SCRIPT,
+    "components/figure_files.js": _SCRIPT,
     "components/figures.js": _SCRIPT,
     "components/file_upload.js": _SCRIPT,
     "components/job_request.js": _SCRIPT,

@@ -20,6 +20,7 @@ from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
 from islands.models.narx import Model, make_model
 from islands.validation.residual_tests import residual_tests
+from support.contrast import DARK_PAPER, LINE_CONTRAST, contrast, shown_in_dark
 
 pytestmark = pytest.mark.ci
 
@@ -167,3 +168,15 @@ def test_saving_twice_gives_equal_bytes(name, tmp_path):
     for file in ("first", "second"):
         save(drawn(name).figure, tmp_path / f"{file}.svg")
     assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()
+
+
+@every_figure
+def test_lines_have_a_contrast_of_three_in_both_colour_schemes(name):
+    from matplotlib.colors import to_rgb
+
+    lines = [line for axes in drawn(name).figure.axes for line in axes.lines]
+    colours = {tuple(255 * each for each in to_rgb(line.get_color())) for line in lines}
+    assert colours
+    for colour in colours:
+        assert contrast(colour, (255, 255, 255)) >= LINE_CONTRAST, colour
+        assert contrast(shown_in_dark(colour), DARK_PAPER) >= LINE_CONTRAST, colour
