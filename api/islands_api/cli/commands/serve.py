@@ -13,6 +13,7 @@ import typer
 from islands.cli.console import errors
 from islands.distribution import describe_missing_extra, list_missing_packages
 from islands.errors import SettingsError
+from islands_api.cli.service.page_opening import open_when_ready
 from islands_api.cli.service.store_options import refuse_password
 from islands_service.intake.confined_process import ENVIRONMENT, REQUESTS, make_command
 from islands_service.settings import ServiceSettings, service_settings
@@ -70,22 +71,27 @@ def serve(
         str | None, typer.Option("--root-path", help="Path prefix of a proxy, for example /islands.")
     ] = None,
     log_format: Annotated[str | None, typer.Option("--log-format", help="text or json.")] = None,
+    show: Annotated[
+        bool, typer.Option("--open", help="Open the page in the browser when the service is ready.")
+    ] = False,
 ) -> None:
     """Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next start."""
-    settings = service_settings(**locals())
+    given = dict(locals())
+    del given["show"]  # no setting of the service
+    settings = service_settings(**given)
     check_packages(settings)
     with folder_lock(settings.data_dir):
         scheme = "http" if settings.tls_key is None else "https"
-        errors.print(
-            f"islands serve: {scheme}://{settings.host}:{settings.port}, data in {settings.data_dir}",
-            markup=False,
-        )
+        address = f"{scheme}://{settings.host}:{settings.port}"
+        errors.print(f"islands serve: {address}, data in {settings.data_dir}", markup=False)
         # The address of an earlier run's Ray is stale.
         settings.ray_address_file.unlink(missing_ok=True)
         # Both ends stay open here: requests wait while the fork server starts again.
         requests, readers = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with requests, readers:
             children = roles(settings, requests.fileno(), readers.fileno())
+            if show:
+                open_when_ready(address)
             status = supervise(children, settings.environment())
     sys.exit(status)
 
