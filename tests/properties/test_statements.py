@@ -52,7 +52,7 @@ CHOICES = st.fixed_dictionaries(
         "lost": st.booleans(),
         "shares": st.tuples(SHARES, SHARES),
         "percent": st.sampled_from([1e-6, 0.5, 1.5]),
-        "r2": st.tuples(*[st.sampled_from([0.3, 0.95])] * 2),
+        "r2": st.tuples(*[st.sampled_from([-0.01, 0.3, 0.95])] * 2),
         "rmse": st.tuples(*[RMSES] * 3),
         "bounded": st.tuples(*[st.sampled_from([True, True, True, False])] * 3),
         "constant": st.booleans(),

@@ -20,6 +20,9 @@ from islands.validation.prediction_bands import LEVEL
 #: Smallest R2 of a simulation that counts as good.
 _GOOD_R2 = 0.9
 
+#: R2 of a simulation below which it is hardly better than the mean of the output.
+_NO_R2 = 0.05
+
 #: Largest ratio of the free-run error and the noise level at which the error is that of the noise.
 _NOISE_RATIO = 1.2
 
@@ -55,8 +58,8 @@ _OPEN_PERCENT = 5.0
 
 #: Where to look for missing terms, by correlation test.
 _HINTS = {
-    "xi_xi": "terms in past outputs (larger lags, other powers), or a model of coloured noise",
-    "u_xi": "linear or odd terms in {input}, also at other lags",
+    "xi_xi": "terms in past outputs (larger lags{lags}, other powers), or a model of coloured noise",
+    "u_xi": "linear or odd terms in {input}, also at larger lags{lags}",
     "xi_xiu": "products of past outputs and {input}",
     "u2_xi": "even terms in {input}, such as squares or absolute values",
     "u2_xi2": "terms that grow with {input}, because the size of the residual depends on it",
@@ -174,10 +177,16 @@ class RunFacts:
         return self.has_structure and self.residual["predictable_percent"] is not None
 
     @property
+    def is_unrelated(self) -> bool:
+        """Whether the free run is hardly better than the mean of an output that nothing predicts."""
+        r2 = self.error()["r2"]
+        return r2 is not None and r2 < _NO_R2 and self.is_unpredictable
+
+    @property
     def simulates(self) -> bool:
         """Whether the free run follows the output: R2 is good, or the error is that of the noise."""
         rmse, r2, noise = self.error()["rmse"], self.error()["r2"], self.data.get("noise")
-        if rmse is None:
+        if rmse is None or self.is_unrelated:
             return False
         # R2 is undefined for a constant output.
         return r2 is None or r2 >= _GOOD_R2 or (noise is not None and rmse <= _NOISE_RATIO * noise)
@@ -196,6 +205,17 @@ class RunFacts:
         """Error one step ahead that cannot be predicted: the smallest that the data show."""
         found: float | None = self.error("one_step_ahead")["rmse"]
         return None if exceeds_limit(self.share("one_step_ahead")) else found
+
+    @property
+    def one_step_ratio(self) -> float:
+        """Error one step ahead divided by the noise level, as written; 0 if one of them is unknown."""
+        rmse, noise = self.error("one_step_ahead")["rmse"], self.data.get("noise")
+        return 0.0 if rmse is None or not noise or self.is_rounding(rmse) else round_ratio(rmse / noise)
+
+    @property
+    def is_far_ahead(self) -> bool:
+        """Whether the error one step ahead is far above the noise."""
+        return self.one_step_ratio >= _FAR_RATIO
 
     @property
     def noise_ratio(self) -> float | None:
@@ -295,7 +315,7 @@ class ResultFacts(RunFacts):
 
         The measured past then makes the prediction one step ahead worse than an adequate free run.
         """
-        if self.criterion.get("estimator") != "least-squares":
+        if self.criterion.get("estimator") != "least-squares" or self.is_unrelated:
             return False
         return self.is_unpredictable and all(map(self._is_free_run_better, ("estimation", "validation")))
 
@@ -313,6 +333,11 @@ class ResultFacts(RunFacts):
         return compare_input_ranges(
             columns["names"]["inputs"], columns["units"]["inputs"], ranges["estimation"], ranges["validation"]
         )
+
+    @property
+    def is_unpredictable_ahead(self) -> bool:
+        """Whether the error of the free run has a cause that the residual one step ahead does not show."""
+        return (self.has_structure or self.exceeds_noise) and not exceeds_limit(self.share("one_step_ahead"))
 
     @property
     def has_limits(self) -> bool:
@@ -445,9 +470,11 @@ def describe(document: Document) -> list[str]:
 
 
 def describe_choice(document: Document) -> str:
-    """State which model is recommended, and the first reason."""
+    """State which model is recommended, and the first reason, or that none is of use."""
     facts = ResultFacts(document)
     rank, reasons = facts.recommended["rank"], facts.recommended["reasons"]
+    if facts.is_unrelated:
+        return f"No model found: {_describe_unrelated(facts)}. Model {rank} of {len(document['models'])}:"
     text = f"Recommended: model {rank} of {len(document['models'])}, size {facts.model['size']}"
     return f"{text}: {reasons[0]}." if reasons else f"{text}."
 
@@ -646,6 +673,14 @@ def _has_physics_reason(facts: ResultFacts) -> bool:
     return len(facts.recommended["reasons"]) > 1
 
 
+def _describe_unrelated(facts: ResultFacts) -> str:
+    share = write_percent(max(0.0, facts.error()["r2"]))
+    return (
+        f"the free run explains {share} of the variance of {facts.names[0]}, and neither inputs nor past "
+        "outputs predict the rest"
+    )
+
+
 def _describe_structure(facts: ResultFacts) -> str:
     return (
         f"{write_percent(facts.share('free_run') or 0.0)} of the free-run residual is predictable "
@@ -724,7 +759,13 @@ def _suggest_terms(facts: ResultFacts) -> str:
     excess = [test["largest"] / test["limit"] if test["largest"] and test["limit"] else 0.0 for test in tests]
     worst = tests[excess.index(max(excess))] if max(excess) > 1.0 else past
     name = "" if worst["input"] is None else facts.names[1 + worst["input"]]
-    return f"try {_HINTS[worst['name']].format(input=name)}"
+    return f"try {_HINTS[worst['name']].format(input=name, lags=_name_lags(facts))}"
+
+
+def _name_lags(facts: ResultFacts) -> str:
+    """Return the option for twice the lags of the library; empty if they are unknown."""
+    option = next((name for name in ("lags", "library_lags") if name in facts.document["settings"]), "")
+    return f": {name_option(option, 2 * facts.document['settings'][option])}" if option else ""
 
 
 # Statements about one output and about several outputs alike.
@@ -862,7 +903,7 @@ USES: Final[tuple[Statement[ResultFacts], ...]] = (
     *SIMULATION_USES,
     Statement(
         "adequate-residual",
-        lambda facts: facts.is_unpredictable and not facts.exceeds_noise,
+        lambda facts: facts.is_unpredictable and not (facts.exceeds_noise or facts.is_unrelated),
         lambda _: (
             "no structure is left in the free-run residual (at most "
             f"{write_percent(LARGEST_SHARE)} is predictable)"
@@ -887,9 +928,10 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
         ),
     ),
     NO_SIMULATION,
+    Statement("unrelated", lambda facts: facts.is_unrelated, _describe_unrelated),
     Statement(
         "poor-simulation",
-        lambda facts: facts.error()["rmse"] is not None and not facts.simulates,
+        lambda facts: facts.error()["rmse"] is not None and not (facts.simulates or facts.is_unrelated),
         lambda facts: f"simulation from the inputs alone: R2 {facts.error()['r2']:.3f}",
     ),
     Statement(
@@ -935,16 +977,25 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
 NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
     Statement("more-terms", _may_grow, lambda facts: f"allow more than {_largest_size(facts)} terms"),
     Statement(
-        "free-run-estimate",
+        # Correlations do not show what a steep nonlinearity leaves, as that of a titration curve.
+        "terms-of-another-form",
+        lambda facts: facts.is_unpredictable_ahead and facts.is_far_ahead,
         lambda facts: (
-            (facts.has_structure or facts.exceeds_noise)
-            and not exceeds_limit(facts.share("one_step_ahead"))
-            and facts.criterion.get("error", "free_run") != "free_run"
+            "try terms of another form (a higher degree, another library): the error one step ahead is "
+            f"{facts.one_step_ratio:.3g} times the noise level of {facts.names[0]}"
         ),
-        lambda _: (
+    ),
+    Statement(
+        "free-run-estimate",
+        lambda facts: facts.is_unpredictable_ahead and facts.criterion.get("error", "free_run") != "free_run",
+        lambda facts: (
             "try an estimate that minimises the error of the free run "
-            f"({name_option('estimator', 'free-run')}), or measure the disturbance: one step ahead, no "
-            "structure is left"
+            f"({name_option('estimator', 'free-run')}), or measure the disturbance: one step ahead, "
+            + (
+                f"at most {write_percent(LARGEST_SHARE)} is predictable"
+                if facts.is_far_ahead
+                else "no structure is left"
+            )
         ),
     ),
     Statement(
@@ -973,7 +1024,12 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         lambda facts: facts.simulates and not facts.insignificant and _find_unlikely(facts)[1] < _UNLIKELY,
         _describe_unlikely,
     ),
-    TEST,
+    Statement(
+        "check-inputs",
+        lambda facts: facts.is_unrelated,
+        lambda facts: f"check that {' or '.join(facts.names[1:]) or 'an input'} acts on {facts.names[0]}",
+    ),
+    Statement(TEST.name, lambda facts: not facts.is_unrelated, TEST.write),
 )
 
 #: All statements, in the order of the text.

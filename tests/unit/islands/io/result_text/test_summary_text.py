@@ -294,6 +294,47 @@ def test_an_unpredictable_error_far_above_the_noise_is_a_limit(findings):
     assert "no structure is left in the free-run residual" in near
 
 
+@pytest.mark.parametrize("noise", [None, 0.1])
+def test_no_model_is_found_of_an_output_that_nothing_predicts(findings, noise):
+    """White noise next to an input that does not act: its level is that of the output, and of the error."""
+    white = ResidualStructure(0.4, 0.02, 0.7, "adequate")
+    mean, past = Metrics(9.0, -0.003, 0.1, 0.0), Metrics(9.0, -1.0, 0.14, 0.0)
+    metrics = {part: {"free_run": mean, "one_step_ahead": past} for part in ("estimation", "validation")}
+    document = with_noise(findings, noise, metrics=metrics, residual_structure=white, criterion=LEAST_SQUARES)
+    text = " ".join(statements.describe(document))
+    assert text.startswith("No model found: the free run explains 0 % of the variance of y_um, and neither")
+    assert "As a simulation: unsuitable" in text
+    assert text.endswith("Next: check that u_V acts on y_um.")
+
+
+@pytest.mark.parametrize(("one_step", "is_far"), [(0.2, False), (2.0, True)])
+def test_an_error_one_step_ahead_far_above_the_noise_has_structure(findings, one_step, is_far):
+    """The correlations of a residual do not show a steep nonlinearity, as that of a titration curve."""
+    hidden = ResidualStructure(0.02, 0.5, 7.0, "inadequate")
+    metrics = errors(findings, Metrics(5.0, 0.95, 3.0, 80.0))
+    metrics["validation"]["one_step_ahead"] = Metrics(5.0, 0.95, one_step, 80.0)
+    changes = {"metrics": metrics, "residual_structure": hidden, "criterion": LEAST_SQUARES}
+    advice = statements.describe(with_noise(findings, 0.1, **changes))[-1]
+    assert ("one step ahead, no structure is left" in advice) != is_far
+    stated = (
+        "try terms of another form (a higher degree, another library): the error one step ahead is 20 times"
+    )
+    assert (stated in advice) == is_far
+
+
+def test_the_advice_to_increase_lags_names_the_option_with_a_value(findings):
+    document = result_document(findings)
+    document["models"][document["recommended"]["rank"] - 1]["residual_tests"] |= {
+        "verdict": "inadequate",
+        "predictable_share": {"one_step_ahead": 0.9, "free_run": 0.9},
+    }
+    lags = document["settings"]["lags"]
+    with command_line_names():
+        assert f"larger lags: --lags {2 * lags}" in statements.describe(document)[-1]
+    document["settings"]["library_lags"] = document["settings"].pop("lags")
+    assert f"larger lags: library_lags={2 * lags}" in statements.describe(document)[-1]
+
+
 def test_an_output_that_escapes_at_an_extreme_is_a_failure_with_the_input(findings):
     physics = findings.recommended.physics
     assert "held at up to 1.2 times their recorded amplitude" in said(findings)["Good for"]
