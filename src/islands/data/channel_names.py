@@ -8,8 +8,12 @@ from functools import lru_cache
 AT_ONCE = "+1"
 
 #: Quantity and unit in the notation of ISO 80000: ``t/s``, ``U_1/mV``. Products of units are in brackets.
+#: Instruments also write a quotient without them: ``q/mL/min``.
 # A run of blanks must match in one way only: otherwise the time grows with the square of its length.
-_QUOTIENT = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+)")
+_QUOTIENT = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+(?:/[^/\s]+)?)")
+
+#: Quantity, unit, and remarks of a logger in brackets: ``Temp, °C (LGR S/N: 10412233)``.
+_LISTED = re.compile(r"([^,]*[^,\s]),\s*([^,\s\[(]+)(\s*[\[(].*[\])])?")
 
 _BRACKETED = re.compile(r"(|.*\S)\s*[\[(（]([^\[\]()（）]*)[\])）]")
 
@@ -30,6 +34,9 @@ _TIME_STEM = re.compile(r"(?:t|(?i:.*(?:time|zeit|duration|dauer|delay|period|ag
 
 #: Units of time that divide the unit before them.
 _DIVISORS = frozenset({"s", "s2", "min", "h"})
+
+#: Quantities of one letter that are measured in a unit of time, although the letter is also a unit.
+_TIMES = ("t", "T", "h")
 
 #: Units in words, as instruments write them in a row of units.
 _WORDS = {
@@ -115,10 +122,10 @@ def parse_channel_name(name: str) -> ChannelName:
 def parse_unit(name: str) -> str:
     """Return the unit in a column's name, empty if it has none: ``V`` for ``u_est_V``, ``u [V]`` and ``u/V``.
 
-    The unit is the text in brackets, behind a slash, after the last underscore, or, if it begins with a
-    degree sign, behind a blank (``Soll °C``). A time after another unit divides it: ``omega_rad_s`` is in
-    ``rad/s``. Text that is not a unit is a part of the name: ``oven_temperature``, ``speed (measured)``,
-    ``level_min``.
+    The unit is the text in brackets, behind a slash, behind a comma (``Temp, °C``), after the last
+    underscore, or, if it begins with a degree sign, behind a blank (``Soll °C``). A time after another unit
+    divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
+    ``oven_temperature``, ``speed (measured)``, ``level_min``.
     """
     return _split_unit(name)[1]
 
@@ -126,7 +133,9 @@ def parse_unit(name: str) -> str:
 def _split_unit(name: str) -> tuple[str, str]:
     """Return the name without its unit, and the unit."""
     if (bracketed := _BRACKETED.fullmatch(name)) and is_unit(unit := bracketed[2].strip()):
-        return bracketed[1], unit
+        return bracketed[1].rstrip(" /"), unit
+    if (listed := _LISTED.fullmatch(name)) and is_unit(listed[2]):
+        return listed[1] + (listed[3] or ""), listed[2]
     if (quotient := _match_quotient(name)) is not None:
         return quotient[1], quotient[2]
     words, _, degrees = name.rpartition(" ")
@@ -142,12 +151,13 @@ def _split_unit(name: str) -> tuple[str, str]:
 
 
 def _match_quotient(name: str) -> re.Match[str] | None:
-    """Match a quantity divided by its unit; ``v_m/s`` and ``km/h`` are quotients of two units."""
+    """Match a quantity divided by its unit; ``v_m/s``, ``km/h`` and ``l/min`` are quotients of two units."""
     quotient = _QUOTIENT.fullmatch(name)
     if quotient is None or not is_unit(quotient[2]):
         return None
     last = quotient[1].rpartition("_")[2]
-    return None if is_unit(last) and ("_" in quotient[1] or len(last) > 1) else quotient
+    is_rate = quotient[2] in _DIVISORS and last not in _TIMES
+    return None if is_unit(last) and ("_" in quotient[1] or len(last) > 1 or is_rate) else quotient
 
 
 def is_unit(text: str) -> bool:

@@ -71,7 +71,7 @@ def _format_columns(columns: Sequence[InspectedColumn]) -> Iterator[str]:
     width = max(width, len("column") + 1)
     yield f"{'column':<{width}}{'unit':<8}{'minimum':>12}{'maximum':>12}{'missing':>9}  role"
     for column in columns[:_MOST_COLUMNS]:
-        name = column.name if len(column.name) < width else column.name[: width - 4] + "..."
+        name = _shorten(column.name, width - 1)
         role = column.role or ("unusable" if column.problem else "")
         low, high = ("" if value is None else f"{value:.5g}" for value in (column.minimum, column.maximum))
         missing = str(column.missing) if column.missing else ""
@@ -79,6 +79,14 @@ def _format_columns(columns: Sequence[InspectedColumn]) -> Iterator[str]:
         yield line.rstrip()
     if len(columns) > _MOST_COLUMNS:
         yield f"and {len(columns) - _MOST_COLUMNS} more"
+
+
+def _shorten(name: str, most: int) -> str:
+    """Return a name without its middle if it is long: the names of a logger may differ at their ends only."""
+    if len(name) <= most:
+        return name
+    end = (most - 3) // 2
+    return f"{name[: most - 3 - end]}...{name[-end:]}"
 
 
 def _describe_sampling(sampling: InspectedSampling) -> str:

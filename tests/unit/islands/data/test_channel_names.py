@@ -51,6 +51,9 @@ def test_a_unit_is_the_end_of_a_name(name, stem, unit):
         "V",
         "_V",
         "km/h",
+        "l/min",
+        "K/min",
+        "gain, low",
         "valve",
         "°C",
         "Phase A",
@@ -88,6 +91,21 @@ def test_an_ordinary_name_has_no_unit(name):
 )
 def test_long_times_are_units_of_times_and_of_rates(name, unit):
     assert parse_unit(name) == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "stem", "unit"),
+    [
+        ("Temp, °C (LGR S/N: 10412233, LBL: room)", "Temp (LGR S/N: 10412233, LBL: room)", "°C"),
+        ("Speed, m/s", "Speed", "m/s"),
+        ("q(NaOH)/mL/min", "q(NaOH)", "mL/min"),
+        ("v/(m/s)", "v", "m/s"),
+        ("T/s", "T", "s"),
+    ],
+)
+def test_loggers_write_units_behind_commas_and_slashes(name, stem, unit):
+    parts = parse_channel_name(name)
+    assert (parts.stem, parts.unit) == (stem, unit)
 
 
 @pytest.mark.ci

@@ -178,3 +178,12 @@ def test_a_column_of_dates_is_read_with_that_of_the_time_of_day(tmp_path):
     found = islands.inspect_record(tmp_path / "r.txt")
     assert [(column.role, column.problem) for column in found.columns[:2]] == [("date", ""), ("time", "")]
     assert found.sampling.dt == 2.0
+
+
+def test_long_names_with_equal_beginnings_differ_in_the_table(tmp_path):
+    names = [f"Temp (LGR S/N: 10412233, LBL: {place})" for place in ("room", "outdoor")]
+    path = tmp_path / "r.csv"
+    rows = [f"{k},{k % 7},{k % 11}" for k in range(60)]
+    path.write_text("\n".join([f't_s,"{names[0]}","{names[1]}"', *rows]) + "\n")
+    table = format_inspection(islands.inspect_record(path)).splitlines()[3:6]
+    assert [line[:28].rstrip()[-6:] for line in table] == ["t_s", " room)", "tdoor)"]
