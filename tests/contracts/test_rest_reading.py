@@ -108,3 +108,11 @@ def test_a_table_of_text_is_uploaded_under_any_name(service, name):
 def test_an_mdf_file_under_another_name_is_refused(service):
     answer = service.upload(b"MDF     4.10    " + bytes(400), "record.dat")
     assert "MDF" in problem_of(answer, 422, "invalid-record")
+
+
+@pytest.mark.parametrize("extra", [{"gaps": "split"}, {"reading": {"gaps": "split"}}])
+def test_an_option_of_reading_in_a_job_is_refused_with_its_place(service, extra):
+    """The message about a gap names the option; the job of the data set is not its place."""
+    answer = service.submit(dataset="0" * 32 + "-csv", inputs=["u_V"], output="y_um", **extra)
+    detail = problem_of(answer, 422, "invalid-request")
+    assert detail.endswith("the form field reading of the upload states how a data set is read")

@@ -1,6 +1,7 @@
 """Exception handlers: every error becomes an RFC 9457 problem document."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from errno import EDQUOT, ENOSPC
 from http import HTTPStatus
 from math import ceil
@@ -17,6 +18,7 @@ from starlette.types import Scope
 
 from islands.document_problems import explain_problem
 from islands.errors import IslandsError
+from islands.io.records.reading_options import ReadingOptions
 from islands_api.oidc.bearer_token import TokenRefusedError
 from islands_api.web.problems import (
     MEDIA_TYPE,
@@ -62,6 +64,9 @@ _RETRY_AFTER = {HTTPStatus.SERVICE_UNAVAILABLE: 1, HTTPStatus.INSUFFICIENT_STORA
 
 #: Maximum number of errors in a response: a body of one megabyte could have a hundred thousand.
 _MAX_ERRORS = 20
+
+#: Options of reading, and the form field that has them. A request about a data set has none of them.
+_OF_READING = frozenset({"reading", *(option.name for option in fields(ReadingOptions))})
 
 
 def problem_response(
@@ -133,6 +138,8 @@ def _format_message(problem: ErrorDetails, form: Any) -> str:
     if "Expected UploadFile" in problem["msg"]:
         return "not a file: send a file with a file name"
     kind, *place = problem["loc"]
+    if problem["type"] == "extra_forbidden" and len(place) == 1 and place[0] in _OF_READING:
+        return f"{problem['msg']}: the form field reading of the upload states how a data set is read"
     return explain_problem({**problem, "loc": tuple(place)} if kind == "body" else problem, form)
 
 
