@@ -34,7 +34,10 @@ _LIKELY = {
     ),
 }
 
-#: Logarithm of the odds that a role is right by a sure name and by a likely one.
+#: Units that suggest it, whatever the name is: a magnetic field H and the flux density B that it causes.
+_UNITS = {"A/m": "input", "kA/m": "input", "T": "output", "mT": "output"}
+
+#: Logarithm of the odds that a role is right by a sure name, and by a likely one or a unit.
 _SURE_NAME, _LIKELY_NAME = 3.0, 0.85
 
 #: Logarithm of the odds by the signals, at most.
@@ -154,13 +157,16 @@ def _first_word(name: str) -> str:
 
 
 def find_role(name: str) -> tuple[str, float]:
-    """Return the role that a column's name suggests, empty if none, and the logarithm of its odds."""
+    """Return the role that a column's name or unit suggests, empty if none, and the logarithm of its odds."""
     word = _first_word(name)
-    for table, odds in ((_SURE, _SURE_NAME), (_LIKELY, _LIKELY_NAME)):
-        for role, pattern in table.items():
-            if pattern.fullmatch(word):
-                return role, odds
-    return "", 0.0
+    if sure := _match(_SURE, word):
+        return sure, _SURE_NAME
+    likely = _UNITS.get(parse_channel_name(name).unit, "") or _match(_LIKELY, word)
+    return likely, _LIKELY_NAME if likely else 0.0
+
+
+def _match(table: Mapping[str, re.Pattern[str]], word: str) -> str:
+    return next((role for role, pattern in table.items() if pattern.fullmatch(word)), "")
 
 
 def _rate_name(name: str, role: str) -> float:

@@ -26,6 +26,13 @@ def assert_right(kind, test=False, seeds=range(2)):
     [
         *[("u_V", "input"), ("u1", "input"), ("pump/V", "input"), ("run.u", "input")],
         *[("y [um]", "output"), ("level_cm", "output"), ("Temperature (degC)", "output")],
+        *[
+            ("H [A/m]", "input"),
+            ("B [T]", "output"),
+            ("y_T", "output"),
+            ("u_T", "input"),
+            ("h [m]", "output"),
+        ],
         *[("channel_3", ""), ("k", "")],
     ],
 )
