@@ -141,6 +141,7 @@ class JobView(ResponseModel):
                     "version": 7,
                     "attempt": 1,
                     "cancel_requested": False,
+                    "stop_requested": False,
                     "created": "2026-11-20T14:00:00Z",
                     "updated": "2026-11-20T14:00:07Z",
                     "started": "2026-11-20T14:00:01Z",
@@ -159,6 +160,7 @@ class JobView(ResponseModel):
                     "version": 9,
                     "attempt": 1,
                     "cancel_requested": False,
+                    "stop_requested": False,
                     "created": "2026-11-20T14:00:00Z",
                     "updated": "2026-11-20T14:00:05Z",
                     "started": "2026-11-20T14:00:01Z",
@@ -192,6 +194,9 @@ class JobView(ResponseModel):
     version: int = Field(description="Increases with every change; the number of the last event.")
     attempt: int = Field(description="Number of times a coordinator has started it.")
     cancel_requested: bool
+    stop_requested: bool = Field(
+        default=False, description="Whether its search ends early, and the job succeeds with the best models."
+    )
     created: datetime
     updated: datetime
     started: datetime | None = None

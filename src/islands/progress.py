@@ -253,10 +253,14 @@ class Steps:
 
     def skip(self, step: str) -> bool:
         """Return whether a step must be left out because a stop is requested, and record its name."""
-        if not self.stop():
-            return False
+        if self.stop():
+            self.leave_out(step)
+            return True
+        return False
+
+    def leave_out(self, step: str) -> None:
+        """Record a step that is left out."""
         self._left_out[step] = None
-        return True
 
     @property
     def left_out(self) -> tuple[str, ...]:

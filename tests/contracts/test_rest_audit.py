@@ -14,6 +14,7 @@ CHANGES = {
     ("PATCH", "/v1/jobs/{job}"): Action.LABEL,
     ("POST", "/v1/jobs/{job}/cancel"): Action.CANCEL,
     ("POST", "/v1/admin/jobs/{job}/cancel"): Action.CANCEL_AS_ADMINISTRATOR,
+    ("POST", "/v1/jobs/{job}/stop"): Action.STOP,
     ("POST", "/v1/jobs/{job}/resume"): Action.RESUME,
     ("DELETE", "/v1/jobs/{job}"): Action.DELETE,
     ("POST", "/v1/admin/keys"): Action.CREATE_KEY,
@@ -43,6 +44,7 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
     (key,) = service.store.keys.all()
     used, unused = kept(service.store, "me"), kept(service.store, "me", b"2")
     failed = job_in(service.store, JobState.FAILED, "me", spec=spec(used)).id
+    running = job_in(service.store, JobState.RUNNING, "me", spec=spec(used)).id
     webhook = service.store.webhooks.create("me", "https://1.1.1.1", ("job.succeeded",), 1)[0].id
     columns = {name: value for name, value in held(used).items() if name != "dataset"}
     monitor = service.store.monitors.create("me", "press", columns, 0, 1).id
@@ -57,6 +59,7 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
         ("POST", "/v1/jobs/{job}/resume", {}),
         ("POST", "/v1/jobs/{job}/cancel", {}),
         ("DELETE", "/v1/jobs/{job}", {}),
+        ("POST", "/v1/jobs/{job}/stop", {}),
         ("POST", "/v1/monitors", {"json": columns}),
         ("POST", "/v1/monitors/{monitor}/records", {"json": {"dataset": used}}),
         ("DELETE", "/v1/monitors/{monitor}", {}),
@@ -71,6 +74,8 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
     for method, route, body in requests:
         subjects = {"job": failed, "dataset": unused, "owner": "me", "key": key.id}
         subjects |= {"webhook": webhook, "monitor": monitor}
+        if route.endswith("/stop"):
+            subjects["job"] = running
         path = route.format(**subjects)
         answer = service.client.request(method, path, headers=header, **body)
         assert answer.is_success, (route, answer.text)

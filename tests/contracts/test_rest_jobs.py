@@ -200,6 +200,7 @@ def test_invalid_cursors_are_rejected(service, path, cursor):
 #: States in which an action is allowed, and the following state; all others are conflicts.
 ALLOWED = {
     "cancel": {"queued": "cancelled", "running": "running"},
+    "stop": {"running": "running"},
     "resume": {"failed": "queued", "cancelled": "queued"},
     "delete": {"succeeded": None, "failed": None, "cancelled": None},
 }
@@ -221,6 +222,7 @@ def test_actions_are_allowed_only_in_certain_states(service, action, state):
         assert (answer.status_code, answer.json()["state"]) == (202, ALLOWED[action][state])
         assert answer.json() == service.client.get(path).json()
         assert answer.json()["cancel_requested"] == (action == "cancel")
+        assert answer.json()["stop_requested"] == (action == "stop")
 
 
 def test_queued_jobs_show_their_position_among_those_of_all_owners(service, order, monkeypatch):

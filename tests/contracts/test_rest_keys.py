@@ -24,6 +24,7 @@ GUARDED = {
     ("PATCH", "/v1/jobs/{job}"): "write",
     ("DELETE", "/v1/jobs/{job}"): "write",
     ("POST", "/v1/jobs/{job}/cancel"): "write",
+    ("POST", "/v1/jobs/{job}/stop"): "write",
     ("POST", "/v1/jobs/{job}/resume"): "write",
     ("GET", "/v1/jobs/{job}/history"): "read",
     ("GET", "/v1/jobs/{job}/events"): "read",

@@ -5,7 +5,7 @@ import threading
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.job import JobState, JobStateError
+from islands_service.domain.job import DISCREPANCY, JobState, JobStateError
 from islands_service.store.job_rows.job_claims import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.stores import (
@@ -51,6 +51,44 @@ def test_every_change_of_a_job_is_an_event_with_its_version(store):
     times = [event.at for event in store.jobs.events(job.id)]
     assert times == sorted(times)
     assert times[-1] == store.jobs.get(ALICE, job.id).updated
+
+
+def test_request_to_stop_a_search_is_one_event_and_ends_with_a_resumption(store):
+    job = submitted(store)
+    lease = claimed(store)
+    store.jobs.stop(ALICE, job.id)
+    assert store.jobs.stop(ALICE, job.id).version == 3
+    assert kinds(store, job.id) == ["queued", "running", "stopping"]
+    store.leases.finish(lease, FAILED)
+    assert store.jobs.get(ALICE, job.id).stop_requested
+    assert not store.jobs.resume(ALICE, job.id).stop_requested
+
+
+@pytest.mark.parametrize("other", [{"kind": DISCREPANCY}, {"spec": {"model": "wiener"}}])
+def test_only_a_search_is_stopped(store, other):
+    job = submitted(store, **other)
+    claimed(store)
+    with pytest.raises(JobStateError, match="has no search to stop: wait for its end, or cancel it"):
+        store.jobs.stop(ALICE, job.id)
+
+
+def test_a_search_that_is_being_cancelled_is_not_stopped(store):
+    job = submitted(store)
+    claimed(store)
+    store.jobs.cancel(ALICE, job.id)
+    with pytest.raises(JobStateError, match="is being cancelled"):
+        store.jobs.stop(ALICE, job.id)
+
+
+def test_a_queued_search_is_stopped_once_it_has_a_checkpoint(store):
+    job = submitted(store)
+    with pytest.raises(JobStateError, match="is queued: it has no models yet"):
+        store.jobs.stop(ALICE, job.id)
+    lease = claimed(store)
+    store.leases.report(lease, brought_on(1))
+    store.leases.release(lease)
+    assert store.jobs.stop(ALICE, job.id).state == JobState.QUEUED
+    assert claimed(store).job.stop_requested
 
 
 def test_events_are_read_after_a_number(store):

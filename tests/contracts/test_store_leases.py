@@ -250,6 +250,17 @@ def test_claim_after_a_takeover_contains_the_cancel_request(store):
     assert claimed(store, LONG, "second").job.cancel_requested
 
 
+def test_claim_and_renewal_contain_the_request_to_stop_the_search(store):
+    job = submitted(store)
+    lease = claimed(store, EXPIRED, "first")
+    assert store.leases.read_requests(lease) == (False, False)
+    assert not store.leases.renew(lease, EXPIRED).stop_requested
+    store.jobs.stop(ALICE, job.id)
+    assert store.leases.read_requests(lease) == (False, True)
+    assert store.leases.renew(lease, EXPIRED).stop_requested
+    assert claimed(store, LONG, "second").job.stop_requested
+
+
 def test_job_without_progress_fails_after_all_attempts(store):
     job = submitted(store)
     for attempt in range(1, ATTEMPTS + 1):

@@ -29,7 +29,11 @@ def make_run(
     blobs: Any,
     check: Callable[[], None] = lambda: None,
     checkpoint_every: float = 600.0,
+    is_search_stopped: Callable[[], bool] = lambda: False,
 ) -> JobRun:
     """Return the run of a job with a serial engine."""
     notes = JobNotes(lease, store)
-    return JobRun(lease, store, blobs, SerialEngine(), check, checkpoint_every, notes, lambda: None)
+    return JobRun(
+        *(lease, store, blobs, SerialEngine(), check, checkpoint_every, notes, lambda: None),
+        is_search_stopped=is_search_stopped,
+    )

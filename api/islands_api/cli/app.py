@@ -11,7 +11,7 @@ SERVICE_COMMANDS = core.make_commands(
     {
         "serve": "Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next "
         "start.",
-        "jobs": "Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, resume, "
+        "jobs": "Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, stop, resume, "
         "result.",
         "report": "Write the report of a result folder or of a job as one HTML file.",
         "monitors": "Monitors of a service: create, add records, list, show, delete.",

@@ -94,6 +94,7 @@ class BaseClient(Generic[H]):
     jobs = Endpoint(calls.jobs)
     datasets = Endpoint(calls.datasets)
     label = Endpoint(calls.label)
+    stop = Endpoint(calls.stop)
     resume = Endpoint(calls.resume)
     delete = Endpoint(calls.delete)
     delete_dataset = Endpoint(calls.delete_dataset)

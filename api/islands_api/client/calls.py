@@ -191,6 +191,11 @@ def cancel(which: JobRef) -> RequestSpec[JobView]:
     return RequestSpec("POST", f"/v1/jobs/{quote_id(which)}/cancel", read_as(JobView))
 
 
+def stop(which: JobRef) -> RequestSpec[JobView]:
+    """Stop the search of a job, which then succeeds with its best models."""
+    return RequestSpec("POST", f"/v1/jobs/{quote_id(which)}/stop", read_as(JobView))
+
+
 def resume(which: JobRef) -> RequestSpec[JobView]:
     """Resume a job that has failed or was cancelled."""
     return RequestSpec("POST", f"/v1/jobs/{quote_id(which)}/resume", read_as(JobView), repeatable=False)

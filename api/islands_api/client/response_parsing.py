@@ -23,7 +23,7 @@ class Event:
     number : int
         Version of the job after the event.
     kind : str
-        queued, running, progress, cancelling, succeeded, failed or cancelled.
+        queued, running, progress, cancelling, stopping, succeeded, failed or cancelled.
     """
 
     number: int

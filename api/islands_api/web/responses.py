@@ -52,6 +52,7 @@ def job_document(job: Job, max_run_seconds: int, place: QueuePlace | None = None
         "version": job.version,
         "attempt": job.attempt,
         "cancel_requested": job.cancel_requested,
+        "stop_requested": job.stop_requested,
         "created": _format_time(job.created),
         "updated": _format_time(job.updated),
         "started": _format_time(job.started),

@@ -102,6 +102,7 @@ class Heartbeat:
         self._over = Event()
         self._outage = OutageLog("heartbeat failed", "heartbeat works again")
         self._lost = self._cancelled = self._completed = self._abandoned = False
+        self._search_stopped = False
         self._searching = self._waiting = False
         # The limit of run time, once it is reached.
         self._reached_limit: int | None = None
@@ -111,6 +112,7 @@ class Heartbeat:
 
     def __enter__(self) -> "Heartbeat":
         self._cancelled = self._lease.job.cancel_requested
+        self._search_stopped = self._lease.job.stop_requested
         self._thread.start()
         return self
 
@@ -139,6 +141,10 @@ class Heartbeat:
             raise CoordinatorStopping("the coordinator is stopping")
         if self._reached_limit is not None and not self._completed:
             raise RunTimeLimitError(self._reached_limit)
+
+    def is_search_stopped(self) -> bool:
+        """Return whether the owner has asked that the search ends with its best models."""
+        return self._search_stopped
 
     def complete(self) -> None:
         """Mark the computation as complete: from now on neither a cancellation nor a limit ends the job."""
@@ -187,7 +193,7 @@ class Heartbeat:
                     self._renew(now)
                     renew_at = now + period
                 else:
-                    self._cancelled |= self._store.leases.is_cancel_requested(self._lease)
+                    self._keep_requests(*self._store.leases.read_requests(self._lease))
                 if self._cancelled or self._lost:
                     end_by = min(end_by, now + CANCEL_GRACE)
                 elif self._reached_limit is not None:
@@ -208,10 +214,15 @@ class Heartbeat:
         ran = 0.0 if self._waiting else now - self._counted_until
         renewal = self._store.leases.renew(self._lease, self._seconds, ran)
         self._counted_until = now
-        self._cancelled |= renewal.cancel_requested
+        self._keep_requests(renewal.cancel_requested, renewal.stop_requested)
         limit = self._max_run_seconds if renewal.max_run_seconds is None else renewal.max_run_seconds
         if self._reached_limit is None and renewal.run_seconds >= limit:
             self._reached_limit = limit
+
+    def _keep_requests(self, cancel: bool, stop: bool) -> None:
+        """Keep requests of the owner. None is withdrawn while a job runs."""
+        self._cancelled |= cancel
+        self._search_stopped |= stop
 
     def _end_job(self) -> None:
         """Store that the job is cancelled or at its limit, unless its lease is lost, and abandon it."""

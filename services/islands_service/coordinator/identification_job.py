@@ -34,13 +34,18 @@ from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_run import JobRun
-from islands_service.domain.job import RUN_TIME, JobOutcome, JobState, ProgressReport
+from islands_service.coordinator.search_view import SearchFront, describe_migration
+from islands_service.coordinator.stoppable_engine import StoppableEngine
+from islands_service.domain.job import BY_OWNER, RUN_TIME, JobOutcome, JobState, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.domain.search_limits import resolve_job_settings
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
 from islands_service.store.database import StoreError
+
+#: Phase after the last step of the search.
+STORING = "storing the result"
 
 #: Seconds between two reports of progress.
 REPORT_EVERY = 0.5
@@ -49,7 +54,8 @@ REPORT_EVERY = 0.5
 def run_identification_job(run: JobRun) -> JobOutcome:
     """Run an identification job from its last checkpoint.
 
-    A job that is cancelled ends between two steps, with the models found so far.
+    A job that is cancelled ends between two steps, with the models found so far. If its owner stops the
+    search, the epochs end, and all other steps follow.
 
     Raises
     ------
@@ -61,20 +67,25 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     """
     spec = parse_identification(run.job.spec)
     datasets = {name: run.get_dataset(name) for name in spec.datasets}
+    run.notes.begin("reading the record")
     record, validation = read_record_and_validation(spec, datasets, run.blobs)
     checkpoints = JobCheckpoints(run.job, run.blobs)
     start = checkpoints.read()
     stop = SearchStop(run.check)
+    front = SearchFront()
+    # Generations of several outputs are summed.
+    reached = (run.job.progress or {}).get("generation", 0) if len(spec.outputs) == 1 else 0
+    engine = StoppableEngine(run.engine, run.is_search_stopped, front.begin, reached)
     warnings = [
         f"validation extrapolates: {statement}"
         for statement in describe_search_extrapolation(record, validation, len(spec.outputs))
     ]
-    reporter = ProgressReporter(run, checkpoints, stop, start, spec, record.samples, warnings)
+    reporter = ProgressReporter(run, checkpoints, stop, start, spec, record.samples, front, warnings)
     try:
         if len(spec.outputs) > 1:
-            coupled = _identify_outputs(record, validation, spec, start, run.engine, reporter, stop)
+            coupled = _identify_outputs(record, validation, spec, start, engine, reporter, stop)
             return _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
-        found = _identify(record, validation, spec, start, run.engine, reporter, stop)
+        found = _identify(record, validation, spec, start, engine, reporter, stop)
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
     return _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
@@ -83,9 +94,12 @@ def run_identification_job(run: JobRun) -> JobOutcome:
 def _end_job(
     make: Callable[..., JobOutcome], left_out: Sequence[str], note: str, stop: "SearchStop"
 ) -> JobOutcome:
-    """Return the outcome of a search that is complete, cancelled, or at its limit of run time."""
+    """Return the outcome of a search that is complete, cancelled, stopped, or at its limit of run time."""
     if not left_out:
         return make(note)
+    if stop.reason is None:
+        stopped = f"the owner stopped the job, which leaves out: {', '.join(left_out)}"
+        return make("; ".join(filter(None, [note, stopped])), BY_OWNER)
     if not isinstance(stop.reason, RunTimeLimitError):
         return replace(make(note), state=JobState.CANCELLED)
     limit = (
@@ -96,7 +110,7 @@ def _end_job(
 
 
 class SearchStop:
-    """Stop request of a search: its job is cancelled, or at its limit of run time.
+    """Stop request of all steps of a search: its job is cancelled, or at its limit of run time.
 
     Parameters
     ----------
@@ -274,10 +288,11 @@ class ProgressReporter:
         start: JobStart,
         spec: Identification,
         samples: int,
+        front: SearchFront,
         warnings: Sequence[str] = (),
     ) -> None:
         self._warnings = {"warnings": list(warnings)} if warnings else {}
-        self._outputs = len(spec.outputs)
+        self._outputs, self._seed, self._front = len(spec.outputs), spec.seed, front
         self._phases = _make_progress(self._keep_stage, spec, samples)
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
         self._started_at = monotonic() - start.spent
@@ -324,7 +339,9 @@ class ProgressReporter:
         """Keep the phase, the completed fraction of the job and the time left for the next report."""
         now = monotonic()
         assert fraction is not None
-        self._left.update(fraction, now)
+        # Before the first epoch a search may have waited for its actors: only its speed gives the time left.
+        if not message.endswith(SEARCH):
+            self._left.update(fraction, now)
         self._stage = {
             "phase": message,
             "fraction": fraction,
@@ -340,16 +357,18 @@ class ProgressReporter:
 
     def flush(self) -> None:
         """Store the last state. Retry while the store is unavailable, unless the job is cancelled."""
-        while self._last is not None and not self._report(*self._last) and not self._stop():
+        self._stage |= {"phase": STORING, "seconds_left": None}
+        while self._last is not None and not self._report(*self._last, False) and not self._stop():
             sleep(REPORT_EVERY)
 
-    def _report(self, state: SearchState, settings: Settings) -> bool:
-        """Store the progress of the search; return whether the store accepted it."""
+    def _report(self, state: SearchState, settings: Settings, searching: bool = True) -> bool:
+        """Store the progress of the search, or after it; return whether the store accepted it."""
         started = monotonic()
         summed = sum_searches(state)
         points, after = self._points(summed)
         reached = self._progress(state, settings)
-        self._keep_search(state, settings, reached["evaluations_per_second"])
+        if searching:
+            self._keep_search(state, settings, reached["evaluations_per_second"])
         progress = self._run.notes.complete({**reached, **self._stage})
         report = ProgressReport(progress, points, after=after)
         try:
@@ -404,7 +423,16 @@ class ProgressReporter:
             "best_error": min((error for error in best.values() if isfinite(error)), default=None),
             "best_by_size": best,
             "islands": [least**0.5 if isfinite(least) else None for least in last.islands],
+            **self._describe_search(searched, settings),
             **self._note,
+        }
+
+    def _describe_search(self, searched: SearchState, settings: Settings) -> dict[str, Any]:
+        """Return the front and the last migration, as far as they are known."""
+        front, migration = self._front.update(searched), describe_migration(searched, settings, self._seed)
+        return {
+            **({"front": front} if front else {}),
+            **({} if migration is None else {"migration": migration}),
         }
 
     def _points(self, state: SearchState) -> tuple[tuple[Any, ...], int]:

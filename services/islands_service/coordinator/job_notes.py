@@ -38,8 +38,17 @@ class JobNotes:
         log.warning("islands", note=message)
         self._message, self._until = message, monotonic() + SHOWN_SECONDS
         phase = {"phase": WAITING} if message.startswith(WAITING) else {}
+        self._try_report({**phase, "note": message})
+
+    def begin(self, phase: str) -> None:
+        """Store a phase before the first report of an attempt, without the note of an earlier one."""
+        self._progress = {name: value for name, value in self._progress.items() if name != "note"}
+        self._try_report({"phase": phase})
+
+    def _try_report(self, changes: Mapping[str, Any]) -> None:
+        """Store the last progress with changes, unless the store is unavailable."""
         try:
-            self.report({**phase, "note": message})
+            self.report(changes)
         except StoreError as error:
             # The next report of the search contains the message.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from islands.progress import Stop, never_stop
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.domain.job import Job, Lease
 from islands_service.store import Store
@@ -33,6 +34,8 @@ class JobRun:
         Messages that the progress of the job contains.
     connect : callable
         Connects this process to the Ray cluster, unless it is connected.
+    is_search_stopped : callable
+        Returns whether the owner has asked that the search ends with its best models.
     """
 
     lease: Lease
@@ -43,6 +46,7 @@ class JobRun:
     checkpoint_every: float
     notes: JobNotes
     connect: Callable[[], None]
+    is_search_stopped: Stop = never_stop
 
     @property
     def job(self) -> Job:

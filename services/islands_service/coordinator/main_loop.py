@@ -220,9 +220,11 @@ class Coordinator:
     def _run_job(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
         try:
             heartbeat.check()
+            notes = JobNotes(lease, self._store)
+            if not self._prepared:
+                notes.begin("loading the library")
             self._prepare()
             self._demand_ray_early(lease.job)
-            notes = JobNotes(lease, self._store)
             connect = partial(self._wait_for_ray, lease, notes, heartbeat)
             run = JobRun(
                 lease,
@@ -233,6 +235,7 @@ class Coordinator:
                 checkpoint_every=self._settings.checkpoint_every,
                 notes=notes,
                 connect=connect,
+                is_search_stopped=heartbeat.is_search_stopped,
             )
             return JOB_RUNNERS[lease.job.kind](run)
         except JobCancelled:

@@ -14,6 +14,7 @@
 * release: a coordinator that stops or cannot continue returns the job to the queue. The next attempt
   continues from the last checkpoint.
 * cancel: a queued job is cancelled at once, a running one as soon as its coordinator has released it.
+* stop: the search of a job ends early, and the job succeeds with the best models so far.
 * resume: a failed or cancelled job is queued again and continues from its last checkpoint, if it has one.
 """
 
@@ -50,12 +51,15 @@ ACTIVE = (JobState.QUEUED, JobState.RUNNING)
 #: States from which a job can be resumed.
 RESUMABLE = (JobState.FAILED, JobState.CANCELLED)
 
-#: Why a search ended that was stopped at the limit of its run time, in its result.
-RUN_TIME = "run time"
+#: Why a search ended that was stopped at the limit of its run time, or by its owner, in its result.
+RUN_TIME, BY_OWNER = "run time", "stopped by its owner"
 
 #: Kind of a job that identifies a model; a key of ``JOB_RUNNERS`` in
 #: `islands_service.coordinator.job_runners`.
 IDENTIFICATION = "identification"
+
+#: Class of the models that a search finds, `islands.io.models.NARX`, whose import would take long.
+SEARCHED = "narx"
 
 #: Kind of a job that diagnoses a simulation.
 DISCREPANCY = "discrepancy"
@@ -190,6 +194,8 @@ class Job:
         Number of the last event; raised by every change that clients can see.
     attempt : int
         Number of times that a coordinator has claimed the job.
+    stop_requested : bool
+        Whether its search ends early, with the best models so far.
     progress : mapping or None
         Last progress report.
     checkpoint : str or None
@@ -222,6 +228,7 @@ class Job:
     version: int
     attempt: int
     cancel_requested: bool
+    stop_requested: bool
     progress: Mapping[str, Any] | None
     checkpoint: str | None
     summary: Mapping[str, Any] | None
@@ -240,6 +247,11 @@ class Job:
     def datasets(self) -> tuple[str, ...]:
         """Data sets that the specification names, also one that this version cannot parse."""
         return find_datasets(self.spec)
+
+    @property
+    def has_search(self) -> bool:
+        """Whether a search finds its models, which can end early with the best ones."""
+        return self.kind == IDENTIFICATION and self.spec.get("model", SEARCHED) == SEARCHED
 
 
 def find_datasets(spec: Mapping[str, Any]) -> tuple[str, ...]:
@@ -271,12 +283,13 @@ class Renewal:
 
     Attributes
     ----------
-    cancel_requested : bool
+    cancel_requested, stop_requested : bool
     run_seconds, max_run_seconds
         See `Job`.
     """
 
     cancel_requested: bool
+    stop_requested: bool
     run_seconds: float
     max_run_seconds: int | None
 

@@ -21,6 +21,7 @@ class Action(StrEnum):
     SUBMIT = "submit-job"
     CANCEL = "cancel-job"
     CANCEL_AS_ADMINISTRATOR = "cancel-job-as-administrator"
+    STOP = "stop-job"
     RESUME = "resume-job"
     LABEL = "label-job"
     DELETE = "delete-job"

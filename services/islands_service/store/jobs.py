@@ -1,4 +1,4 @@
-"""Operations of owners on their jobs: submit, get, list, label, cancel, resume, delete.
+"""Operations of owners on their jobs: submit, get, list, label, cancel, stop, resume, delete.
 
 An owner has access only to its own jobs.
 """
@@ -271,6 +271,29 @@ class Jobs:
 
         return self._database.write(operation)
 
+    def stop(self, owner: str, job: str, by: Requester | None = None) -> Job:
+        """Request that the search of a job ends with its best models; a repeated request has no effect.
+
+        Raises
+        ------
+        JobNotFoundError
+        JobStateError
+            The job is finished, is being cancelled, has not begun, or has no search.
+        """
+
+        def operation(connection: Connection) -> Job:
+            current = _read_owned(connection, owner, job, locked=True)
+            found = job_from_row(current)
+            _check_stoppable(found)
+            if found.stop_requested:
+                return found
+            row = update_job(connection, job, stop_requested=True)
+            append_event(connection, row, "stopping")
+            record_change(connection, Action.STOP, owner, job, by)
+            return job_from_row(row)
+
+        return self._database.write(operation)
+
     def resume(
         self, owner: str, job: str, most_active: int | None = None, by: Requester | None = None
     ) -> Job:
@@ -301,6 +324,7 @@ class Jobs:
                 job,
                 state=JobState.QUEUED,
                 cancel_requested=False,
+                stop_requested=False,
                 stalled=0,
                 not_before=0.0,
                 run_seconds=0.0,
@@ -364,6 +388,23 @@ def _find_dataset_name(connection: Connection, submission: Submission) -> str | 
         return None
     name: str | None = connection.execute(_DATASET_NAME, {"owner": submission.owner, "id": found[0]}).scalar()
     return name
+
+
+def _check_stoppable(job: Job) -> None:
+    """Raise an error if a job has no search that could end early with models.
+
+    Raises
+    ------
+    JobStateError
+    """
+    if job.state in TERMINAL:
+        raise JobStateError(f"job {job.id} is {job.state}: there is no search to stop")
+    if not job.has_search:
+        raise JobStateError(f"job {job.id} has no search to stop: wait for its end, or cancel it")
+    if job.cancel_requested:
+        raise JobStateError(f"job {job.id} is being cancelled, and keeps the models found so far")
+    if job.state == JobState.QUEUED and job.checkpoint is None:
+        raise JobStateError(f"job {job.id} is queued: it has no models yet, wait for its start, or cancel it")
 
 
 def _read_owned(connection: Connection, owner: str | None, job: str, locked: bool = False) -> Row[Any]:

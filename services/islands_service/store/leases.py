@@ -97,11 +97,21 @@ class Leases:
             held = update(jobs).where(*_held(lease))
             renewed = held.values(lease_until=now() + seconds, run_seconds=jobs.c.run_seconds + ran)
             found = connection.execute(
-                renewed.returning(jobs.c.cancel_requested, jobs.c.run_seconds, jobs.c.max_run_seconds)
+                renewed.returning(
+                    jobs.c.cancel_requested,
+                    jobs.c.stop_requested,
+                    jobs.c.run_seconds,
+                    jobs.c.max_run_seconds,
+                )
             ).one_or_none()
             if found is None:
                 raise _make_lease_lost_error(lease)
-            return Renewal(bool(found.cancel_requested), found.run_seconds, found.max_run_seconds)
+            return Renewal(
+                bool(found.cancel_requested),
+                bool(found.stop_requested),
+                found.run_seconds,
+                found.max_run_seconds,
+            )
 
         return self._database.write(operation)
 
@@ -112,11 +122,15 @@ class Leases:
         with self._database.read() as connection:
             return find_places(connection, found, most_running, most_islands)
 
-    def is_cancel_requested(self, lease: Lease) -> bool:
-        """Return whether cancellation of a job is requested; the lease is neither checked nor extended."""
-        query = select(jobs.c.cancel_requested).where(jobs.c.id == lease.job.id)
+    def read_requests(self, lease: Lease) -> tuple[bool, bool]:
+        """Return whether a cancellation, and a stop of the search of a job are requested.
+
+        The lease is neither checked nor extended.
+        """
+        query = select(jobs.c.cancel_requested, jobs.c.stop_requested).where(jobs.c.id == lease.job.id)
         with self._database.read() as connection:
-            return bool(connection.execute(query).scalar())
+            found = connection.execute(query).one_or_none()
+        return (False, False) if found is None else (bool(found[0]), bool(found[1]))
 
     def report(self, lease: Lease, report: ProgressReport) -> Job:
         """Store progress, history points and checkpoint of a job: all together or none of them.

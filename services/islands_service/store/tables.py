@@ -13,6 +13,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    false,
     text,
 )
 
@@ -54,6 +55,7 @@ jobs = Table(
     Column("lease_epoch", BigInteger, nullable=False, default=0),
     Column("lease_until", Float, nullable=False, default=0.0),
     Column("cancel_requested", Boolean, nullable=False, default=False),
+    Column("stop_requested", Boolean, nullable=False, server_default=false()),
     Column("progress", Text),
     Column("checkpoint", String(64)),
     Column("summary", Text),

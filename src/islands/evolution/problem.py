@@ -8,6 +8,7 @@ from islands.available_cpus import count_cpus
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import make_selection_problem, select_forward, select_pool
 from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.deviations import Offsets
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import with_phi
@@ -35,12 +36,15 @@ class Problem:
         from a swap search; the best of every size first. They start the first population of every island.
     pool : tuple of Expression
         Genes of that library, which an outer mutation may insert.
+    offsets : tuple of float
+        Constants that were subtracted from the output and from every input; empty if there were none.
     """
 
     record: Dataset
     settings: Settings
     seeds: tuple[Genes, ...] = ()
     pool: tuple[Expression, ...] = ()
+    offsets: Offsets = ()
 
     def settings_of(self, island: int) -> Settings:
         """Return the settings of an island; profiles are assigned to the islands in turn."""

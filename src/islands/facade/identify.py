@@ -215,7 +215,9 @@ def identify_record(
         shooting=count_means(settings.shooting, count),
         library_delays=tuple(delay // count for delay in settings.library_delays),
     )
-    search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled, steps)
+    search_problem = replace(
+        make_problem(subtract_offsets(split.estimation, offsets), scaled, steps), offsets=offsets
+    )
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
         (index, seed) for index in range(settings.islands)
@@ -261,8 +263,9 @@ def _evolve(
             state = advance(state, epoch)
             on_epoch(state, settings)
     if not stop_reason(state, settings):
+        # Also an engine may end the epochs, without a stop of the steps after them.
         done = max(0, state.archipelago.generation)
-        steps.skip(f"search from generation {done} to {settings.generations}")
+        steps.leave_out(f"search from generation {done} to {settings.generations}")
     return state
 
 

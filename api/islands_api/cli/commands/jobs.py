@@ -25,7 +25,7 @@ from islands_api.schemas import JobView
 from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, JobState
 
 jobs = typer.Typer(
-    help="Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, resume, result.",
+    help="Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, stop, resume, result.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -230,6 +230,13 @@ def cancel(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False)
     """Cancel a job; it can be resumed."""
     with open_client(url, key) as client:
         views.show_job(client.cancel(job), as_json)
+
+
+@jobs.command()
+def stop(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
+    """Stop the search of a job, which then succeeds with the best models found so far."""
+    with open_client(url, key) as client:
+        views.show_job(client.stop(job), as_json)
 
 
 @jobs.command()

@@ -22,10 +22,15 @@ from islands.reports.origin import REPORT_FILE
 from islands.simulators.specification.table import EXTENDED_FILE
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
-from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, RUN_TIME, TERMINAL, JobState
+from islands_service.domain.job import BY_OWNER, DISCREPANCY, IDENTIFICATION, RUN_TIME, TERMINAL, JobState
 
 #: Largest number of islands that have a line each.
 _SHOWN_ISLANDS = 16
+
+#: How a search ended that used up none of its budgets, by the entry of its summary.
+ENDED: Mapping[object, str] = MappingProxyType(
+    {RUN_TIME: "ended at its limit of run time", BY_OWNER: "was stopped by its owner"}
+)
 
 #: Lines of a job in a list.
 _LINE, _SECOND_LINE = "{:32}  {:9}  {:>13}  {:>10}", "  {:16}  {}"
@@ -73,15 +78,15 @@ def show_labels(job: JobView, as_json: bool) -> None:
 def describe_kept_models(job: JobView) -> str:
     """Return what a search has kept that did not end by itself, and how to get it; empty for other jobs."""
     summary = job.summary or {}
-    is_cancelled, is_limited = job.state == JobState.CANCELLED, summary.get("ended_by") == RUN_TIME
-    if job.kind != IDENTIFICATION or not summary or not (is_cancelled or is_limited):
+    is_cancelled, ended_by = job.state == JobState.CANCELLED, summary.get("ended_by")
+    if job.kind != IDENTIFICATION or not summary or not (is_cancelled or ended_by in ENDED):
         return ""
     count = summary["models"]
     models = f"{count} model{'s' if count > 1 else ''} found so far"
     get = f"'islands jobs result {job.id} --out FOLDER' writes {'them' if count > 1 else 'it'} to a folder"
     if is_cancelled:
         return f"was cancelled and kept the {models}: {get}, 'islands jobs resume {job.id}' continues"
-    return f"ended at its limit of run time and kept the {models}: {get}"
+    return f"{ENDED[ended_by]} and kept the {models}: {get}"
 
 
 def show_findings(job: JobView) -> None:

@@ -24,7 +24,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_
 _KEEP_ALIVE_SECONDS = 7.0
 
 #: Kinds of events of a job.
-_EVENT_KINDS = ("queued", "running", "progress", "cancelling", LABELLED, *TERMINAL)
+_EVENT_KINDS = ("queued", "running", "progress", "cancelling", "stopping", LABELLED, *TERMINAL)
 
 _STREAM_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {

@@ -1,4 +1,4 @@
-"""Jobs: submit, list, get, wait, label, cancel, resume, delete, history."""
+"""Jobs: submit, list, get, wait, label, cancel, stop, resume, delete, history."""
 
 from functools import partial
 from typing import Annotated, Any
@@ -160,6 +160,18 @@ async def cancel(job: Id, caller: Writer, state: AppStateDep) -> Any:
     """Cancel a job: a queued one immediately, a running one within about a second."""
     cancelled = await state.run_blocking(state.store.jobs.cancel, caller.owner, job, caller.requester)
     return JSONDocument(job_document(cancelled, state.settings.max_run_seconds), 202)
+
+
+@router.post("/{job}/stop", status_code=202, response_model=JobView)
+async def stop(job: Id, caller: Writer, state: AppStateDep) -> Any:
+    """Stop the search of a running identification: the job succeeds with the best models found so far.
+
+    The search ends with its present epoch, and not before its first population. The best models are
+    estimated and validated as after a complete search. `summary.ended_by` is `stopped by its owner`, and the
+    note of the summary names the last generation.
+    """
+    stopped = await state.run_blocking(state.store.jobs.stop, caller.owner, job, caller.requester)
+    return JSONDocument(job_document(stopped, state.settings.max_run_seconds), 202)
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)

@@ -59,6 +59,7 @@ def job_from_row(row: Row[Any]) -> Job:
         row.version,
         row.attempt,
         bool(row.cancel_requested),
+        bool(row.stop_requested),
         read_document(row.progress),
         row.checkpoint,
         read_document(row.summary),

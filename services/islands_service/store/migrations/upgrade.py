@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 #: Revision that the code is written for. Importing Alembic takes a quarter of a second, and a database of
 #: this revision does not need it. A test compares this constant with the migrations.
-HEAD = "0011"
+HEAD = "0012"
 
 
 def prepare(database: Database) -> None:

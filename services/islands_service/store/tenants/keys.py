@@ -20,7 +20,7 @@ from islands_service.store.tables import keys
 #: Scopes of a key, and what each allows.
 SCOPES = {
     "read": "read your own data sets, jobs and results",
-    "write": "upload data sets, submit, cancel, resume and delete jobs",
+    "write": "upload data sets, submit, cancel, stop, resume and delete jobs",
     "metrics": "read the service's metrics",
     "admin": "manage keys, and the weights and quotas of owners",
 }

@@ -263,6 +263,16 @@ def test_finished_job_cannot_be_cancelled_nor_queued_job_resumed(
         client.cancel(job)
 
 
+def test_search_of_a_running_job_is_stopped(client: Any, me: Any, claimed: Any) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    with pytest.raises(ServiceError, match="is queued: it has no models yet"):
+        client.stop(job)
+    claimed(job)
+    stopped = client.stop(job)
+    assert (stopped.state, stopped.stop_requested) == (JobState.RUNNING, True)
+    assert client.stop(job) == stopped
+
+
 def test_failed_job_contains_its_problem(client: Any, service: Service, me: Any, claimed: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     service.store.leases.finish(claimed(job), FAILED)
@@ -376,11 +386,12 @@ def test_closed_client_raises_an_error(service: Service, me: Any) -> None:
 def test_calls_declare_whether_they_are_repeatable() -> None:
     made: list[RequestSpec[Any]] = [
         calls.cancel("0"),
+        calls.stop("0"),
         calls.resume("0"),
         calls.delete("0"),
         calls.delete_dataset("0"),
     ]
-    assert [call.repeatable for call in made] == [True, False, False, False]
+    assert [call.repeatable for call in made] == [True, True, False, False, False]
     assert all(
         call.repeatable
         for call in (calls.job("0"), calls.submit("0", ["u"], "y"), dataset_calls.upload("r.csv"))

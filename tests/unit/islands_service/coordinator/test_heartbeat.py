@@ -397,6 +397,17 @@ def test_job_without_checks_ends_the_process_unless_it_computes(store: Store, ho
         assert take_over(store).job.id == job.id
 
 
+def test_request_to_stop_the_search_is_kept_and_ends_no_check(store: Store, lease: Lease) -> None:
+    with Heartbeat(store, lease, SECONDS, StopRequest()) as heartbeat:
+        assert not heartbeat.is_search_stopped()
+        store.jobs.stop(ALICE, lease.job.id)
+        eventually(heartbeat.is_search_stopped)
+        heartbeat.check()
+    # A coordinator that takes the job over knows the request from the start.
+    with Heartbeat(store, take_over(store), SECONDS, StopRequest()) as heartbeat:
+        assert heartbeat.is_search_stopped()
+
+
 BROKEN = """
 import sys, time
 from islands_service.liveness import StopRequest
@@ -407,7 +418,7 @@ with Store(sys.argv[1]) as store:
     with heartbeat.Heartbeat(store, lease, 0.3, StopRequest()):
         def fail(*_):
             raise MemoryError
-        store.leases.renew = store.leases.is_cancel_requested = fail
+        store.leases.renew = store.leases.read_requests = fail
         time.sleep(10.0)
         print("went on", flush=True)
 """

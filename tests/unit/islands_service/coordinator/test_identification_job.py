@@ -4,13 +4,14 @@ import gzip
 import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import structlog
 
+from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
 from islands.io.result_folder import result_document
 from islands.io.result_text.statements import describe
@@ -213,6 +214,99 @@ def test_search_at_its_limit_of_run_time_ends_with_its_models(
     assert outcome.document["search"]["evaluations"] < undisturbed[1][-1][1]
 
 
+@pytest.mark.ci
+@pytest.mark.parametrize("at", [-1, 4])
+def test_stopped_search_gives_the_models_of_one_that_ends_there(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+
+    def is_stopped() -> bool:
+        progress = store.jobs.get(ALICE, job.id).progress or {}
+        return progress.get("generation", -1) >= at
+
+    outcome = run_identification_job(make_run(claim(store), store, blobs, is_search_stopped=is_stopped))
+    assert outcome.state == JobState.SUCCEEDED
+    assert outcome.document is not None
+    assert outcome.summary is not None
+    search, last = outcome.document["search"], max(0, at)
+    # The first populations are evaluated in any case.
+    assert (search["generations"], search["ended_by"]) == (last, "stopped by its owner")
+    assert search["left_out"] == [f"search from generation {last} to 30"]
+    assert f"search from generation {last} to 30" in outcome.summary["note"]
+    assert outcome.summary["ended_by"] == "stopped by its owner"
+    settings = {**job.spec["settings"], "generations": last}
+    short = store.jobs.submit(Submission(ALICE, {**job.spec, "settings": settings}))[0]
+    lease = claim(store, "another")
+    assert lease.job.id == short.id
+    assert get_models(run_job(lease, store, blobs)) == get_models(outcome)
+
+
+@pytest.mark.ci
+def test_request_to_stop_is_not_lost_with_the_coordinator(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    lease = claim(store)
+    with pytest.raises(CoordinatorStopping):
+        run_job(lease, store, blobs, Interruption(store, job, 3))
+    store.jobs.stop(ALICE, job.id)
+    # The process is killed, and its last checkpoint is older than what the owner has seen.
+    lease = claim(store)
+    assert lease.job.attempt == 2
+    run = make_run(lease, store, blobs, is_search_stopped=lambda: lease.job.stop_requested)
+    outcome = run_identification_job(run)
+    assert outcome.state == JobState.SUCCEEDED
+    assert outcome.document is not None
+    assert outcome.document["search"]["left_out"] == ["search from generation 3 to 30"]
+    assert outcome.models
+
+
+class LateEngine(SerialEngine):
+    """Engine whose first epoch takes long, as with actors that have to start."""
+
+    def run(self, problem: Any, start: Any, stop: Any) -> Any:
+        time.sleep(2.0)
+        yield from super().run(problem, start, stop)
+
+
+@pytest.mark.ci
+def test_time_left_of_the_epochs_does_not_depend_on_the_wait_before_them(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    store.jobs.cancel(ALICE, job.id)
+    changed = store.jobs.submit(Submission(ALICE, {**job.spec, "preset": "auto"}))[0]
+    before, first = [0.0], []
+
+    def watch() -> None:
+        progress = store.jobs.get(ALICE, changed.id).progress or {}
+        if progress.get("generation", 0) >= 3:
+            raise CoordinatorStopping("enough")
+        (first if "generation" in progress else before).append(progress.get("seconds_left") or 0.0)
+
+    with pytest.raises(CoordinatorStopping):
+        run_identification_job(replace(make_run(claim(store), store, blobs, watch), engine=LateEngine()))
+    assert first
+    # It only decreases until the speed of the epochs is known.
+    assert max(first) <= before[-1]
+
+
+@pytest.mark.ci
+def test_progress_has_the_front_and_the_last_migration(store: Store, blobs: Blobs, job: Job) -> None:
+    run_job(claim(store), store, blobs)
+    progress = store.jobs.get(ALICE, job.id).progress
+    assert progress is not None
+    front = progress["front"]
+    assert [each["size"] for each in front] == sorted({each["size"] for each in front})
+    errors = [each["error"] for each in front]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] == progress["best_error"]
+    assert all(each["equation"].startswith("y_um(k) = ") for each in front)
+    # The last of 30 generations is a stop, since islands exchange models in each of them.
+    assert progress["migration"] == {"generation": 30, "emigrants": 1, "sources": [[1], [0]]}
+
+
 def test_search_without_models_fails_at_its_limit_of_run_time(store: Store, blobs: Blobs, job: Job) -> None:
     def check() -> None:
         raise RunTimeLimitError(10)
@@ -266,14 +360,14 @@ def test_stages_of_a_job_are_its_phases_and_keep_its_generation(store: Store, bl
 
     run_job(claim(store), store, blobs, watch)
     phases = [progress["phase"] for progress in seen if progress]
-    assert phases[0] == "sampling rate and direct feedthrough"
+    assert list(dict.fromkeys(phases))[:2] == ["reading the record", "sampling rate and direct feedthrough"]
     assert {phase.split(" of ")[0] for phase in phases} >= {"search", "estimation"}
     ended = store.jobs.get(ALICE, job.id).progress
     assert ended is not None
-    assert ended["phase"] == "search"
+    assert ended["phase"] == "storing the result"
     reached = [progress.get("generation", -1) for progress in seen if progress]
     assert reached == sorted(reached)
-    fractions = [progress["fraction"] for progress in seen if progress]
+    fractions = [progress.get("fraction", 0.0) for progress in seen if progress]
     assert fractions == sorted(fractions)
     searching = phases.index("search")
     assert fractions[searching] < fractions[-1] <= 1.0

@@ -28,6 +28,14 @@ def test_search_that_waits_for_cpus_has_this_phase(store, lease):
     assert progress_of(store, lease) == {"phase": "waiting for capacity", "note": WAITING}
 
 
+def test_phase_before_the_first_report_is_stored_at_once(store, lease):
+    JobNotes(lease, store).add(LOST)
+    store.leases.release(lease)
+    again = claimed(store)
+    JobNotes(again, store).begin("reading the record")
+    assert progress_of(store, again) == {"phase": "reading the record"}
+
+
 def test_running_search_keeps_its_figures_and_the_message_for_a_while(store, lease, monkeypatch):
     notes, figures = JobNotes(lease, store), {"phase": "search", "generation": 7}
     store.leases.report(lease, ProgressReport(notes.complete(figures)))

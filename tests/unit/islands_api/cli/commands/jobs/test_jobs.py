@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from islands_api.cli.service import client_options
-from islands_service.domain.job import RUN_TIME, JobOutcome, JobState
+from islands_service.domain.job import BY_OWNER, RUN_TIME, JobOutcome, JobState
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
 from support.service import FIGURES, Service, ahead, kept, queued, spec
@@ -73,6 +73,14 @@ def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: s
         assert printed["id"] == job
     service.store.leases.finish(taken(service.store, job), FAILED)
     assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
+
+
+def test_search_of_a_running_job_is_stopped(run: Run, service: Service, owner: str) -> None:
+    job = ahead(service, owner, spec=spec(kept(service.store, owner)))
+    taken(service.store, job)
+    assert run("stop", job)[:2] == (0, f"job {job}: running\n")
+    assert service.store.jobs.get(owner, job).stop_requested
+    assert json.loads(run("stop", job, "--json")[1])["stop_requested"]
 
 
 @pytest.mark.ci
@@ -147,15 +155,19 @@ def test_watch_states_the_models_of_a_cancelled_job_and_how_to_get_them(
 
 
 @pytest.mark.ci
-def test_watch_states_that_a_job_at_its_limit_of_run_time_kept_its_models(
-    run: Run, found: JobOutcome, finish: Callable[[JobOutcome], str]
+@pytest.mark.parametrize(
+    ("ended_by", "words"),
+    [(RUN_TIME, "ended at its limit of run time"), (BY_OWNER, "was stopped by its owner")],
+)
+def test_watch_states_that_a_job_whose_search_ended_early_kept_its_models(
+    run: Run, found: JobOutcome, finish: Callable[[JobOutcome], str], ended_by: str, words: str
 ) -> None:
-    assert "limit of run time" not in run("watch", finish(found))[1]
-    job = finish(replace(found, summary={**(found.summary or {}), "ended_by": RUN_TIME}))
+    assert words not in run("watch", finish(found))[1]
+    job = finish(replace(found, summary={**(found.summary or {}), "ended_by": ended_by}))
     code, out, _ = run("watch", job)
     assert code == 0
     assert " ".join(out.split()).endswith(
-        f"The job ended at its limit of run time and kept the {len(found.models)} models found so far: "
+        f"The job {words} and kept the {len(found.models)} models found so far: "
         f"'islands jobs result {job} --out FOLDER' writes them to a folder."
     )
 

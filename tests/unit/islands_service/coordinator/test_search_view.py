@@ -1,0 +1,108 @@
+"""View of a running search: the front has at most one bounded entry per size, and migrations are named."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.history import HistoryPoint
+from islands.evolution.individual import Individual
+from islands.evolution.island import Island
+from islands.evolution.problem import Problem
+from islands.evolution.search_state import SearchState
+from islands.evolution.settings import Settings
+from islands.expressions.parsing import parse
+from islands.models.narx import canonical_order
+from islands.models.regressor import regressor
+from islands_service.coordinator.search_view import (
+    MAX_CHARACTERS,
+    MAX_ISLANDS,
+    MAX_MODELS,
+    SearchFront,
+    describe_migration,
+)
+
+RECORD = Dataset(u=np.zeros((9, 1)), y=np.zeros(9), dt=0.1, input_names=("u_V",), output_name="y_um")
+PROBLEM = Problem(RECORD, Settings())
+
+
+def individual(size: int, fitness: float) -> Individual:
+    terms = canonical_order(
+        found for lag in range(1, size + 1) if (found := regressor(parse(f"y(k-{lag})"))[1]) is not None
+    )
+    return Individual((), tuple(terms), (0.5,) * size, fitness)
+
+
+def searched(*islands: list[Individual], generation: int = 7) -> SearchState:
+    halls = [HallOfFame(tuple(sorted(each, key=lambda one: (one.size, one.fitness)))) for each in islands]
+    made = tuple(Island(at, 3, generation, (), (), hall) for at, hall in enumerate(halls))
+    best = {each.size: each.fitness for hall in halls for each in hall.entries}
+    return SearchState(Archipelago(made), history=(HistoryPoint(generation, 1, best, ()),))
+
+
+def shown(state: SearchState, problem: Problem = PROBLEM) -> list[dict[str, Any]]:
+    front = SearchFront()
+    front.begin(problem)
+    return front.update(state)
+
+
+def test_front_has_the_best_model_of_each_size_that_no_smaller_one_equals() -> None:
+    islands = [individual(1, 9.0), individual(2, 4.0)], [individual(2, 1.0), individual(3, 2.0)]
+    assert shown(searched(*islands)) == [
+        {"size": 1, "error": 3.0, "equation": "y_um(k) = 0.5*y_um(k-1)"},
+        {"size": 2, "error": 1.0, "equation": "y_um(k) = 0.5*y_um(k-1) + 0.5*y_um(k-2)"},
+    ]
+
+
+def test_size_of_a_front_is_bounded() -> None:
+    many = [individual(size, 1.0 / size) for size in range(1, 61)]
+    found = shown(searched(many))
+    assert (len(found), found[0]["size"], found[-1]["size"]) == (MAX_MODELS, 1, 60)
+    assert max(len(each["equation"]) for each in found) == MAX_CHARACTERS
+    assert found[-1]["equation"].endswith("…")
+    assert len(json.dumps(found)) < 7000
+
+
+def test_equation_in_deviations_names_the_offsets() -> None:
+    (found,) = shown(searched([individual(1, 1.0)]), replace(PROBLEM, offsets=(101300.0, 0.0)))
+    assert found["equation"] == "y_um(k) = 0.5*y_um(k-1), with y_um minus 101300"
+
+
+def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("islands_service.coordinator.search_view._FRONT_SHARE", 1e9)
+    front = SearchFront()
+    assert front.update(searched([individual(1, 1.0)])) == []
+    front.begin(PROBLEM)
+    first = front.update(searched([individual(1, 1.0)]))
+    assert front.update(searched([individual(1, 1.0)])) is first
+    assert front.update(searched([individual(1, 0.25)]))[0]["error"] == 0.5
+
+
+def migration(generation: int, islands: int = 3, **changes: Any) -> dict[str, Any] | None:
+    settings = Settings(**{"generations": 100, "islands": islands, "topology": "ring", **changes})
+    return describe_migration(searched(*[[]] * islands, generation=generation), settings, 3)
+
+
+def test_last_migration_names_the_sources_of_every_island() -> None:
+    assert migration(9, migrate_every=10) is None
+    for generation in (10, 15, 19):
+        assert migration(generation, migrate_every=10, migrants=2) == {
+            "generation": 10,
+            "emigrants": 2,
+            "sources": [[2], [0], [1]],
+        }
+
+
+@pytest.mark.parametrize(
+    ("islands", "changes"),
+    [(1, {}), (MAX_ISLANDS + 1, {}), (3, {"topology": "isolated"}), (3, {"migrants": 0})],
+)
+def test_without_migrations_or_with_many_islands_none_is_described(
+    islands: int, changes: dict[str, Any]
+) -> None:
+    assert migration(20, islands, **changes) is None
