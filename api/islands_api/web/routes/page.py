@@ -55,7 +55,6 @@ FILES = {
     "components/job_labels.js": _SCRIPT,
     "components/job_row.js": _SCRIPT,
     "components/job_selection.js": _SCRIPT,
-    "components/job_state.js": _SCRIPT,
     "components/job_words.js": _SCRIPT,
     "components/models.js": _SCRIPT,
     "components/monitoring/monitor_form.js": _SCRIPT,
