@@ -117,10 +117,10 @@ def test_a_failed_job_shows_its_problem(quiet: Callable[..., Screen], desk: Serv
     with stored(desk) as store:
         store.leases.finish(taken(store, job), JobOutcome(JobState.FAILED, problem=PROBLEM))
     page = quiet(desk.url).go(f"#/jobs/{job}")
-    expect(page.locator(".failure")).to_have_text("The job failed" + PROBLEM["detail"])
+    expect(page.locator(".failure")).to_contain_text("The job failed" + PROBLEM["detail"])
     assert page.locator(".failure b").count() == 0
     names = [each.text_content() for each in page.locator(".actions button:visible").all()]
-    assert names == ["Resume", "Delete"]
+    assert names == ["Delete"]
 
 
 @pytest.mark.ci

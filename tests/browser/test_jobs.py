@@ -59,7 +59,8 @@ def test_a_row_shows_the_equation_the_error_and_the_verdict(
     expect(found.locator(".verdict")).to_have_text("usable, with limits")
     assert found.locator("td.figure").all_text_contents()[:2] == ["3.14 %", "4"]
     about = found.locator(".about-job").text_content()
-    assert about.startswith("Identification · data.csv · u_V → y_um · seed 7")
+    assert about.startswith("Identification · data.csv · seed 7")
+    assert about.endswith("u_V → y_um")
     assert found.locator(".tag").all_text_contents() == ["cold"]
     assert not found.locator("progress").is_visible()
 
@@ -195,6 +196,24 @@ def test_a_search_is_in_the_address_and_keeps_the_focus(
     page.go_back()
     expect(row(page, found)).to_be_visible()
     assert shown(page) == [found]
+
+
+def test_the_list_is_sorted_by_error(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+    jobs = []
+    for error in (2.0, 0.5):
+        summary = {**SUMMARY, "metrics": {"mape": error}}
+        jobs.append(end(desk, desk.submit(500), document={}, summary=summary))
+    waiting = desk.submit(500)
+    page = quiet(desk.url).go()
+    expect(row(page, waiting)).to_be_visible()
+    assert shown(page) == [waiting, jobs[1], jobs[0]]
+    page.get_by_role("columnheader", name="Error").get_by_role("link").click()
+    expect(row(page, waiting)).to_have_count(0)
+    expect(row(page, jobs[0])).to_be_visible()
+    assert shown(page) == [jobs[1], jobs[0]]
+    expect(page.locator("[aria-sort=ascending]")).to_have_text("Error ↑")
+    page.get_by_role("link", name="Submitted").click()
+    expect(row(page, waiting)).to_be_visible()
 
 
 def test_selected_jobs_are_deleted_after_a_confirmation(

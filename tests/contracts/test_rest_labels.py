@@ -3,9 +3,9 @@
 import pytest
 
 from islands_api.web.routes import events
-from islands_service.domain.job import JobState
+from islands_service.domain.job import JobOutcome, JobState
 from support.service import held, kept, problem_of, queued, spec
-from support.stores import job_in
+from support.stores import claimed, job_in
 
 
 @pytest.fixture
@@ -99,6 +99,22 @@ def test_the_list_is_searched(service, order):
     assert ids(service, q="first second") == ids(service, q="f_rst") == []
     assert ids(service, tag="Rig 2", state="queued") == [first]
     assert ids(service, tag="Rig") == []
+
+
+def test_the_list_is_sorted_by_error(service):
+    jobs = []
+    for error in (2.0, 0.5, 1.0):
+        jobs.append(queued(service.store).id)
+        summary = {"metrics": {"mape": error}}
+        service.store.leases.finish(
+            claimed(service.store), JobOutcome(JobState.SUCCEEDED, {}, summary=summary)
+        )
+    queued(service.store)
+    ordered = [jobs[1], jobs[2], jobs[0]]
+    assert ids(service, sort="error") == ordered
+    first = service.client.get("/v1/jobs", params={"sort": "error", "limit": 2}).json()
+    assert ids(service, sort="error", cursor=first["next"]) == ordered[2:]
+    problem_of(service.client.get("/v1/jobs", params={"sort": "size"}), 422, "invalid-request")
 
 
 @pytest.mark.parametrize(

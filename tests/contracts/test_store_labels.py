@@ -115,6 +115,22 @@ def test_a_search_follows_the_labels_and_the_result(store):
     assert found(store, words=["after", "sin"]) == {job}
 
 
+def test_jobs_with_a_model_are_listed_by_its_error(store):
+    errors = [3.5, 0.25, float("inf"), 3.5, 12.0]
+    jobs = [ended(store, {"equation": "y", "metrics": {"mape": error}}, tags=("a",)) for error in errors]
+    ended(store, {"verdict": "nothing"})
+    submitted(store)
+    seen, after = [], None
+    while True:
+        page = store.jobs.page(ALICE, after=after, limit=1, by_error=True)
+        seen += [job.id for job in page.jobs]
+        if (after := page.after) is None:
+            break
+    assert seen == [jobs[1], *sorted([jobs[0], jobs[3]]), jobs[4]]
+    filtered = store.jobs.page(ALICE, tag="a", words=["y"], by_error=True)
+    assert [job.id for job in filtered.jobs] == seen
+
+
 def test_pages_of_a_search_hold_each_job_once(store):
     wanted = [submitted(store, tags=("a",) if number % 3 else ()).id for number in range(20)]
     seen, after = [], None

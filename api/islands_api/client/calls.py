@@ -154,6 +154,7 @@ def jobs(
     kind: str | None = None,
     tag: str | None = None,
     q: str | None = None,
+    sort: str | None = None,
 ) -> RequestSpec[JobPage]:
     """Return a page of jobs, newest first.
 
@@ -165,8 +166,11 @@ def jobs(
         ``next`` of the previous page.
     q : str, optional
         Words that a job has in its name, tags, name of the data set, equation or verdict, in any case.
+    sort : str, optional
+        ``"error"`` for the jobs with a model, least error first.
     """
-    given = {"state": state, "kind": kind, "tag": tag, "q": q, "cursor": cursor, "limit": limit}
+    filters = {"state": state, "kind": kind, "tag": tag, "q": q, "sort": sort}
+    given = {**filters, "cursor": cursor, "limit": limit}
     params = {key: value for key, value in given.items() if value is not None}
     return RequestSpec("GET", "/v1/jobs", read_as(JobPage), params=params)
 

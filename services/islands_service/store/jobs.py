@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, bindparam, insert, select, tuple_
+from sqlalchemy import Connection, Row, Select, bindparam, insert, select, tuple_
 
 from islands_service.domain.job import (
     ISLANDS_VERSION,
@@ -73,7 +73,7 @@ _INSERT_JOB = (
 
 @dataclass(frozen=True, slots=True)
 class JobRows:
-    """A page of jobs, newest first, and the position of the next page; None if this is the last one."""
+    """A page of jobs, in the order of the list, and the position of the next page; None on the last one."""
 
     jobs: tuple[Job, ...]
     after: tuple[float, str] | None
@@ -184,6 +184,7 @@ class Jobs:
         kind: str | None = None,
         tag: str | None = None,
         words: Sequence[str] = (),
+        by_error: bool = False,
     ) -> JobRows:
         """Return the jobs of an owner, or of all for None, newest first, that follow a position.
 
@@ -194,6 +195,8 @@ class Jobs:
         words : sequence of str
             Only jobs that have each of these words, or parts of words, in their name, tags, name of the data
             set, equation or verdict, in any case.
+        by_error : bool
+            Only jobs with a model, least error first.
         """
         query = select(jobs) if owner is None else select(jobs).where(jobs.c.owner == owner)
         if state is not None:
@@ -203,14 +206,13 @@ class Jobs:
         if tag is not None:
             query = query.where(has_tag(tag))
         query = query.where(*has_words(words))
-        if after is not None:
-            query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
-        query = query.order_by(jobs.c.created.desc(), jobs.c.id.desc()).limit(min(limit, MAX_PAGE_SIZE) + 1)
+        query = _order_by_error(query, after) if by_error else _order_by_age(query, after)
+        size = min(limit, MAX_PAGE_SIZE)
         with self._database.read() as connection:
-            found = [job_from_row(row) for row in connection.execute(query)]
-        more = len(found) > min(limit, MAX_PAGE_SIZE)
-        found = found[: min(limit, MAX_PAGE_SIZE)]
-        return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
+            rows = connection.execute(query.limit(size + 1)).all()
+        found, more = rows[:size], len(rows) > size
+        last = (found[-1].model_error if by_error else found[-1].created, found[-1].id) if more else None
+        return JobRows(tuple(job_from_row(row) for row in found), last)
 
     def label(
         self,
@@ -379,6 +381,19 @@ class Jobs:
         """Return statistics of the jobs of all owners."""
         with self._database.read() as connection:
             return read_queue_statistics(connection)
+
+
+def _order_by_age(query: Select[Any], after: tuple[float, str] | None) -> Select[Any]:
+    if after is not None:
+        query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
+    return query.order_by(jobs.c.created.desc(), jobs.c.id.desc())
+
+
+def _order_by_error(query: Select[Any], after: tuple[float, str] | None) -> Select[Any]:
+    query = query.where(jobs.c.model_error.is_not(None))
+    if after is not None:
+        query = query.where(tuple_(jobs.c.model_error, jobs.c.id) > tuple_(*after))
+    return query.order_by(jobs.c.model_error, jobs.c.id)
 
 
 def _find_dataset_name(connection: Connection, submission: Submission) -> str | None:

@@ -27,7 +27,7 @@ from islands_service.store.database import Database
 from islands_service.store.job_rows.job_claims import claim_job
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
 from islands_service.store.job_rows.job_results import store_result, to_text
-from islands_service.store.job_rows.job_search import describe_result
+from islands_service.store.job_rows.job_search import describe_result, find_error
 from islands_service.store.job_rows.queue_places import QueuePlace, find_places
 from islands_service.store.tables import events, jobs, points
 
@@ -235,6 +235,7 @@ class Leases:
                 checkpoint=None if outcome.state == JobState.SUCCEEDED else jobs.c.checkpoint,
                 summary=to_text(outcome.summary),
                 search_result=describe_result(outcome.summary),
+                model_error=find_error(outcome.summary),
                 problem=to_text(outcome.problem),
                 result_version=jobs.c.result_version if outcome.document is None else ISLANDS_VERSION,
             )

@@ -89,9 +89,21 @@ jobs = Table(
     # Text that a search reads, folded by `job_search`: of the labels, and of the result.
     Column("search_labels", Text, nullable=False, server_default=""),
     Column("search_result", Text, nullable=False, server_default=""),
+    # Mean absolute error of the recommended model, in per cent of the range of its output.
+    Column("model_error", Float),
     UniqueConstraint("owner", "idempotency_key"),
     Index(None, "owner", "created", "id"),
     Index(None, "owner", "state", "created", "id"),
+)
+
+#: Order of the jobs with a model by its error.
+Index(
+    "ix_jobs_model_error",
+    jobs.c.owner,
+    jobs.c.model_error,
+    jobs.c.id,
+    sqlite_where=jobs.c.model_error.is_not(None),
+    postgresql_where=jobs.c.model_error.is_not(None),
 )
 
 #: Owners with queued jobs, and the order of the jobs of each. The islands of running jobs are summed in it.

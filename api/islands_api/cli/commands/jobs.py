@@ -171,6 +171,10 @@ def list_jobs(
         str | None,
         typer.Option("--search", help="Words in the name, tags, data set, equation or verdict, in any case."),
     ] = None,
+    best: Annotated[
+        bool,
+        typer.Option("--best", help="List jobs with a model, least error first, instead of newest first."),
+    ] = False,
     limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of jobs to list.")] = 50,
     url: Url = LOCAL,
     key: ApiKey = None,
@@ -178,7 +182,7 @@ def list_jobs(
 ) -> None:
     """List the jobs, newest first."""
     with open_client(url, key) as client:
-        read_page = partial(client.jobs, state, kind=kind, tag=tag, q=search)
+        read_page = partial(client.jobs, state, kind=kind, tag=tag, q=search, sort="error" if best else None)
         views.show_jobs(read_pages(read_page, limit), as_json)
 
 

@@ -36,11 +36,12 @@ function listSettings({ settings = {}, preset = "auto", model = "narx", seed = 0
   ].filter(Boolean);
 }
 
-/** Describe a job by its kind, its data set unless it is called like it, its columns and its settings. */
+/** Describe a job by its kind, its data set unless it is called like it, its settings and its columns. */
 export function describeJob({ kind, name, dataset_name: dataset, spec }) {
   const inputs = [spec.inputs ?? spec.input ?? []].flat();
   const outputs = [spec.output ?? []].flat();
   const columns = inputs.length ? `${inputs.join(", ")} → ${outputs.join(", ")}` : null;
-  const parts = [KINDS[kind] ?? kind, dataset === name ? null : dataset, columns, ...listSettings(spec)];
+  const about = [KINDS[kind] ?? kind, dataset === name ? null : dataset];
+  const parts = [...about, ...listSettings(spec), columns];
   return parts.filter(Boolean).join(" · ");
 }

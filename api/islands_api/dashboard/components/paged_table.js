@@ -2,12 +2,15 @@
 
 import { el } from "../lib/dom.js";
 
+const makeHeading = ([content, kind, order]) =>
+  el("th", { scope: "col", class: kind, "aria-sort": order }, content);
+
 /**
  * Make a table.
  *
- * A heading is a text, or a text and a class. `makeRow(item)` returns `{node, show(item)}`;
- * `makeEmptyMessage()` the text of a page without items; `makeAddress(cursor)` the address of a page.
- * `show({items, next})` updates the table and the links to other pages.
+ * A heading is a text, or a content, a class and an order, `ascending` or `descending`. `makeRow(item)`
+ * returns `{node, show(item)}`; `makeEmptyMessage()` the text of a page without items; `makeAddress(cursor)`
+ * the address of a page. `show({items, next})` updates the table and the links to other pages.
  *
  * While `isHeld(table)` is true, rows are updated but none is added, removed or moved: the user is about to
  * click one. A button shows the new ones. `release()` lets the next update change the rows.
@@ -20,7 +23,7 @@ export function makePagedTable(options) {
     "table",
     { class: "listing" },
     el("caption", { class: "visually-hidden" }, caption),
-    el("thead", {}, el("tr", {}, heads.map(([name, kind]) => el("th", { scope: "col", class: kind }, name)))),
+    el("thead", {}, el("tr", {}, heads.map(makeHeading))),
     body,
   );
   const list = el("div", {}, el("p", { class: "loading" }, "Loading…"));

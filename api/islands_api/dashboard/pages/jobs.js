@@ -76,11 +76,11 @@ function makeWelcomeCard() {
 }
 
 function makeEmptyMessage(filters) {
-  const { state, cursor, kind, tag, q } = filters;
+  const { state, cursor, kind, tag, q, sort } = filters;
   if (!Object.values(filters).some(Boolean)) return makeWelcomeCard();
-  const isOnlyState = state && !kind && !tag && !q;
+  const isOnlyState = state && !kind && !tag && !q && !sort;
   let text = isOnlyState ? `No job is ${state}.` : "No job matches these filters.";
-  if (cursor) text = "No older jobs.";
+  if (cursor) text = "No further jobs.";
   return el("p", { class: "empty" }, text, " ", el("a", { href: "#/jobs" }, "Show all jobs"));
 }
 
@@ -88,6 +88,14 @@ function makeEmptyMessage(filters) {
 function isInUse(table, selection) {
   const isPointed = matchMedia("(hover: hover)").matches && table.querySelector("tbody:hover") !== null;
   return isPointed || table.querySelector("form") !== null || !selection.isEmpty();
+}
+
+/** Make the heading of a column by which the list can be sorted. */
+function makeSortHeading(name, sort, order, filters) {
+  const href = makeJobsAddress({ ...filters, sort, cursor: "" });
+  const isChosen = (filters.sort ?? "") === sort;
+  const arrow = order === "ascending" ? " ↑" : " ↓";
+  return [el("a", { href }, name, isChosen && arrow), "figure", isChosen ? order : null];
 }
 
 /** Show the list in a host until the signal aborts; `update(filters)` shows another part of it. */
@@ -102,16 +110,18 @@ export function mountJobs(host, firstFilters, signal) {
     wake();
   }
 
-  function showFilters({ state, kind, tag, q, cursor }) {
-    filters = { state, kind, tag, q, cursor };
+  function showFilters({ state, kind, tag, q, sort, cursor }) {
+    filters = { state, kind, tag, q, sort, cursor };
     bars.show(filters);
     selection = makeJobSelection({ refresh });
     table = makePagedTable({
-      caption: "Jobs, newest first",
+      caption: filters.sort ? "Jobs with a model, least error first" : "Jobs, newest first",
       headings: [
         [selection.all, "choice"],
         ...["State", "Job", "Result"],
-        ...["Error", "Terms", "Submitted"].map((name) => [name, "figure"]),
+        makeSortHeading("Error", "error", "ascending", filters),
+        ["Terms", "figure"],
+        makeSortHeading("Submitted", "", "descending", filters),
       ],
       makeRow: (job) => makeJobRow(job, selection),
       makeEmptyMessage: () => makeEmptyMessage(filters),

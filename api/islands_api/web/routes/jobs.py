@@ -108,6 +108,14 @@ async def jobs(
             "the data set, equation or verdict, in any case.",
         ),
     ] = "",
+    sort: Annotated[
+        str,
+        Query(
+            pattern="^(created|error)$",
+            description="`created`: newest first. `error`: only jobs with a model, by its mean error in "
+            "per cent of the range of the output, least first.",
+        ),
+    ] = "created",
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:
@@ -115,7 +123,7 @@ async def jobs(
     words = q.split()
     if len(words) > _MAX_WORDS:
         raise SettingsError(f"q has {len(words)} words, and {_MAX_WORDS} is the most: take fewer")
-    read_page = partial(state.store.jobs.page, kind=kind, tag=tag, words=words)
+    read_page = partial(state.store.jobs.page, kind=kind, tag=tag, words=words, by_error=sort == "error")
     page = await state.run_blocking(read_page, caller.owner, job_state, decode_cursor(cursor), limit)
     items = await describe_jobs(state, page.jobs)
     return JSONDocument({"items": items, "next": encode_cursor(page.after)})

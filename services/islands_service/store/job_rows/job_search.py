@@ -1,9 +1,10 @@
-"""Search in the jobs of an owner: by tag, and by words of the labels and of the result.
+"""Search in the jobs of an owner: by tag, by words of the labels and of the result, and by error.
 
 The texts are folded by Python, since the databases fold only ASCII (SQLite) or by their locale (PostgreSQL).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from typing import Any
 from unicodedata import normalize
 
@@ -42,6 +43,12 @@ def describe_result(summary: Mapping[str, Any] | None) -> str:
     entries = [(summary or {}).get(name) for name in _RESULT]
     texts = [each for entry in entries for each in (entry if isinstance(entry, list) else [entry])]
     return fold("\n".join(str(text) for text in texts if text))
+
+
+def find_error(summary: Mapping[str, Any] | None) -> float | None:
+    """Return the error of the recommended model in per cent of the range of its output; None without one."""
+    error = ((summary or {}).get("metrics") or {}).get("mape")
+    return error if isinstance(error, float) and isfinite(error) else None
 
 
 def has_tag(tag: str) -> ColumnElement[bool]:

@@ -31,6 +31,11 @@ ASKED = {
     "page of a kind": (lambda store: store.jobs.page(ALICE, kind="discrepancy"), "ix_jobs_owner_created_id"),
     "page of a tag": (lambda store: store.jobs.page(ALICE, tag="rig 2"), "ix_jobs_owner_created_id"),
     "page of words": (lambda store: store.jobs.page(ALICE, words=["no", "such"]), "ix_jobs_owner_created_id"),
+    "page by error": (lambda store: store.jobs.page(ALICE, by_error=True), "ix_jobs_model_error"),
+    "next by error": (
+        lambda store: store.jobs.page(ALICE, None, (5.0, "f"), by_error=True),
+        "ix_jobs_model_error",
+    ),
     "events": (lambda store: store.jobs.events("0" * 32, 3), "sqlite_autoindex_events_1"),
     "versions": (lambda store: store.jobs.versions(["0" * 32] * 50), "sqlite_autoindex_jobs_1"),
     "history": (lambda store: store.results.history("0" * 32, 3), "sqlite_autoindex_points_1"),
@@ -120,7 +125,7 @@ def test_frequent_query_reads_its_intended_index(sqlite, ask):
     "ask",
     [
         *("page", "next page", "page of a state", "next of a state", "page of a kind", "page of a tag"),
-        *("page of words", "events", "history"),
+        *("page of words", "page by error", "next by error", "events", "history"),
     ],
 )
 def test_ordered_query_needs_no_sort(sqlite, ask):

@@ -192,7 +192,8 @@ def test_islands_of_earlier_jobs_are_those_of_their_specification(empty_database
 
 
 def test_jobs_of_an_earlier_release_are_found_by_a_search(empty_database):
-    summary = {"equation": "y(k) = 0.9 y(k-1) + tanh(u(k-1))", "words": "As a simulation: good."}
+    equation = "y(k) = 0.9 y(k-1) + tanh(u(k-1))"
+    summary = {"equation": equation, "words": "As a simulation: good.", "metrics": {"mape": 1.5}}
     database = Database(empty_database)
     with database.exclusive() as connection:
         upgrade(connection, "0010")
@@ -216,6 +217,7 @@ def test_jobs_of_an_earlier_release_are_found_by_a_search(empty_database):
             (found,) = store.jobs.page(ALICE, words=words).jobs
             assert (found.dataset_name, found.tags) == ("Piezo.csv", ())
         assert store.jobs.page(ALICE, words=["simulation"]).jobs == ()
+        assert store.jobs.page(ALICE, by_error=True).jobs == (found,)
 
 
 def test_records_of_a_monitor_are_moved_to_rows(empty_database):
