@@ -22,6 +22,9 @@ _FULL_INNOVATION = 0.3
 #: Confidence, at most: the resamples of one record agree more often than records do.
 _MOST_CONFIDENCE = 0.99
 
+#: Confidence from which on the value is stated without reservation.
+_LEAST_CONFIDENCE = 0.5
+
 
 def estimate_dead_time(record: Dataset, place: int) -> Fact:
     """Estimate how many samples after an input the output begins to respond.
@@ -53,14 +56,19 @@ def estimate_dead_time(record: Dataset, place: int) -> Fact:
     interval = (float(min(value, max(0, floor(first)))), float(max(value, ceil(last))))
     right = float(np.mean(np.abs(onset.resampled - value) <= 1.0))
     right = min(right * min(1.0, onset.innovation / _FULL_INNOVATION), _MOST_CONFIDENCE)
-    after = f"after {_count(value)} ({value * record.dt:.4g} s)" if value else "within the sample"
-    low, high = map(int, interval)
-    between = f", between {low} and {_count(high)} with a probability of 95 %" if low < high else ""
-    sentence = (
-        f"{record.output_name} responds to {name} {after}{between}; right within one sample with a "
-        f"probability of {100 * right:.0f} %."
-    )
+    response = f"{record.output_name} responds to {name}"
+    sentence = _describe(response, value, record.dt, (int(interval[0]), int(interval[1])), right)
     return Fact("dead-time", name, float(value), "samples", interval, right, sentence)
+
+
+def _describe(response: str, value: int, dt: float, interval: tuple[int, int], right: float) -> str:
+    low, high = interval
+    after = f"after {_count(value)} ({value * dt:.4g} s)" if value else "within the sample"
+    between = f"between {low} and {_count(high)} with a probability of 95 %" if low < high else ""
+    chance = f"right within one sample with a probability of {100 * right:.0f} %."
+    if right < _LEAST_CONFIDENCE and between:
+        return f"It is uncertain when {response}: {between}; the estimate, {after}, is {chance}"
+    return f"{response} {', '.join(filter(None, (after, between)))}; {chance}"
 
 
 def _count(samples: int) -> str:

@@ -111,3 +111,11 @@ def test_sentence_states_samples_seconds_and_range():
     low, high = fact.interval
     assert low < high
     assert f"between {low:.0f} and {high:.0f} samples with a probability of 95 %" in fact.sentence
+
+
+def test_a_value_that_is_probably_wrong_is_not_stated_as_one():
+    """The turning points of a slow sine tell little about a dead time."""
+    u = np.sin(2 * np.pi * np.arange(2000) / 200) * np.repeat([1.0, 0.6, 0.9, 0.4], 500)
+    fact = estimate_dead_time(measure(u, np.tanh(delay(lag(u, 20.0), 3)), 0.02), 0)
+    assert fact.confidence < 0.5
+    assert fact.sentence.startswith("It is uncertain when y responds to u")
