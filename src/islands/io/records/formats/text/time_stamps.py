@@ -148,7 +148,10 @@ def _match(text: str, name: str, sample: int, rows: RowRange) -> re.Match[str]:
 def _is_day_first(
     matches: Sequence[re.Match[str] | None], name: str, rows: RowRange, order: str | None
 ) -> bool:
-    """Return whether the day precedes the month in dates such as 3/4/2026. A point always follows a day."""
+    """Return whether the day precedes the month in dates such as 3/4/2026. A point always follows a day.
+
+    If no day exceeds 12, it is the order with which the time goes on at midnight, in a record without gaps.
+    """
     if order is not None:
         return order == "day-first"
     dates: dict[tuple[str, str, str], int] = {}
@@ -164,6 +167,9 @@ def _is_day_first(
         )
     # The order does not affect elapsed times within a day, or if day and month are equal.
     if day_first is None and month_first is None and len(dates) > 1:
+        continuous = [order for order in (True, False) if _is_continuous(matches, order)]
+        if len(continuous) == 1:
+            return continuous[0]
         one, two, year = next(iter(dates))
         raise RecordError(
             f"{rows.place(next(iter(dates.values())), name)}: {one}/{two}/{year} may be the day {one} "
@@ -172,6 +178,22 @@ def _is_day_first(
             f"or {name_option('dates', 'month-first')}"
         )
     return month_first is None
+
+
+def _is_continuous(matches: Sequence[re.Match[str] | None], day_first: bool) -> bool:
+    """Return whether the time goes on with about its usual step wherever the date changes.
+
+    Most steps have to be within a day: dates alone may be days as well as first days of months.
+    """
+    known = [match for match in matches if match is not None]
+    try:
+        days = np.array([_date_of(match, day_first) for match in known])
+        moments = np.array([_to_moment(match, day_first, None, None) for match in known])
+    except ValueError:
+        return False
+    steps, changes = np.abs(np.diff(moments)), np.diff(days) != 0
+    usual = np.median(steps)
+    return bool(2 * changes.sum() <= steps.size and usual > 0 and steps[changes].max() <= 2 * usual)
 
 
 def _to_moment(match: re.Match[str], day_first: bool, zone: ZoneInfo | None, before: int | None) -> int:
