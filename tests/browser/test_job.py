@@ -19,7 +19,7 @@ PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7
 
 def legend(page: Any) -> list[float]:
     """Return the values of the chart of the islands with full precision."""
-    chart = page.locator("figure.chart").first
+    chart = page.locator(".convergence figure.chart").first
     return [float(each) for each in chart.locator("data").evaluate_all("all => all.map((one) => one.value)")]
 
 
@@ -40,16 +40,15 @@ def test_the_convergence_chart_grows_with_the_events(
         for first, last in ((0, 40), (41, 90), (91, 200)):
             advance(store, lease, first, last)
             expect(page.locator(".status .progress-text")).to_have_text(f"{last} / 500")
-            expect(page.locator("figure.chart .position").first).to_have_text(f"generation {last}")
+            expect(page.locator(".convergence figure.chart .position").first).to_have_text(
+                f"generation {last}"
+            )
             assert legend(page) == pytest.approx(island_errors(last))
     # It is counted down.
     expect(page.get_by_text(re.compile(r"about [56]\.\d s"))).to_be_visible()
-    lines = page.locator("figure.chart").first.locator("path.line[data-name]")
+    lines = page.locator(".convergence figure.chart").first.locator("path.line[data-name]")
     # One point for each reported generation.
     assert [line.get_attribute("d").count("L") for line in lines.all()] == [200, 200]
-    sizes = page.locator("figure.chart").last
-    expect(sizes.locator("circle.line")).to_have_count(5)
-    expect(sizes.locator(".position")).to_have_text("terms 5")
 
 
 @pytest.mark.ci
@@ -237,11 +236,11 @@ def test_a_reload_keeps_the_scroll_position(quiet: Callable[..., Screen], desk: 
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 30)
     page = quiet(desk.url, height=500).go(f"#/jobs/{job}")
-    expect(page.locator("figure.chart").first).to_be_visible()
+    expect(page.locator(".convergence figure.chart").first).to_be_visible()
     page.locator("table code", has_text="y_um").wait_for()
     page.evaluate("scrollTo(0, 320)")
     page.reload()
-    expect(page.locator("figure.chart").first).to_be_visible()
+    expect(page.locator(".convergence figure.chart").first).to_be_visible()
     # The security policy forbids evaluating text, so `wait_for_function` of playwright does not work.
     eventually(lambda: page.evaluate("scrollY") == 320)
     assert page.url.endswith(f"#/jobs/{job}")
@@ -255,7 +254,7 @@ def test_every_island_has_a_line_for_any_number_of_islands(
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 30, islands=20)
     page = quiet(desk.url).go(f"#/jobs/{job}")
-    chart = page.locator("figure.chart").first
+    chart = page.locator(".convergence figure.chart").first
     expect(chart.locator("path.faint")).to_have_count(20)
     expect(chart.locator(".legend li")).to_have_count(2)
     assert legend(page) == pytest.approx([island_errors(30, 20)[0], island_errors(30, 20)[19]])

@@ -79,12 +79,12 @@ def test_the_page_of_a_job_continues_after_a_broken_stream(
         expect(page.locator(".status .progress-text")).to_have_text("140 / 500")
         expect(page.locator(".banner")).to_have_count(0)
         advance(store, lease, 141, 150)
-        expect(page.locator("figure.chart .position").first).to_have_text("generation 150")
+        expect(page.locator(".convergence figure.chart .position").first).to_have_text("generation 150")
     assert int(resumed[0]) < seen
     assert set(resumed[1:]) == {str(seen)}
-    line = page.locator("figure.chart").first.locator("path.line[data-name]").first
+    line = page.locator(".convergence figure.chart").first.locator("path.line[data-name]").first
     assert line.get_attribute("d").count("L") == 150
-    shown = page.locator("figure.chart data").first.get_attribute("value")
+    shown = page.locator(".convergence figure.chart data").first.get_attribute("value")
     assert float(shown) == pytest.approx(squared_error(150, 0) ** 0.5)
 
 

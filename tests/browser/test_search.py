@@ -48,11 +48,11 @@ def test_a_running_search_is_cancelled_from_the_page(
     job = service.submit(1_000_000)
     page = opened(f"#/jobs/{job}")
     expect(page.locator(".title .state")).to_have_text("running")
-    expect(page.locator("figure.chart").first).to_be_visible(timeout=60_000)
-    expect(page.locator("figure.chart .position").first).not_to_have_text("generation 0")
+    expect(page.locator(".convergence figure.chart").first).to_be_visible(timeout=60_000)
+    expect(page.locator(".convergence figure.chart .position").first).not_to_have_text("generation 0")
     page.get_by_role("button", name="Cancel").click()
     expect(page.locator(".title .state")).to_have_text("cancelled", timeout=60_000)
     assert service.job(job)["state"] == "cancelled"
     reached = int(service.job(job)["progress"]["generation"])
-    shown = page.locator("figure.chart .position").first.text_content().split()[-1]
+    shown = page.locator(".convergence figure.chart .position").first.text_content().split()[-1]
     assert 0 < int(shown) <= reached

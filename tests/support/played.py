@@ -35,6 +35,14 @@ def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2)
         )
         for at in range(first, last + 1)
     )
+    front = [
+        {
+            "size": size,
+            "error": sqrt(squared_error(last, 0) * 2 ** (5 - size)),
+            "equation": "y_um(k) = " + " + ".join(f"{last}*y_um(k-{lag})" for lag in range(1, size + 1)),
+        }
+        for size in range(1, 6)
+    ]
     progress: dict[str, Any] = {
         "phase": "search",
         "generation": last,
@@ -43,7 +51,11 @@ def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2)
         "evaluations_per_second": 3000.0,
         "seconds_left": (GENERATIONS - last) / 50,
         "best_error": sqrt(squared_error(last, 0)),
-        "best_by_size": {"5": sqrt(squared_error(last, 0))},
+        "best_by_size": {each["size"]: each["error"] for each in front},
+        "front": front,
         "islands": [sqrt(squared_error(last, island)) for island in range(islands)],
     }
+    if last > 0 and islands > 1:
+        sources = [[(island - 1) % islands] for island in range(islands)]
+        progress["migration"] = {"generation": last, "emigrants": 1, "sources": sources}
     store.leases.report(lease, ProgressReport(progress, points, after=first - 1))

@@ -1,9 +1,10 @@
-/** Convergence of a search: the error of each island by generation, and the best error of each model size. */
+/** Convergence of a search: the error of each island by generation, and the last migration. */
 
 import { getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
 import { poll } from "../lib/polling.js";
 import { COLOURS, makeLineChart } from "./chart.js";
+import { makeIslandMap } from "./island_map.js";
 
 /** Maximum number of points kept; beyond it every other point is dropped. A screen shows no more. */
 const MAX_POINTS = 4000;
@@ -33,12 +34,6 @@ export function makeIslandSeries(points) {
   return [...series, makeEnvelope("best", Math.min), makeEnvelope("worst", Math.max)];
 }
 
-/** Make the series of the best error of each model size at the end of a history. */
-export function makeSizeSeries(points) {
-  const best = Object.entries(points.at(-1)?.best ?? {}).map(([size, error]) => [Number(size), toRms(error)]);
-  return [{ name: "best so far", points: best.sort(([a], [b]) => a - b) }];
-}
-
 /** Return every other point and the last one. */
 export const halve = (points) => points.filter((_, at) => at % 2 === 0 || at === points.length - 1);
 
@@ -50,12 +45,7 @@ export function makeConvergencePanel(id, unit, signal) {
     x: { label: "generation", integer: true },
     y: { label, log: true },
   });
-  const sizes = makeLineChart({
-    title: "Best error by number of terms",
-    x: { label: "terms", integer: true },
-    y: { label, log: true },
-    marks: true,
-  });
+  const map = makeIslandMap(unit);
   const placeholder = el("p", { class: "soft" }, "There are no data before the first generation.");
   let points = [];
   let targetGeneration = -1;
@@ -70,7 +60,6 @@ export function makeConvergencePanel(id, unit, signal) {
       while (points.length > MAX_POINTS) points = halve(points);
       placeholder.hidden = true;
       islands.draw(makeIslandSeries(points));
-      sizes.draw(makeSizeSeries(points));
     }
     return REFRESH_SECONDS;
   }
@@ -81,9 +70,10 @@ export function makeConvergencePanel(id, unit, signal) {
       { class: "card" },
       el("h2", {}, "Convergence of the search"),
       placeholder,
-      el("div", { class: "convergence" }, islands.node, sizes.node),
+      el("div", { class: "convergence" }, islands.node, map.node),
     ),
     advance(job) {
+      map.show(job.progress ?? {});
       targetGeneration = job.progress?.generation ?? -1;
       if (targetGeneration < 0) return;
       if (loadNow === null) loadNow = poll(load, signal);

@@ -1,6 +1,7 @@
 /** Equations: the MathML of the service, copied element by element so that only mathematics is inserted. */
 
 import { getText } from "../lib/api.js";
+import { el } from "../lib/dom.js";
 
 const MATHML = "http://www.w3.org/1998/Math/MathML";
 
@@ -40,6 +41,10 @@ export function parseMath(source) {
     throw new Error("the equation is not MathML");
   return equations.map(copyMath);
 }
+
+/** Make a plain equation whose lines break between factors only. */
+export const makeLine = (equation) =>
+  equation.split(/(?<=\*| [+-] |= )/).map((part) => el("span", {}, part));
 
 /** Load the equations of a model. */
 export async function loadEquations(model, signal) {

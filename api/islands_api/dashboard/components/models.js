@@ -7,6 +7,7 @@ import { poll } from "../lib/polling.js";
 import { showProblem } from "./banner.js";
 import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
+import { makeModelFront } from "./model_front.js";
 import { makeReportButtons } from "./report.js";
 
 /** Display names of the export formats. */
@@ -244,10 +245,10 @@ export function makeSentences(job) {
 }
 
 /** Make the panel of the models; `select(rank)` shows a model, the recommended one for null. */
-export function makeModelsPanel(job, rank, signal) {
+export function makeModelsPanel(job, rank, unit, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   const article = el("article", { class: "model", "aria-labelledby": "model" });
-  let models = [];
+  let [models, front] = [[], null];
   let controller = new AbortController();
 
   function select(newRank) {
@@ -257,6 +258,7 @@ export function makeModelsPanel(job, rank, signal) {
     controller.abort();
     controller = new AbortController();
     article.dataset.rank = model.rank;
+    front.show(model);
     const shown = AbortSignal.any([signal, controller.signal]);
     article.replaceChildren(...makeDetail(job.id, model, claimHysteresis(models), shown));
     for (const link of body.querySelectorAll("table.models a")) {
@@ -276,9 +278,10 @@ export function makeModelsPanel(job, rank, signal) {
         + "not an independent test.",
     );
     const overview = makeScrollable("Models", makeModelTable(job.id, models));
+    front = makeModelFront(job, models, unit);
     const islands = job.progress?.islands?.length ?? 0;
     const figures = makeSearchFigures(job.id, islands, signal);
-    body.replaceChildren(makeSentences(job), overview, note, article, figures);
+    body.replaceChildren(makeSentences(job), front.node, overview, note, article, figures);
     select(rank);
     return Infinity;
   }, signal);

@@ -45,6 +45,9 @@ export function formatInterval(value, half) {
 export const formatCount = (value) =>
   Number.isFinite(value) ? Math.round(value).toLocaleString("en").replaceAll(",", "\u202f") : NONE;
 
+/** Format the size of a model. */
+export const formatTerms = (size) => (size === 1 ? "1 term" : `${size} terms`);
+
 /** Format a value in per cent. */
 export const formatPercent = (value, digits = 3) =>
   Number.isFinite(value) ? `${formatNumber(value, digits)} %` : NONE;

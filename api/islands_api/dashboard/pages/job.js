@@ -16,6 +16,8 @@ import {
   makeBadge,
   makeProgressBar,
 } from "../components/job_state.js";
+import { makePhasePanel } from "../components/job_phase.js";
+import { makeLivePanel } from "../components/live_search.js";
 import { makeModelsPanel } from "../components/models.js";
 import { makeResultCard } from "../components/result_card.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
@@ -35,8 +37,21 @@ async function deleteJob(job) {
   return null;
 }
 
+/** Return whether the search of a job can end early with its best models. */
+const canStop = (job) =>
+  job.state === "running" && isSearch(job) && (job.spec.model ?? "narx") === "narx"
+  && !job.cancel_requested && !job.stop_requested;
+
+/** Return whether a search is about to end early: its time left does not count then. */
+const isStopping = ({ stop_requested: stopped, progress }) => stopped && progress?.phase === "search";
+
 /** Actions on a job: name, condition and function, which returns the changed job or null. */
 const ACTIONS = [
+  {
+    name: "Stop and keep the best",
+    when: (job) => canStop(job),
+    act: (job) => getJson(`${getPath(job.id)}/stop`, { method: "POST" }),
+  },
   {
     name: "Cancel",
     when: (job) => !isEnded(job) && !job.cancel_requested,
@@ -117,12 +132,12 @@ function makeJobFacts(job, unit) {
     ["Best error", bestError],
     ["Evaluations", progress.evaluations === undefined ? null : formatCount(progress.evaluations)],
     ["Per second", running && rate ? formatCount(rate) : null],
-    ["Time left", running && Number.isFinite(left) ? makeCountdown(left) : null],
+    ["Time left", running && Number.isFinite(left) && !isStopping(job) ? makeCountdown(left) : null],
     ["Run time", formatRunTime(job)],
     ["Note", running && progress.note ? progress.note : null],
     ["Warning", progress.warnings?.join("; ")],
     ["Duration", job.finished && job.started ? formatDuration(getSeconds(job)) : null],
-    ["Stopped by", job.summary?.ended_by],
+    ["Ended by", job.summary?.ended_by],
     ["Attempt", job.attempt > 1 ? String(job.attempt) : null],
     ["Priority", job.priority ? String(job.priority) : null],
     ["Submitted", makeAge(job.created)],
@@ -137,6 +152,7 @@ export function mountJob(host, { id, rank }, signal) {
   const heading = el("h1", { tabindex: "-1" }, name);
   const state = makeBadge();
   const bar = makeProgressBar();
+  const phase = makePhasePanel();
   const factsHost = el("div");
   const failureHost = el("div");
   const [resultHost, convergenceHost, modelsHost] = [el("div", { class: "stack" }), el("div"), el("div")];
@@ -150,7 +166,7 @@ export function mountJob(host, { id, rank }, signal) {
     el("div", { class: "title" }, heading, rename.node, state.node, tags.node),
     el("code", { class: "soft small" }, id),
   );
-  let [current, unit, convergence, models] = [null, null, null, null];
+  let [current, unit, convergence, live, models] = [null, null, null, null, null];
 
   function build(job) {
     const onUnitKnown = (value) => {
@@ -158,7 +174,8 @@ export function mountJob(host, { id, rank }, signal) {
       // The errors of several outputs have no common scale.
       if (!isSearch(job) || hasSeveralOutputs(job)) return;
       convergence = makeConvergencePanel(id, unit, signal);
-      convergenceHost.replaceChildren(convergence.node);
+      live = makeLivePanel(unit);
+      convergenceHost.replaceChildren(live.node, convergence.node);
       if (current) show(current);
     };
     aboutHost.replaceChildren(makeSettingsPanel(job.spec), makeDatasetPanel(job.spec, onUnitKnown, signal));
@@ -167,7 +184,7 @@ export function mountJob(host, { id, rank }, signal) {
       titleBar,
       buttons.node,
       resultHost,
-      el("section", { class: "card status", "aria-label": "Progress" }, bar.node, factsHost),
+      el("section", { class: "card status", "aria-label": "Progress" }, phase.node, bar.node, factsHost),
       failureHost,
       convergenceHost,
       modelsHost,
@@ -185,21 +202,23 @@ export function mountJob(host, { id, rank }, signal) {
     tags.show(job);
     state.show(job);
     bar.show(job);
+    phase.show(job);
     buttons.show(job);
     factsHost.replaceChildren(makeJobFacts(job, unit ?? ""));
     showResult(job);
     failureHost.replaceChildren(...[makeFailureCard(job)].filter(Boolean));
     convergence?.advance(job);
+    live?.show(job);
     if (!isSearch(job)) {
       // Not replaced if present: a button in it may have the focus.
       const succeeded = job.state === "succeeded";
       const findingsHost = isDiagnosis(job) ? resultHost : modelsHost;
       if (succeeded !== findingsHost.hasChildNodes())
         findingsHost.replaceChildren(...(succeeded ? makeFindingsPanels(job, signal) : []));
-    } else if (job.state === "succeeded" && models === null) {
+    } else if (job.state === "succeeded" && models === null && (unit !== null || hasSeveralOutputs(job))) {
       models = hasSeveralOutputs(job)
         ? makeCoupledPanel(job, signal)
-        : makeModelsPanel(job, rank, signal);
+        : makeModelsPanel(job, rank, unit, signal);
       modelsHost.replaceChildren(models.node);
     }
   }

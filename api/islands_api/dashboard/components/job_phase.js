@@ -1,0 +1,125 @@
+/** What a job does now, in words: the stages of its kind, and a sentence about the present step. */
+
+import { announce, el, setText } from "../lib/dom.js";
+import { formatCount } from "../lib/numbers.js";
+import { getIsolatedName, isEnded } from "./job_state.js";
+import { isDiagnosis, isSearch } from "./diagnosis.js";
+
+/** Stages of a search, each with the beginnings of its phases. */
+const SEARCH = [
+  ["Record", ["loading", "reading"]],
+  ["Preset", ["preset auto"]],
+  ["First models", ["sampling rate", "forward selection", "swap search"]],
+  ["Search", ["search", "starting", "waiting"]],
+  ["Final models", ["estimation", "choice of the equations", "refinement"]],
+  ["Validation", ["assessment", "prediction bands"]],
+  ["Result", ["storing"]],
+];
+
+const CLASS_FIT = SEARCH.filter(([name]) => !["Preset", "First models", "Search", "Result"].includes(name));
+
+/** Stages of a diagnosis; its analysis has many phases. */
+const DIAGNOSIS = [
+  ["Record", ["loading", "reading", "starting"]],
+  ["Calibration", ["calibrating", "looking for gross errors"]],
+  ["Causes", [""]],
+  ["Formula", ["a formula"]],
+  ["Report", ["writing the report"]],
+];
+
+/** Sentences about phases, by their beginnings; `rest` is what follows in the phase. */
+const SENTENCES = [
+  ["loading the library", () => "Loads the library and its compiled functions."],
+  ["reading the record", () => "Reads the record."],
+  ["preset auto: trial of ", (rest) => `Chooses the preset: trial of ${rest} models.`],
+  ["preset auto: dead times", () => "Chooses the preset: estimates dead times."],
+  ["preset auto: fit of ", (rest) => `Chooses the preset: fits ${rest} models.`],
+  ["sampling rate and", () => "Chooses the sampling rate, and inputs that act within a sample."],
+  ["forward selection among ", (rest) => `Selects the first models: forward selection among ${rest}.`],
+  ["swap search among ", (rest) => `Selects the first models: swap search among ${rest}.`],
+  ["starting", () => "Starts the processes of the islands."],
+  ["estimation of the final models of ", (rest) => `Estimates the final models: ${rest}.`],
+  ["estimation from ", (rest) => `Estimates the model from ${rest}.`],
+  ["assessment of ", (rest) => `Validates ${rest}.`],
+  ["prediction bands", () => "Calculates the prediction bands."],
+  ["storing the result", () => "Stores the result."],
+];
+
+const capitalise = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
+
+/** Split the phase of a search of several outputs: the beginning names the output. */
+function splitPhase({ spec, progress }) {
+  const phase = progress?.phase ?? "";
+  const outputs = Array.isArray(spec.output) ? spec.output : [];
+  const output = outputs.find((name) => phase.startsWith(`${name}: `));
+  return output === undefined ? ["", phase] : [output, phase.slice(output.length + 2)];
+}
+
+function describeSearch({ generation, generations, islands = [] }) {
+  const where = islands.length > 1 ? ` on ${formatCount(islands.length)} islands` : "";
+  const reached =
+    generation === undefined ? "" : `: generation ${formatCount(generation)} of ${formatCount(generations)}`;
+  return `Evolves equations${where}${reached}.`;
+}
+
+/** Describe what a running job does now. */
+export function describePhase(job) {
+  const [output, phase] = splitPhase(job);
+  const found = SENTENCES.find(([beginning]) => phase.startsWith(beginning));
+  let sentence = "Starts.";
+  if (phase === "search") sentence = describeSearch(job.progress);
+  else if (found) sentence = found[1](phase.slice(found[0].length));
+  else if (phase) sentence = `${capitalise(job.progress.note ?? phase)}.`;
+  const stopped = job.stop_requested ? " The search ends with its best models." : "";
+  return `${output ? `${output}: ` : ""}${sentence}${stopped}`;
+}
+
+/** Return the stages of a job; a given preset is not chosen, and a class of models is only fitted. */
+function getStages({ kind, spec }) {
+  if (isDiagnosis({ kind })) return DIAGNOSIS;
+  if ((spec.model ?? "narx") !== "narx") return CLASS_FIT;
+  return (spec.preset ?? "auto") === "auto" ? SEARCH : SEARCH.filter(([name]) => name !== "Preset");
+}
+
+/** Return the position of the present stage; the one with the longest beginning of the phase. */
+function findStage(stages, phase) {
+  const fits = stages.map(([, beginnings]) =>
+    Math.max(-1, ...beginnings.filter((each) => phase.startsWith(each)).map((each) => each.length)));
+  const best = Math.max(...fits);
+  return best < 0 ? 0 : fits.indexOf(best);
+}
+
+/** Make the stages and the sentence of a running job; `show(job)` updates them. */
+export function makePhasePanel() {
+  const list = el("ol", { class: "stages", "aria-label": "Stages of the job" });
+  const sentence = el("p", { class: "doing" });
+  const node = el("div", { class: "phase", hidden: true }, list, sentence);
+  let shown = null;
+  function showStages(job, stages) {
+    const at = findStage(stages, splitPhase(job)[1]);
+    const name = stages[at][0];
+    if (shown === name) return;
+    if (shown !== null) announce(`${getIsolatedName(job)}: ${describePhase(job)}`);
+    shown = name;
+    list.replaceChildren(
+      ...stages.map(([each], place) =>
+        el(
+          "li",
+          { class: place < at ? "done" : null, "aria-current": place === at ? "step" : null },
+          each,
+          place < at ? el("span", { class: "visually-hidden" }, " (done)") : null,
+        )),
+    );
+  }
+  return {
+    node,
+    show(job) {
+      const known = isSearch(job) || isDiagnosis(job);
+      node.hidden = job.state !== "running" || !known;
+      if (isEnded(job)) shown = null;
+      if (node.hidden) return;
+      showStages(job, getStages(job));
+      setText(sentence, describePhase(job));
+    },
+  };
+}

@@ -1,0 +1,120 @@
+"""Page of a running search: its phase in words, the front with equations, and a stop that keeps models."""
+
+from collections.abc import Callable, Iterator
+from threading import Thread
+from typing import Any
+
+import pytest
+
+from islands_service.domain.job import ProgressReport
+from islands_service.liveness import StopRequest
+from islands_service.settings import ServiceSettings
+from support.coordinators import SerialCoordinator
+from support.played import advance, stored
+from support.screen import Screen
+from support.service_processes import Service
+from support.stores import taken
+
+
+@pytest.fixture(scope="module")
+def service(guarded: Callable[..., Any]) -> Iterator[Service]:
+    """A service whose searches run in this process, without Ray."""
+    stopping = StopRequest()
+    with guarded("--coordinators", 0) as running:
+        settings = ServiceSettings(data_dir=running.folder)
+        thread = Thread(target=SerialCoordinator(settings, "me", stopping).run)
+        thread.start()
+        yield running
+        stopping.request()
+        thread.join(30.0)
+
+
+@pytest.mark.ci
+def test_a_running_job_states_its_phase_in_words(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500, name="piezo", preset="auto")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    doing, stage = page.locator(".doing"), page.locator(".stages [aria-current=step]")
+    with stored(desk) as store:
+        lease = taken(store, job)
+        # Before the first report the bar moves.
+        expect(page.locator(".status progress")).not_to_have_attribute("value", "0")
+        for phase, name, sentence in (
+            ("reading the record", "Record", "Reads the record."),
+            ("preset auto: fit of friction", "Preset", "Chooses the preset: fits friction models."),
+            (
+                "swap search among 144 candidates: 9 terms",
+                "First models",
+                "Selects the first models: swap search among 144 candidates: 9 terms.",
+            ),
+            (
+                "estimation of the final models of 7 terms",
+                "Final models",
+                "Estimates the final models: 7 terms.",
+            ),
+            ("prediction bands", "Validation", "Calculates the prediction bands."),
+            ("storing the result", "Result", "Stores the result."),
+        ):
+            store.leases.report(lease, ProgressReport({"phase": phase}))
+            expect(doing).to_have_text(sentence)
+            expect(stage).to_have_text(name)
+            if name != "Record":
+                # Screen readers announce every new stage, after the state of the job.
+                expect(page.get_by_role("status")).to_have_text(f"\u2068piezo\u2069: {sentence}")
+        advance(store, lease, 0, 40)
+        expect(doing).to_have_text("Evolves equations on 2 islands: generation 40 of 500.")
+        expect(stage).to_have_text("Search")
+
+
+@pytest.mark.ci
+def test_the_front_grows_and_its_points_show_their_equations(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    equation, chart = page.locator(".live .equation"), page.locator(".live figure.chart")
+    with stored(desk) as store:
+        lease = taken(store, job)
+        expect(page.locator(".live")).to_be_hidden()
+        for last in (40, 90):
+            advance(store, lease, last - 1, last)
+            expect(chart.locator("circle.line")).to_have_count(5)
+            expect(equation).to_have_text(
+                "y_um(k) = " + " + ".join(f"{last}*y_um(k-{n})" for n in range(1, 6))
+            )
+        plot = page.get_by_role("slider", name="Front of size against error")
+        plot.focus()
+        for key in ("Home", "ArrowRight", "Enter"):
+            page.keyboard.press(key)
+        expect(equation).to_have_text("y_um(k) = 90*y_um(k-1) + 90*y_um(k-2)")
+        expect(page.locator(".live")).to_contain_text("Chosen point: 2 terms")
+        # The chosen size stays while the search goes on.
+        advance(store, lease, 91, 95)
+        expect(equation).to_have_text("y_um(k) = 95*y_um(k-1) + 95*y_um(k-2)")
+    ways = "Islands that received models: island 1 from 2; island 2 from 1"
+    expect(page.get_by_role("img", name=ways)).to_be_visible()
+    expect(page.locator(".map")).to_contain_text("Generation 95: 1 model was sent along each arrow.")
+
+
+@pytest.mark.ci
+def test_stop_and_keep_the_best_ends_a_search_with_models(
+    opened: Callable[..., Any], service: Service, expect: Any
+) -> None:
+    job = service.submit(1_000_000, name="endless")
+    page = opened(f"#/jobs/{job}")
+    expect(page.locator(".live .equation")).to_contain_text("y_um(k) = ", timeout=60_000)
+    page.get_by_role("button", name="Stop and keep the best").click()
+    expect(page.get_by_role("button", name="Stop and keep the best")).to_be_hidden()
+    expect(page.locator(".title .state")).to_have_text("succeeded", timeout=60_000)
+    expect(page.locator(".status .facts")).to_contain_text("stopped by its owner")
+    expect(page.locator("main")).to_contain_text("the owner stopped the job, which leaves out: search from")
+    expect(page.locator("table.models tbody tr")).not_to_have_count(0)
+    # Each point of the front opens its model, by the keyboard as well.
+    models = service.ask("GET", f"/v1/jobs/{job}/models").json()["items"]
+    smallest = min(models, key=lambda model: model["size"])
+    page.get_by_role("slider", name="Size against error").focus()
+    for key in ("Home", "Enter"):
+        page.keyboard.press(key)
+    expect(page.get_by_role("heading", name=f"Model {smallest['rank']}", exact=True)).to_be_visible()
+    assert page.url.endswith(f"#/jobs/{job}/models/{smallest['rank']}")
