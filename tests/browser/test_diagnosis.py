@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, Jo
 from islands_service.store.blobs import Blobs
 from support.canvas import DRAWN
 from support.diagnosis_documents import CAUSE, GAIN, make_document
+from support.extended_simulations import extended
 from support.played import stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
@@ -190,6 +192,24 @@ def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
     widths = [float(bar.get_attribute("width")) for bar in rows.locator("rect").all()]
     assert widths == [100.0, 25.0, 0.0]
     expect(page.locator(".card", has=rows).locator(".facts")).to_contain_text("hold the input")
+
+
+def test_an_extended_difference_equation_is_typeset_and_exported(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = submit_diagnosis(desk)
+    linear = {"kind": "linear", "order": 0, "numerator": [2.0]}
+    spec = extended(linear, {"dead-zone": {"d": 0.25}})
+    with stored(desk) as store:
+        outcome = make_outcome(desk, equation="y(k) = 2*max(abs(u(k)) - 0.25, 0)*sign(u(k))")
+        blob = Blobs(desk.folder / "blobs").write(spec.model_dump_json(by_alias=True).encode())
+        artefacts = {**outcome.artefacts, EXTENDED: blob}
+        store.leases.finish(taken(store, job), replace(outcome, artefacts=artefacts))
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".findings .equation math")).to_contain_text("0.25")
+    with page.expect_download() as saved:
+        page.locator(".findings [data-format=c]").click()
+    assert saved.value.suggested_filename == f"extended-{job[:8]}.c"
 
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)

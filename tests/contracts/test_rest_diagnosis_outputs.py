@@ -1,9 +1,11 @@
-"""Measured and simulated outputs of a finished diagnosis over REST."""
+"""Outputs and extended equation of a finished diagnosis over REST."""
 
 import pytest
 
 from islands_api import Client
-from islands_service.domain.job import DISCREPANCY, JobOutcome, JobState
+from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState
+from islands_service.store.blobs import Blobs
+from support.extended_simulations import extended
 from support.service import hidden, problem_of, run_diagnosis
 
 pytestmark = pytest.mark.ci
@@ -73,3 +75,25 @@ def test_a_result_of_an_earlier_version_has_no_outputs(finished):
     service.store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"verdict": "nothing"}))
     answer = service.client.get(f"/v1/jobs/{job['id']}/outputs")
     assert "submit it again" in problem_of(answer, 404, "not-found")
+
+
+def test_an_extended_linear_simulation_is_exported_as_a_model(service, order):
+    linear = {"kind": "linear", "order": 0, "numerator": [2.0]}
+    spec = extended(linear, {"dead-zone": {"d": 0.25}})
+    blob = Blobs(service.settings.blobs).write(spec.model_dump_json(by_alias=True).encode())
+    job = service.client.post("/v1/discrepancies", json=order).json()["id"]
+    outcome = JobOutcome(JobState.SUCCEEDED, {"verdict": "named"}, artefacts={EXTENDED: blob})
+    service.store.leases.finish(service.store.leases.claim("test", 600.0), outcome)
+    with Client(str(service.client.base_url)) as client:
+        assert "double" in client.export_extended(job, "c")
+        assert "0.25" in client.export_extended(job, "plain")
+    answer = service.client.get(f"/v1/jobs/{job}/extended/export", params={"format": "mathml"})
+    assert answer.headers["content-type"] == "application/mathml+xml"
+    assert answer.headers["content-disposition"] == f'inline; filename="extended-{job[:8]}.xml"'
+
+
+def test_differential_equations_are_no_difference_equation(finished):
+    service, job = finished
+    assert "equation" not in service.client.get(f"/v1/jobs/{job}").json()["summary"]
+    answer = service.client.get(f"/v1/jobs/{job}/extended/export")
+    assert "is not one difference equation" in problem_of(answer, 404, "not-found")

@@ -42,6 +42,7 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/figures/{figure}.csv"): "read",
     ("GET", "/v1/jobs/{job}/report"): "read",
     ("GET", "/v1/jobs/{job}/extended"): "read",
+    ("GET", "/v1/jobs/{job}/extended/export"): "read",
     ("GET", "/v1/jobs/{job}/outputs"): "read",
     ("POST", "/v1/discrepancies"): "write",
     ("GET", "/v1/simulations"): "read",

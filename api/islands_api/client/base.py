@@ -102,6 +102,7 @@ class BaseClient(Generic[H]):
     result = Endpoint(calls.result)
     report = Endpoint(calls.report)
     extended = Endpoint(calls.extended)
+    export_extended = Endpoint(calls.export_extended)
     history = Endpoint(calls.history)
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)

@@ -241,6 +241,12 @@ def presets() -> RequestSpec[PresetPage]:
     return RequestSpec("GET", "/v1/presets", read_as(PresetPage))
 
 
+def export_extended(which: JobRef, form: str = "python") -> RequestSpec[str]:
+    """Return an extended simulation that is one difference equation as text: python, c, latex and so on."""
+    path = f"/v1/jobs/{quote_id(which)}/extended/export"
+    return RequestSpec("GET", path, lambda response: response.text, params={"format": form})
+
+
 def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:
     """Return a page of the search history after a generation. After the last page an empty one follows."""
     return RequestSpec(

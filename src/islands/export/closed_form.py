@@ -93,6 +93,14 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     return replace(found, output_name=spec.output, dt=spec.scales.dt)
 
 
+def find_closed_form(spec: SimulationSpec | LocalSpec) -> Model | None:
+    """Return an extended simulation as a model; None if it is not one difference equation."""
+    try:
+        return closed_form(spec)
+    except ModelError:
+        return None
+
+
 def _refuse(what: str, formats: str = "plain, python, json, c or matlab") -> ModelError:
     possible = ", ".join([*_INPUT_MAPS, *_OUTPUT_LINES])
     return ModelError(

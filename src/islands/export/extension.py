@@ -5,13 +5,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.effects.catalogue import get_summary
-from islands.errors import ModelError
 from islands.export import export
-from islands.export.closed_form import closed_form
+from islands.export.closed_form import closed_form, find_closed_form
 from islands.export.equations.c.program import c_equations
 from islands.export.equations.collection import collect_equations
 from islands.export.equations.matlab.program import matlab_equations
-from islands.models.narx import Model
 from islands.simulators.ode.output_system import SYMBOL_MEANINGS
 from islands.simulators.specification.base import ValueSpec
 from islands.simulators.specification.equations import OdeParameterSpec, OdeSpec
@@ -81,22 +79,14 @@ if __name__ == "__main__":
 
 def as_c(spec: LocalExtendedSpec) -> str:
     """Return C99 source; see `export_extended`."""
-    model = _find_closed_form(spec)
+    model = find_closed_form(spec)
     return c_equations(collect_equations(spec)) if model is None else export(model, "c")
 
 
 def as_matlab(spec: LocalExtendedSpec) -> str:
     """Return a MATLAB function; see `export_extended`."""
-    model = _find_closed_form(spec)
+    model = find_closed_form(spec)
     return matlab_equations(collect_equations(spec)) if model is None else export(model, "matlab")
-
-
-def _find_closed_form(spec: LocalExtendedSpec) -> Model | None:
-    """Return the simulation as one difference equation; None if it is not one."""
-    try:
-        return closed_form(spec)
-    except ModelError:
-        return None
 
 
 #: Export formats of an extended simulation by name.

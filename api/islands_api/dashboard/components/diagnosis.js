@@ -5,6 +5,7 @@ import { el } from "../lib/dom.js";
 import { showProblem } from "./banner.js";
 import { makeCauses } from "./diagnosing/causes.js";
 import { makeOutputsPlot } from "./diagnosing/outputs_plot.js";
+import { makeEquation, makeExportRow } from "./models.js";
 import { makeMonitorForm } from "./monitoring/monitor_form.js";
 import { makeReportButtons, makeSaveButton } from "./report.js";
 
@@ -27,6 +28,18 @@ function splitWords({ headline, words }) {
 }
 
 const makeLines = (lines) => lines.map((line) => el("p", {}, line));
+
+/** Make the equation of an extended simulation that is one difference equation, and its exports. */
+function makeExtendedEquation(job, signal) {
+  const path = `v1/jobs/${encodeURIComponent(job.id)}/extended`;
+  return el(
+    "div",
+    { class: "stack" },
+    el("h3", {}, "Extended equation"),
+    makeEquation(path, job.summary, signal),
+    makeExportRow(path, "extended"),
+  );
+}
 
 /** Show the figure and the causes of a diagnosis in their hosts. */
 async function showResult(job, figureHost, causesHost, signal) {
@@ -51,6 +64,7 @@ export function makeFindingsPanels(job, signal) {
     el("p", { class: "verdict" }, verdict),
     makeLines(headline),
     figureHost,
+    summary.equation && isDiagnosis(job) ? makeExtendedEquation(job, signal) : null,
     el(
       "div",
       { class: "row exports" },

@@ -124,7 +124,9 @@ export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange,
     for (const tick of times.ticks) {
       pen.strokeStyle = line;
       strokeLine(pen, times.at(tick), 0, times.at(tick), height - BOTTOM);
-      pen.fillText(formatShort(tick), times.at(tick), height - 21);
+      const text = formatShort(tick);
+      // The last one is not cut off by the edge.
+      pen.fillText(text, Math.min(times.at(tick), width - pen.measureText(text).width / 2), height - 21);
     }
     pen.fillText(dt === null ? "row" : "time (s)", (LEFT + width) / 2, height - 4);
   }

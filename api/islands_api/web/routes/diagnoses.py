@@ -5,9 +5,11 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
+from islands.export.closed_form import find_closed_form
+from islands.simulators.specification.table import ExtendedSpec
 from islands_api.result_schemas import DiagnosisOutputs, ExtendedSimulation
 from islands_api.schemas import DiscrepancyRequest, JobView
-from islands_api.web.auth import Reader, Writer
+from islands_api.web.auth import Principal, Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import (
     ACCEPTED_RESPONSES,
@@ -29,6 +31,7 @@ from islands_api.web.requests import (
 )
 from islands_api.web.responses import JSONDocument
 from islands_api.web.routes.jobs import Id
+from islands_api.web.routes.models import EXPORT_RESPONSES, ExportFormat, export_response
 from islands_service.domain.diagnosis_outputs import describe_outputs
 from islands_service.domain.job import DISCREPANCY, EXTENDED, OUTPUTS
 
@@ -50,14 +53,41 @@ async def submit(
 @router.get(JOBS_PATH + "/{job}/extended", response_model=ExtendedSimulation)
 async def extended(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return the simulation extended by the missing effects; 404 if the diagnosis named none."""
-    found = await get_job_of_kind(state, caller, job, DISCREPANCY)
-    document = await get_result(state, found)
+    return Response(await _read_extended(state, caller, job), media_type="application/json")
+
+
+@router.get(JOBS_PATH + "/{job}/extended/export", response_class=Response, responses=EXPORT_RESPONSES)
+async def exported(job: Id, caller: Reader, state: AppStateDep, form: ExportFormat = "python") -> Response:
+    """Export the extended simulation as a program, a block for a simulator, or an equation.
+
+    It has to be one difference equation, that of a model or of a linear simulation with effects that are maps
+    of the input or lines through the output; `summary.equation` of the job has it then. 404 otherwise.
+    """
+    spec = ExtendedSpec.model_validate_json(await _read_extended(state, caller, job))
+    model = await state.run_blocking(find_closed_form, spec)
+    if model is None:
+        raise ResourceNotFoundError(
+            f"the extended simulation of job {job} is not one difference equation: save its /extended as "
+            "extended.json, and export that with islands.load(FILE).export(FORMAT)"
+        )
+    return await export_response(state, model, form, f"extended-{job[:8]}")
+
+
+async def _read_extended(state: AppState, caller: Principal, job: str) -> bytes:
+    """Return the document of the extended simulation of a job.
+
+    Raises
+    ------
+    ResourceNotFoundError
+        The diagnosis named no effects.
+    """
+    document = await get_result(state, await get_job_of_kind(state, caller, job, DISCREPANCY))
     blob = await state.run_blocking(state.store.results.artefact, job, EXTENDED)
     if blob is None:
         raise ResourceNotFoundError(
             f"job {job} has no extended simulation: its verdict is {document['verdict']}"
         )
-    return Response(await state.run_blocking(state.blobs.read, blob), media_type="application/json")
+    return await state.run_blocking(state.blobs.read, blob)
 
 
 @router.get(

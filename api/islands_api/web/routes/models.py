@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 
-from islands.export import EXPORTS, export
+from islands.export import EXPORTS, Exported, export
 from islands.io.models import any_model_from_json
 from islands_api.result_schemas import (
     CoupledIdentificationResult,
@@ -47,8 +47,14 @@ _SUFFIXES = {
     "mathml": "xml",
 }
 
+#: Query parameter: a format of `islands.export`.
+ExportFormat = Annotated[
+    str,
+    Query(alias="format", description="Format of the export.", json_schema_extra={"enum": list(EXPORTS)}),
+]
+
 _TEXT_SCHEMA: dict[str, Any] = {"schema": {"type": "string"}}
-_EXPORT_RESPONSES: dict[int | str, dict[str, Any]] = {
+EXPORT_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {
         "content": {
             "text/plain": _TEXT_SCHEMA,
@@ -80,27 +86,19 @@ async def model(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
 @router.get(
     "/{job}/models/{rank}/export",
     response_class=Response,
-    responses=_EXPORT_RESPONSES,
+    responses=EXPORT_RESPONSES,
 )
 async def exported(
     job: Id,
     rank: Rank,
     caller: Reader,
     state: AppStateDep,
-    form: Annotated[
-        str,
-        Query(alias="format", description="Format of the export.", json_schema_extra={"enum": list(EXPORTS)}),
-    ] = "python",
+    form: ExportFormat = "python",
 ) -> Response:
     """Export a model as a program, a block for a simulator, an equation, or a model file."""
     found = await get_model(state, caller, job, rank)
-    text = await state.run_blocking(export, any_model_from_json(found.file, f"model {rank}"), form)
-    name = f"model-{rank:02d}.{_SUFFIXES.get(form, 'txt')}"
-    return Response(
-        text,
-        media_type=_MEDIA_TYPES.get(form, "text/plain"),
-        headers={"Content-Disposition": f'inline; filename="{name}"'},
-    )
+    model = any_model_from_json(found.file, f"model {rank}")
+    return await export_response(state, model, form, f"model-{rank:02d}")
 
 
 @router.get(
@@ -135,3 +133,20 @@ async def get_model(state: AppState, caller: Principal, job: str, rank: int) -> 
     if not found:
         raise ResourceNotFoundError(f"job {job} has no model {rank}: see its /models")
     return found[0]
+
+
+async def export_response(state: AppState, model: Exported, form: str, name: str) -> Response:
+    """Return a model in a format, as a file with a name without suffix.
+
+    Raises
+    ------
+    SettingsError, ModelError
+        There is no such format, or the model cannot be written in it.
+    """
+    text = await state.run_blocking(export, model, form)
+    file = f"{name}.{_SUFFIXES.get(form, 'txt')}"
+    return Response(
+        text,
+        media_type=_MEDIA_TYPES.get(form, "text/plain"),
+        headers={"Content-Disposition": f'inline; filename="{file}"'},
+    )

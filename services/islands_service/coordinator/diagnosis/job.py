@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
+from islands.export.closed_form import find_closed_form
 from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.result_text.diagnosis_statements import describe_headline
@@ -132,6 +133,7 @@ def _write_outputs(found: DiagnosisResult) -> bytes:
 
 def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[str, object]:
     words = found.summary
+    model = None if found.gain is None else find_closed_form(found.extension.spec)
     return {
         "simulation": simulation,
         "verdict": str(found.verdict),
@@ -140,5 +142,6 @@ def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[st
         "headline": "\n".join(describe_headline(found.document)),
         "words": f"{words}\nNote: {note}." if note else words,
         "wall_s": found.wall_s,
+        **({} if model is None else {"equation": model.equation().line}),
         **({"note": note} if note else {}),
     }

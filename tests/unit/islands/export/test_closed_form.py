@@ -11,7 +11,7 @@ from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import ModelError
 from islands.export.closed_form import closed_form
 from islands.simulation.predictors import free_run
-from islands.simulators.specification.table import LocalExtendedSpec
+from support.extended_simulations import extended
 from support.simulated_records import DT, MODEL, wave
 
 CORES = {
@@ -43,32 +43,6 @@ EFFECTS = {
     "output": {"sensor-gain": {"k": -0.2}, "offset": {"c": 3.0}},
     "both": {"dead-zone": {"d": 0.1}, "offset": {"c": -1.0}},
 }
-
-
-def extended(core, effects, **further):
-    frame = {
-        "unit": "V",
-        "peak": 1,
-        "rate": 1,
-        "force_unit": "um",
-        "force": 1,
-        "sense": 1,
-        "dissipates": True,
-    }
-    scales = {"dt": DT, "input_peak": 2.0, "output_peak": 5.0, "fitted_s": 4.5, "duration_s": 6.0}
-    return LocalExtendedSpec.model_validate(
-        {
-            "inputs": ["u_V"],
-            "output": "y_um",
-            "core": core,
-            "effects": [
-                {"name": name, "parameters": {key: {"value": value} for key, value in values.items()}}
-                for name, values in effects.items()
-            ],
-            "scales": {**scales, "frame": {**frame, "sharp": 1}},
-            **further,
-        }
-    )
 
 
 @pytest.fixture(scope="module")

@@ -136,7 +136,9 @@ export function makeSimulationChoice(simulations, onChange, signal) {
 
   function show() {
     const { summary: words, estimated } = byKind.get(kind.value);
-    setText(summary, `${words}.${estimated && ` Estimated unless given: ${estimated}.`}`);
+    // The reference sets names of files in backquotes.
+    const text = `${words}.${estimated && ` Estimated unless given: ${estimated}.`}`;
+    setText(summary, text.replaceAll("`", ""));
     const fields = getFields();
     if (fields.node !== host.firstChild) host.replaceChildren(fields.node);
     fields.open?.();

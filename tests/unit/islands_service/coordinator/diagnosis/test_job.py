@@ -12,7 +12,7 @@ import structlog
 from islands.diagnosis.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.facade.explain_residual import FORMULA
-from islands.io.result_text.diagnosis_statements import describe_diagnosis
+from islands.io.result_text.diagnosis_statements import describe_diagnosis, describe_headline
 from islands_service.coordinator.diagnosis import job as diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document
@@ -68,11 +68,31 @@ def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs
     outcome = run_job(claim(store), store, blobs)
     document, summary = outcome.document or {}, outcome.summary or {}
     assert summary["words"].splitlines() == describe_diagnosis(document)
+    assert summary["headline"].splitlines() == describe_headline(document)
+    assert "equation" not in summary  # a column has none
     assert summary["effects"] == ["offset"]
     assert document["simulation"] == "column theirs_um"
     assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
     assert document["verdict"] == "named"
     assert phases(store, job)[-1] == "writing the report"
+
+
+@pytest.mark.nightly
+def test_an_extended_difference_equation_is_in_the_summary(
+    store: Store, blobs: Blobs, tmp_path: Path
+) -> None:
+    time = 0.01 * np.arange(400)
+    u = np.sin(11 * time) + 0.3 * np.sin(50 * time)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(time.size)
+    y = 2.0 * np.sign(u) * np.maximum(np.abs(u) - 0.3, 0.0) + noise
+    path = tmp_path / "record.csv"
+    rows = np.column_stack([time, u, y])
+    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header="t_s,u_V,y_um", comments="")
+    linear = {"kind": "linear", "order": 0, "numerator": [2.0], "reference_input": 0.0}
+    submit_diagnosis(store, blobs, path, simulation=linear)
+    summary = run_job(claim(store), store, blobs).summary or {}
+    assert summary["effects"] == ["dead-zone"]
+    assert "max(abs(u(k)) - 0.3" in summary["equation"]
 
 
 @pytest.mark.ci
