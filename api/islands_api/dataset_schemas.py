@@ -80,6 +80,7 @@ class NoteView(ResponseModel):
 class SamplingView(ResponseModel):
     """Regularity of the time stamps of a record. Rows are named as in the file, the first of each kind."""
 
+    dt: float | None = Field(default=None, description="Usual step in seconds. None if it is unknown.")
     jitter: float | None = Field(
         default=None, description="Root mean square deviation of the steps, relative to the sampling time."
     )

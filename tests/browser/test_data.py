@@ -17,10 +17,10 @@ from support.service_processes import Service
 
 pytestmark = pytest.mark.ci
 
-#: Drops a file on the page as a user does.
-DROP = """([name, text]) => {
+#: Drops files on the page as a user does.
+DROP = """(files) => {
   const data = new DataTransfer();
-  data.items.add(new File([text], name, { type: "text/csv" }));
+  for (const [name, text] of files) data.items.add(new File([text], name, { type: "text/csv" }));
   for (const kind of ["dragover", "drop"])
     document.querySelector("main").dispatchEvent(
       new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data }));
@@ -35,7 +35,32 @@ def text(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def drop(page: Any, name: str, text: str) -> None:
-    page.evaluate(DROP, [name, text])
+    page.evaluate(DROP, [[name, text]])
+
+
+def read_request(page: Any) -> dict[str, Any]:
+    """Return the request that the page shows for curl."""
+    if not page.locator(".run pre").last.is_visible():
+        page.get_by_text("The same as a command").click()
+    command = page.locator(".run pre").last.text_content()
+    request: dict[str, Any] = json.loads(command.partition("-d '")[2].removesuffix("'"))
+    return request
+
+
+def remove_rows(text: str) -> str:
+    """Return a record in which the rows 100 to 139 are missing."""
+    lines = text.splitlines()
+    return "\n".join([*lines[:101], *lines[141:]])
+
+
+def submit(page: Any, desk: Service) -> dict[str, Any]:
+    """Start the job of the page; return its specification."""
+    page.get_by_role("button", name="Identify").click()
+    page.wait_for_url("**/#/jobs/*")
+    job = page.url.rpartition("/")[2]
+    spec: dict[str, Any] = desk.job(job)["spec"]
+    desk.ask("POST", f"/v1/jobs/{job}/cancel")
+    return spec
 
 
 @pytest.fixture
@@ -64,14 +89,14 @@ def test_the_visible_rows_are_those_of_the_job(looked: Any, desk: Service) -> No
     plot.focus()
     for key in ("+", "+", "+", "PageDown"):
         plot.press(key)
-    looked.get_by_text("Settings").click()
     looked.get_by_role("button", name="Use the visible rows").click()
-    start, stop = map(int, looked.get_by_label("Rows").input_value().split(":"))
+    request = read_request(looked)
+    start, stop = map(int, request["rows"].split(":"))
     assert 0 < start < stop
-    looked.get_by_text("The same as a command").click()
-    command = looked.locator(".run pre").last.text_content()
-    request = json.loads(command.partition("-d '")[2].removesuffix("'"))
-    assert request["rows"] == f"{start}:{stop}"
+    # The end of the rows validates, by default a quarter.
+    first, boundary = looked.get_by_label("Estimation rows").input_value().split(":")
+    assert (first, int(boundary)) == (str(start), stop - round((stop - start) / 4))
+    assert "validation" not in request
     submitted = desk.ask("POST", "/v1/jobs", json=request)
     assert submitted.status_code == 202, submitted.text
     desk.ask("POST", f"/v1/jobs/{submitted.json()['id']}/cancel")
@@ -106,6 +131,88 @@ def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: Service, e
     assert page.url.endswith("#/data")
 
 
+def test_a_remedy_changes_the_record_of_the_job(
+    quiet: Callable[..., Screen], desk: Service, text: str, expect: Any
+) -> None:
+    page = quiet(desk.url).go("#/data")
+    drop(page, "gaps.csv", remove_rows(text))
+    page.get_by_role("heading", name="gaps.csv").wait_for()
+    first = read_request(page)["dataset"]
+    expect(page.locator(".notes .problem")).to_contain_text("gap")
+    page.get_by_role("button", name="Show in the plot").first.click()
+    expect(page.locator(".signals + .position")).to_contain_text(re.compile("^row (7|8|9)"))
+    page.locator(".notes").get_by_role("button", name="Split at gaps").first.click()
+    page.wait_for_url(lambda url: first not in url)
+    expect(page.get_by_role("button", name="Do not use: Split at gaps")).to_be_visible()
+    expect(page.locator(".notes .problem")).to_have_count(0)
+    spec = submit(page, desk)
+    assert spec["dataset"] != first
+    stored = desk.ask("GET", f"/v1/datasets/{spec['dataset']}").json()
+    assert stored["preview"]["reading"] == {"gaps": "split"}
+    # Without the option it is the first data set again.
+    page.go_back()
+    page.get_by_role("button", name="Do not use: Split at gaps").click()
+    page.wait_for_url(f"**/{first}*")
+
+
+def test_a_range_that_is_dragged_validates(looked: Any, desk: Service, expect: Any) -> None:
+    looked.get_by_role("button", name="Mark validation").click()
+    box = looked.get_by_role("slider", name="Record").bounding_box()
+    width, y = box["width"], box["y"] + 60
+    looked.mouse.move(box["x"] + 0.3 * width, y)
+    looked.mouse.down()
+    looked.mouse.move(box["x"] + 0.5 * width, y, steps=5)
+    looked.mouse.up()
+    rows = looked.get_by_label("Validation rows").input_value()
+    start, stop = map(int, rows.split(":"))
+    assert 0 < start < stop
+    request = read_request(looked)
+    assert request["validation"] == {"dataset": request["dataset"], "rows": rows}
+    # The longest part of the other rows estimates.
+    assert request["rows"].startswith(f"{stop}:")
+    spec = submit(looked, desk)
+    assert (spec["validation"], spec["rows"]) == (request["validation"], request["rows"])
+    looked.go_back()
+    looked.get_by_label("Estimation rows").fill("nothing")
+    looked.get_by_label("Estimation rows").press("Tab")
+    expect(looked.locator(".ranges .complaint")).to_contain_text("START:STOP")
+    expect(looked.get_by_role("button", name="Identify")).to_be_disabled()
+
+
+def test_only_changed_settings_are_sent_and_a_job_can_be_run_again(
+    looked: Any, desk: Service, expect: Any
+) -> None:
+    looked.get_by_text("Settings", exact=True).click()
+    looked.get_by_label("Preset").select_option("hysteresis")
+    looked.get_by_text("Advanced settings").click()
+    expect(looked.locator("#meaning-max_terms")).to_contain_text("Default: 9.")
+    looked.get_by_label("generations", exact=True).fill("7")
+    looked.get_by_label("shifts", exact=True).fill("1, 2")
+    settings = {"generations": 7, "shifts": [1, 2]}
+    spec = submit(looked, desk)
+    assert (spec["preset"], spec["settings"]) == ("hysteresis", settings)
+    looked.get_by_role("link", name="Run again with changes").click()
+    looked.get_by_label("generations", exact=True).wait_for()
+    assert looked.get_by_label("Preset").input_value() == "hysteresis"
+    looked.get_by_label("shifts", exact=True).fill("")
+    assert submit(looked, desk)["settings"] == {"generations": 7}
+
+
+def test_several_files_are_one_job_if_they_have_the_same_columns(
+    quiet: Callable[..., Screen], desk: Service, text: str, expect: Any
+) -> None:
+    page = quiet(desk.url).go("#/data")
+    page.get_by_role("heading", name="Data", exact=True).wait_for()
+    other = "\n".join(text.splitlines()[:-50])
+    page.evaluate(DROP, [["first.csv", text], ["second.csv", other]])
+    added = page.get_by_role("region", name="Added records")
+    expect(added.get_by_role("listitem")).to_have_count(2)
+    second = added.get_by_role("link", name="second.csv").get_attribute("href").rpartition("/")[2]
+    added.get_by_role("link", name="Use them together in one job").click()
+    page.get_by_text("Together with").wait_for()
+    assert submit(page, desk)["recordings"] == [{"dataset": second}]
+
+
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_pages_of_data_are_readable(
     quiet: Callable[..., Screen], desk: Service, text: str, scheme: str, width: int
@@ -113,7 +220,9 @@ def test_the_pages_of_data_are_readable(
     page = quiet(desk.url, width, 800, color_scheme=scheme).go("#/data")
     drop(page, "piezo.csv", text)
     page.get_by_role("heading", name="piezo.csv").wait_for()
-    page.get_by_text("Settings").click()
+    page.get_by_text("Settings", exact=True).click()
+    page.get_by_text("Advanced settings").click()
+    page.get_by_label("generations", exact=True).wait_for()
     page.get_by_text("The same as a command").click()
     assert unreadable(page) == []
     page.go_back()

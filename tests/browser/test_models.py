@@ -14,7 +14,7 @@ from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import Blobs
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.job_runs import make_run
-from support.played import stored
+from support.played import run_submitted, stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
@@ -53,13 +53,7 @@ def service(guarded: Callable[..., Any]) -> Iterator[Service]:
 @pytest.fixture(scope="module")
 def finished(service: Service) -> str:
     """A succeeded job, executed by the test process."""
-    job = service.submit(60, name="piezo, 2 islands")
-    with stored(service) as store:
-        lease = taken(store, job)
-        blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
-        outcome = run_identification_job(make_run(lease, store, blobs, lambda: None, LONG))
-        store.leases.finish(lease, outcome)
-    return job
+    return run_submitted(service, service.submit(60, name="piezo, 2 islands"))
 
 
 @pytest.mark.ci

@@ -5,9 +5,14 @@ from contextlib import contextmanager
 from math import sqrt
 from typing import Any
 
+from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Lease, ProgressReport
+from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from support.job_runs import make_run
 from support.service_processes import Service
+from support.stores import LONG, taken
 
 GENERATIONS = 500
 
@@ -59,3 +64,13 @@ def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2)
         sources = [[(island - 1) % islands] for island in range(islands)]
         progress["migration"] = {"generation": last, "emigrants": 1, "sources": sources}
     store.leases.report(lease, ProgressReport(progress, points, after=first - 1))
+
+
+def run_submitted(service: Service, job: str) -> str:
+    """Run an identification that was submitted to a service without coordinators; return its id."""
+    with stored(service) as store:
+        lease = taken(store, job)
+        blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
+        outcome = run_identification_job(make_run(lease, store, blobs, lambda: None, LONG))
+        store.leases.finish(lease, outcome)
+    return job

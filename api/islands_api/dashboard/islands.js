@@ -4,6 +4,7 @@ import "./components/banner.js";
 import { listenForDroppedFiles } from "./components/file_upload.js";
 import { connection, key } from "./lib/api.js";
 import { el } from "./lib/dom.js";
+import { mountCompare } from "./pages/compare.js";
 import { mountData } from "./pages/data.js";
 import { mountDataset } from "./pages/dataset.js";
 import { mountJob } from "./pages/job.js";
@@ -30,8 +31,14 @@ const ROUTES = [
   },
   {
     pattern: /^\/data\/([^/]+)$/,
-    view: ([, id]) => `data set ${id}`,
-    mount: (host, [, id], query, signal) => mountDataset(host, { id }, signal),
+    view: ([, id], query) => `data set ${id} ${query}`,
+    mount: (host, [, id], query, signal) =>
+      mountDataset(host, { ...Object.fromEntries(query), id }, signal),
+  },
+  {
+    pattern: /^\/compare$/,
+    view: (_match, query) => `job comparison ${query}`,
+    mount: (host, _match, query, signal) => mountCompare(host, Object.fromEntries(query), signal),
   },
   {
     pattern: /^\/data$/,

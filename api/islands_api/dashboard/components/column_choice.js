@@ -1,25 +1,47 @@
 /** Table of the columns of a data set, in which the inputs and the output are chosen. */
 
 import { el, makeScrollable } from "../lib/dom.js";
-import { formatNumber } from "../lib/numbers.js";
+import { formatNumber, formatShort } from "../lib/numbers.js";
 import { STATISTICS, describeDefect } from "./dataset.js";
 
 const HEADINGS = [
-  ...["Column", "Unit", "Input", "Output"],
+  ...["Column", "Unit", "Input", "Output", "Sampling time"],
   ...STATISTICS.map((name) => [name, "figure"]),
   "Remark",
 ].map((heading) => [heading].flat());
 
-/** Make the table of a preview; `onChange({inputs, output})` is called at each change of the choice. */
-export function makeColumnChoice({ columns, time, inspection }, onChange) {
-  const suggested = inspection?.choice ?? { inputs: [], output: "" };
+/** Columns from which on those that have no role are hidden. */
+const MANY = 8;
+
+/** Return the column of a name in a request: `u_V+1` is the column `u_V` one sample early. */
+const findColumn = (name, names) => (names.includes(name) ? name : name.replace(/\+1$/, ""));
+
+/** Return the columns that are chosen at first: those of a request, or those that the service suggests. */
+function findChoice({ inputs = [], output = "" }, { columns, inspection }) {
+  const names = columns.map(({ name }) => name);
+  const isKnown = names.includes(output) && inputs.every((each) => names.includes(findColumn(each, names)));
+  return isKnown ? { inputs, output } : (inspection?.choice ?? { inputs: [], output: "" });
+}
+
+/**
+ * Make the table of a preview. `initial` is a request whose columns are chosen; `onChange({inputs, output})`
+ * is called at each change of the choice.
+ */
+export function makeColumnChoice(preview, initial, onChange) {
+  const { columns, time } = preview;
+  const suggested = findChoice(initial, preview);
+  const names = columns.map(({ name }) => name);
+  // The choice keeps the names of the request.
+  const given = new Map(suggested.inputs.map((name) => [findColumn(name, names), name]));
   const fields = columns
     .filter(({ name, problem }) => name !== time && !problem)
-    .map(({ name }) => ({ name, ...makeFields(name, suggested) }));
+    .map(({ name }) => ({ name, ...makeFields(name, given.has(name), suggested.output === name) }));
   const byName = new Map(fields.map((each) => [each.name, each]));
 
+  const listInputs = () => fields.filter(({ input }) => input.checked).map(({ name }) => name);
+
   const getChoice = () => ({
-    inputs: fields.filter(({ input }) => input.checked).map(({ name }) => name),
+    inputs: listInputs().map((name) => given.get(name) ?? name),
     output: fields.find(({ output }) => output.checked)?.name ?? "",
   });
 
@@ -31,36 +53,53 @@ export function makeColumnChoice({ columns, time, inspection }, onChange) {
   }
 
   const row = (column) => {
-    const { name, unit, minimum, maximum, mean, deviation } = column;
+    const { name, unit, dt, minimum, maximum, mean, deviation } = column;
     const chosen = byName.get(name);
     const remark = name === time ? "time" : describeDefect(column);
+    const isUsed = name === time || chosen?.input.checked || chosen?.output.checked;
     return el(
       "tr",
-      {},
+      { hidden: columns.length > MANY && !isUsed },
       el("th", { scope: "row" }, el("code", {}, el("bdi", {}, name))),
       el("td", {}, unit),
       el("td", {}, chosen?.input),
       el("td", {}, chosen?.output),
+      // Data sets of earlier versions do not state it.
+      el("td", { class: "figure" }, Number.isFinite(dt) ? `${formatShort(dt)} s` : ""),
       [minimum, maximum, mean, deviation].map((value) => el("td", { class: "figure" }, formatNumber(value))),
       el("td", { class: "soft small" }, remark),
     );
   };
   const head = HEADINGS.map(([name, kind]) => el("th", { scope: "col", class: kind }, name));
+  const rows = columns.map(row);
   const table = el(
     "table",
     { class: "choice", on: { change: update } },
     el("caption", { class: "visually-hidden" }, "Columns of the data set"),
     el("thead", {}, el("tr", {}, head)),
-    el("tbody", {}, columns.map(row)),
+    el("tbody", {}, rows),
   );
-  return { node: makeScrollable("Columns of the data set", table), getChoice };
+  const hidden = rows.filter((each) => each.hidden);
+  const showOthers = ({ currentTarget: button }) => {
+    for (const each of hidden) each.hidden = false;
+    hidden[0].querySelector("input")?.focus();
+    button.remove();
+  };
+  const more = { type: "button", on: { click: showOthers } };
+  const others = hidden.length > 0 && el("button", more, `Show ${hidden.length} other columns`);
+  return {
+    node: el("div", {}, [makeScrollable("Columns of the data set", table), others].filter(Boolean)),
+    getChoice,
+    /** Return the chosen columns as they are named in the file. */
+    listColumns: () => [...listInputs(), getChoice().output].filter(Boolean),
+  };
 }
 
-function makeFields(name, { inputs, output }) {
+function makeFields(name, isInput, isOutput) {
   const input = el("input", { type: "checkbox", value: name, "aria-label": `${name} is an input` });
   const label = { "aria-label": `${name} is the output` };
   const radio = el("input", { type: "radio", name: "output", value: name, ...label });
-  input.checked = inputs.includes(name);
-  radio.checked = output === name;
+  input.checked = isInput;
+  radio.checked = isOutput;
   return { input, output: radio };
 }

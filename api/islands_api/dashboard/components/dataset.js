@@ -4,6 +4,7 @@ import { Problem, getJson } from "../lib/api.js";
 import { el, makeFacts, makeScrollable, makeTable } from "../lib/dom.js";
 import { formatBytes, formatCount, formatNumber, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
+import { getNotes, makeNoteText } from "./record_notes.js";
 
 /** Headings of the statistics of a column. */
 export const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
@@ -62,8 +63,35 @@ function makeColumnTable({ preview }, spec) {
 /** Facts that are shown only if they state a problem. */
 const ONLY_PROBLEMS = ["quantisation", "saturation", "levels"];
 
+/** Kinds of irregular time stamps, and their sentences. */
+const IRREGULAR = {
+  gaps: "Samples are missing before",
+  repeated: "A time stamp is repeated at",
+  backward: "The time goes back at",
+};
+
+/** Rows of a kind that are listed. */
+const LISTED = 3;
+
+/** State how regular the time stamps are; data sets of earlier versions have no sampling. */
+function listIrregularities({ jitter, counts = {}, ...rows }) {
+  const percent = formatNumber(100 * jitter, 2);
+  const steps = jitter >= 1e-3 ? [`The steps of the time vary by ${percent} % rms.`] : [];
+  const kinds = Object.entries(IRREGULAR).filter(([kind]) => rows[kind]?.length);
+  return steps.concat(
+    kinds.map(([kind, text]) => {
+      const listed = rows[kind].slice(0, LISTED);
+      const more = counts[kind] - listed.length;
+      return `${text} ${listed.join(", ")}${more > 0 ? ` and ${more} more` : ""}.`;
+    }),
+  );
+}
+
+const describeChoice = ({ reason, confidence }) =>
+  Number.isFinite(confidence) ? `${reason} Probably right: ${Math.round(100 * confidence)} %.` : reason;
+
 /** List the facts about a record, with their columns as the title; the reason if no columns are chosen. */
-export function listFacts({ facts, choice, rows }) {
+export function listFacts({ facts, choice, rows, sampling }) {
   if (!choice.output) return el("p", { class: "soft" }, choice.reason);
   const shown = facts.filter(({ name, value }) => value || !ONLY_PROBLEMS.includes(name));
   const title = `Facts about ${choice.inputs.join(", ")} and ${choice.output}`;
@@ -71,7 +99,13 @@ export function listFacts({ facts, choice, rows }) {
     "details",
     {},
     el("summary", {}, rows ? `${title}, samples ${rows}` : title),
-    el("ul", {}, ...shown.map(({ sentence }) => el("li", {}, sentence))),
+    el(
+      "ul",
+      {},
+      el("li", {}, describeChoice(choice)),
+      listIrregularities(sampling ?? {}).map((sentence) => el("li", {}, sentence)),
+      ...shown.map(({ sentence }) => el("li", {}, sentence)),
+    ),
   );
 }
 
@@ -87,7 +121,7 @@ function describeDataset(dataset, spec) {
       ["Samples", formatCount(preview.samples)],
       ["Sampling time", preview.dt === null ? null : `${formatShort(preview.dt)} s`],
     ]),
-    ...preview.warnings.map((warning) => el("p", { class: "complaint" }, warning)),
+    ...getNotes(preview).map(makeNoteText),
     makeScrollable("Columns of the data set", makeColumnTable(dataset, spec)),
     ...describeInspection(preview.inspection),
   ];

@@ -11,7 +11,7 @@ export function uploadFile(file) {
   return getJson("v1/datasets", { method: "POST", body });
 }
 
-/** Upload files one after the other. The page of a single one opens, and for several the list. */
+/** Upload files one after the other. The page of a single one opens, and for several the list with these. */
 async function uploadFiles(files) {
   clearBanner("problem");
   const [stored, refused] = [[], []];
@@ -27,7 +27,9 @@ async function uploadFiles(files) {
   announce(`${stored.length} of ${files.length} files can be used`);
   const messages = refused.map(({ message }) => message);
   if (refused.length) showProblem({ ...refused[0], message: messages.join("\n") });
-  if (stored.length) location.hash = files.length === 1 ? `#/data/${stored[0].id}` : "#/data";
+  const added = stored.map(({ id }) => id).join(",");
+  if (stored.length)
+    location.hash = files.length === 1 ? `#/data/${added}` : `#/data?${new URLSearchParams({ added })}`;
 }
 
 /** Make a button that opens the dialog for files. */

@@ -15,25 +15,6 @@ export function makeField(form, label, field, hint) {
   ];
 }
 
-/** Make the field of the rows of a job, and the button that takes those of a plot. */
-export function makeRowsField(form, samples, onChange) {
-  let visible = null;
-  const rows = el("input", { name: "rows", placeholder: "all", pattern: "\\d*:\\d*", maxlength: 40 });
-  function takeVisible() {
-    rows.value = visible === null ? "" : visible.join(":");
-    onChange();
-  }
-  const take = el("button", { type: "button", on: { click: takeVisible } }, "Use the visible rows");
-  const hint = "START:STOP of the rows that are used, counted from 0; all by default.";
-  return {
-    nodes: [...makeField(form, "Rows", rows, hint), el("span"), take, el("span")],
-    get: () => rows.value,
-    setVisible([start, stop]) {
-      visible = start === 0 && stop === samples ? null : [start, stop];
-    },
-  };
-}
-
 /** Quote a text for a shell. */
 export const quote = (text) =>
   /^[\w.,:/+=-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
@@ -52,18 +33,21 @@ function toPython(value) {
 }
 
 /**
- * Return the commands that submit a request: with the path of REST, the method of the Python client, and the
- * command of `islands jobs` with its options and the lines before it.
+ * Return the commands that submit a request: the command of `islands jobs` with its options and the lines
+ * before it, the method of the Python client, and the path of REST. Without options, no command line exists.
  */
 function describeRequest({ path, call, command, options, before = [] }, request) {
   const url = getServiceUrl();
-  const line = `islands jobs ${command} ${quote(request.name)} ${options.join(" ")}`;
+  const line = options && `islands jobs ${command} ${quote(request.name)} ${options.join(" ")}`;
+  const { settings = {}, ...fields } = request;
   return {
-    "Command line": [...before, `${line} \\`, `  --url ${url} --watch`].join("\n"),
+    ...(line && { "Command line": [...before, `${line} \\`, `  --url ${url} --watch`].join("\n") }),
     Python: [
       "from islands_api import Client",
       "",
-      `job = Client(${JSON.stringify(url)}).${call}(**${toPython(request)})`,
+      `job = Client(${JSON.stringify(url)}).${call}(`,
+      ...Object.entries({ ...fields, ...settings }).map(([name, value]) => `    ${name}=${toPython(value)},`),
+      ")",
     ].join("\n"),
     curl: [
       `curl ${url}/${path} -H 'Content-Type: application/json' \\`,

@@ -5,6 +5,7 @@ import { el, makeFacts, makeScrollable, makeTable, runOnceAtATime } from "../lib
 import { NONE, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
 import { showProblem } from "./banner.js";
+import { makeCompareChoice } from "./compare_choice.js";
 import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
 import { makeModelFront } from "./model_front.js";
@@ -281,7 +282,8 @@ export function makeModelsPanel(job, rank, unit, signal) {
     front = makeModelFront(job, models, unit);
     const islands = job.progress?.islands?.length ?? 0;
     const figures = makeSearchFigures(job.id, islands, signal);
-    body.replaceChildren(makeSentences(job), front.node, overview, note, article, figures);
+    const compare = makeCompareChoice(job, models) ?? "";
+    body.replaceChildren(makeSentences(job), front.node, overview, note, compare, article, figures);
     select(rank);
     return Infinity;
   }, signal);

@@ -1,77 +1,115 @@
 /** Form that starts an identification of a data set, with the same request for other programs. */
 
 import { el } from "../lib/dom.js";
-import { makeField, makeJobForm, makeRowsField, quote } from "./job_request.js";
+import { makeField, makeJobForm, quote } from "./job_request.js";
+import { makeSearchSettings } from "./search_settings.js";
 
-/** Presets of a job, with their purpose. */
-const PRESETS = {
-  auto: "auto: tries models of hysteresis, friction and smooth systems on the record, and chooses",
-  narx: "narx: polynomial and sign terms without constraints",
-  hysteresis: "hysteresis: the output rests where the input rests",
-};
+const SAMPLING_TIME = "In seconds; only for a record that does not contain it.";
 
 const ABSENT = "Choose at least one input and the output in the table of columns.";
 
-/** Return the form of a request for other programs. */
-function describe({ inputs, output, rows, validation, preset }) {
-  const options = [
-    ...inputs.flatMap((each) => ["--input", quote(each)]),
-    ...["--output", quote(output)],
-    ...(rows ? ["--rows", rows] : []),
-    ...(validation === undefined ? [] : ["--validation", String(validation)]),
-    ...(preset === "auto" ? [] : ["--preset", preset]),
-  ];
-  return { call: "submit", command: "submit", options };
+/** Return an option of the command line, for example `--no-header` for the value false. */
+function makeFlag(name, value) {
+  const flag = name.replaceAll("_", "-");
+  if (typeof value === "boolean") return [value ? `--${flag}` : `--no-${flag}`];
+  return [`--${flag}`, quote([value].flat().join(","))];
 }
 
-/** Make the form of a data set; `show({inputs, output})` and `setRows([start, stop])` update it. */
-export function makeRunForm({ id, name, preview }) {
-  const preset = el(
-    "select",
-    { name: "preset" },
-    Object.entries(PRESETS).map(([value, text]) => el("option", { value }, text)),
+/** Return the options of the command line; null if it cannot state the request. */
+function listOptions(request, reading) {
+  const { dataset, inputs, output, rows, validation, preset, dt, seed, model, recordings } = request;
+  const isForeign = typeof validation === "object" && validation.dataset !== dataset;
+  // Further recordings are data sets, and the command line uploads files.
+  if (recordings?.length || isForeign) return null;
+  const held = typeof validation === "object" ? validation.rows : validation;
+  return [
+    ...inputs.flatMap((each) => ["--input", quote(each)]),
+    ...["--output", quote(output)],
+    ...(dt ? ["--dt", String(dt)] : []),
+    ...(rows ? ["--rows", rows] : []),
+    ...(held === undefined ? [] : ["--validation", String(held)]),
+    ...(preset === "auto" ? [] : ["--preset", preset]),
+    ...(model && model !== "narx" ? ["--model", model] : []),
+    ...(seed ? ["--seed", String(seed)] : []),
+    ...Object.entries({ ...reading, ...request.settings }).flatMap((each) => makeFlag(...each)),
+  ];
+}
+
+/** Make the statement of the other recordings of the same request, each with a link. */
+const makeRecordings = (recordings) =>
+  recordings.length > 0 &&
+  el(
+    "p",
+    {},
+    "Together with ",
+    recordings.flatMap(({ dataset, name }, at) => [
+      at ? ", " : "",
+      el("a", { href: `#/data/${dataset}` }, el("bdi", {}, name ?? dataset)),
+    ]),
+    ". The end of each recording validates, unless a range is marked.",
   );
-  const fraction = el("input", {
-    ...{ name: "validation", type: "number", min: 1, max: 90, step: 1, placeholder: 25 },
-  });
-  const rows = makeRowsField("run", preview.samples, () => form.update());
+
+/**
+ * Make the form of a data set. `initial` has fields of a request that are set; `ranges` has the rows of the
+ * request. `show({inputs, output})` and `setSamplingTime(dt)` update it.
+ */
+export function makeRunForm({ id, name, preview }, initial, ranges, signal) {
+  const dt = el("input", { name: "dt", type: "number", step: "any", min: 0, placeholder: "from the record" });
+  dt.value = initial.dt ?? "";
+  const search = makeSearchSettings(initial, () => form.update(), signal);
+  const hasChanges = Boolean(initial.settings) || (initial.preset ?? "auto") !== "auto";
+  const settings = el(
+    "details",
+    { open: hasChanges },
+    el("summary", {}, "Settings"),
+    search.nodes[0],
+    el("div", { class: "fields" }, makeField("run", "Sampling time", dt, SAMPLING_TIME)),
+    search.nodes[1],
+  );
   let choice = { inputs: [], output: "" };
 
-  function makeRequest() {
-    if (!choice.inputs.length || choice.output === "") return null;
+  const hasColumns = () => choice.inputs.length > 0 && choice.output !== "";
+
+  function getRequest() {
+    const { model, seed, recordings = [] } = initial;
     return {
       dataset: id,
       inputs: choice.inputs,
       output: choice.output,
-      preset: preset.value,
-      name,
-      ...(rows.get() && { rows: rows.get() }),
-      ...(fraction.value && { validation: Number(fraction.value) / 100 }),
+      ...search.getRequest(),
+      name: initial.name ?? name,
+      ...ranges.getRequest(),
+      ...(dt.value && { dt: Number(dt.value) }),
+      ...(recordings.length && { recordings: recordings.map(({ name: _, ...part }) => part) }),
+      ...(model && { model }),
+      ...(seed && { seed }),
     };
   }
 
-  const settings = el(
-    "div",
-    { class: "fields" },
-    makeField("run", "Preset", preset, "What the search tries. The job states its choice and the reason."),
-    rows.nodes,
-    makeField("run", "Validation", fraction, "Per cent of the rows at the end that select the model."),
-  );
   const form = makeJobForm({
     action: "Identify",
     path: "v1/jobs",
-    makeRequest,
-    describe,
-    explain: (request) => (request ? `${request.inputs.join(", ")} → ${request.output}` : ABSENT),
-    fields: (row) => [row, el("details", {}, el("summary", {}, "Settings"), settings)],
+    makeRequest: () => (hasColumns() && ranges.isComplete() ? getRequest() : null),
+    describe: (request) => ({
+      ...{ call: "submit", command: "submit" },
+      options: listOptions(request, preview.reading),
+    }),
+    explain: () => (hasColumns() ? `${choice.inputs.join(", ")} → ${choice.output}` : ABSENT),
+    fields: (row) => [row, makeRecordings(initial.recordings ?? []), settings].filter(Boolean),
   });
-  form.update();
   return {
     node: el("section", { class: "card" }, el("h2", {}, "Identify"), form.node),
+    update: form.update,
     show(newChoice) {
       choice = newChoice;
       form.update();
     },
-    setRows: rows.setVisible,
+    setSamplingTime(seconds) {
+      dt.value = seconds;
+      settings.open = true;
+      dt.focus();
+      form.update();
+    },
+    getRequest,
   };
 }

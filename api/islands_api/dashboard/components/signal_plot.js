@@ -1,5 +1,6 @@
 /**
- * Plot of signals in panels. After a click the wheel zooms; dragging moves; arrow keys read values.
+ * Plot of signals in panels. After a click the wheel zooms; dragging moves the rows, or marks a range; arrow
+ * keys read values.
  *
  * The service sends the extremes of as many parts of the rows as the plot has pixels. A new range is drawn at
  * once from the last answer, and again when its own answer arrives.
@@ -7,10 +8,10 @@
 
 import { el, setText } from "../lib/dom.js";
 import { formatCount, formatNumber, formatShort } from "../lib/numbers.js";
-import { makeScale } from "../lib/scale.js";
-import { drawEnvelope, drawNames, strokeLine } from "./signal_lines.js";
+import { LEFT, RIGHT, drawSignals, makeRowScale } from "./signal_panels.js";
 
-const [PANEL, TALL_PANEL, GAP, LEFT, BOTTOM] = [110, 150, 14, 62, 36];
+/** Distance in pixels from an edge of a marked range in which a drag moves the edge. */
+const EDGE = 7;
 
 /** How a plot is read; for a text beside it. */
 export const HINT = "Click, then wheel: zoom. Drag: move. Keys: arrows, +, −, Home.";
@@ -46,22 +47,26 @@ function findPart({ rows, stop }, row) {
 }
 
 /**
- * Make a plot of a record of `samples` rows, those from `heldOut` on with another background.
+ * Make a plot of a record of `samples` rows; without `dt` its axis counts rows.
  *
  * `ask(query, names)` requests the rows `start` to `stop` of signals as at most `points` parts.
  * `show(panels)` selects the panels, each a list of lines `{name, unit, colour}` over one axis; a colour is a
- * custom property of the style. `onRange([start, stop])` is called with the rows that are visible.
+ * custom property of the style. `showRows(rows)` marks rows and moves to them.
+ *
+ * `ranges.getRanges()` returns the marked ranges by name. With `ranges.set(name, rows)`, a drag moves their
+ * edges, and `mark(name)` selects the range that a drag marks; null for a drag that moves the rows.
  */
-export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange, signal) {
+export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
   const canvas = el("canvas", { "aria-hidden": "true" });
   const plot = el("div", { class: "signals", tabindex: "0", role: "slider", "aria-label": "Record" }, canvas);
   const position = el("p", { class: "position soft small" });
   let [panels, range, pointed, answer] = [[], [0, samples], null, null];
+  let [marks, marking, drag] = [[], null, null];
   let timer;
 
   const describeRow = (row) =>
     dt === null ? `row ${formatCount(row)}` : `${formatShort(Number((row * dt).toPrecision(6)))} s`;
-  const getX = () => makeScale(range, [LEFT, plot.clientWidth - 8], { maxTicks: 8 });
+  const getX = () => makeRowScale(range, plot.clientWidth);
 
   async function request() {
     const [start, stop] = [Math.floor(range[0]), Math.ceil(range[1])];
@@ -84,75 +89,10 @@ export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange,
 
   function draw() {
     const width = plot.clientWidth;
-    const heights = panels.map((lines) => (lines.length > 1 ? TALL_PANEL : PANEL));
-    const height = heights.reduce((sum, each) => sum + each + GAP, BOTTOM);
     if (!width || !panels.length) return;
-    const ratio = devicePixelRatio || 1;
-    [canvas.width, canvas.height] = [width * ratio, height * ratio];
-    const pen = canvas.getContext("2d");
-    pen.scale(ratio, ratio);
-    const style = getComputedStyle(plot);
-    const colours = Object.fromEntries(
-      ["ink", "soft", "line", "tint", "accent", "before"].map((name) => [
-        name,
-        style.getPropertyValue(`--${name}`),
-      ]),
-    );
-    pen.font = `11.5px ${style.fontFamily}`;
-    const x = getX();
-    pen.fillStyle = colours.tint;
-    const shaded = Math.max(heldOut, range[0]);
-    if (shaded < range[1]) pen.fillRect(x.at(shaded), 0, x.at(range[1]) - x.at(shaded), height - BOTTOM);
-    drawTimes(pen, width, height, colours);
-    panels.reduce((top, lines, at) => {
-      drawPanel(pen, x, lines, [top, top + heights[at]], width, colours);
-      return top + heights[at] + GAP;
-    }, 0);
-    if (pointed !== null) {
-      pen.strokeStyle = colours.soft;
-      pen.setLineDash([3, 3]);
-      strokeLine(pen, x.at(pointed), 0, x.at(pointed), height - BOTTOM);
-    }
+    const view = { panels, range, dt, answer, ranges: ranges.getRanges(), marks, pointed, width };
+    drawSignals(canvas, view, getComputedStyle(plot));
     readValues();
-  }
-
-  function drawTimes(pen, width, height, { soft, line }) {
-    pen.fillStyle = soft;
-    pen.textAlign = "center";
-    const limits = range.map((row) => row * (dt ?? 1));
-    const times = makeScale(limits, [LEFT, width - 8], { maxTicks: 8 });
-    for (const tick of times.ticks) {
-      pen.strokeStyle = line;
-      strokeLine(pen, times.at(tick), 0, times.at(tick), height - BOTTOM);
-      const text = formatShort(tick);
-      // The last one is not cut off by the edge.
-      pen.fillText(text, Math.min(times.at(tick), width - pen.measureText(text).width / 2), height - 21);
-    }
-    pen.fillText(dt === null ? "row" : "time (s)", (LEFT + width) / 2, height - 4);
-  }
-
-  function drawPanel(pen, x, lines, [top, bottom], width, colours) {
-    const columns = lines.map(({ name }) => answer?.columns.find((each) => each.name === name));
-    const values = columns
-      .flatMap((column) => (column ? [...column.minimum, ...column.maximum] : []))
-      .filter((value) => value !== null);
-    const y = makeScale(values, [bottom - 4, top + 20], { padding: 0.05, maxTicks: 4 });
-    pen.textAlign = "right";
-    pen.fillStyle = colours.soft;
-    const ticks = values.length ? y.ticks : [];
-    for (const tick of ticks) pen.fillText(formatShort(tick), LEFT - 6, y.at(tick) + 4);
-    pen.strokeStyle = colours.line;
-    strokeLine(pen, LEFT, bottom, width, bottom);
-    drawNames(pen, lines, [LEFT + 4, top + 11], colours);
-    pen.save();
-    pen.beginPath();
-    pen.rect(LEFT, top, width - LEFT, bottom - top);
-    pen.clip();
-    columns.forEach((column, at) => {
-      pen.strokeStyle = colours[lines[at].colour ?? "accent"];
-      if (column) drawEnvelope(pen, x, y, column, answer.rows);
-    });
-    pen.restore();
   }
 
   /** Show the values at the pointer, and to screen readers. */
@@ -175,7 +115,6 @@ export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange,
 
   function move(start, stop) {
     range = limitRange(start, stop, samples);
-    onRange([Math.floor(range[0]), Math.ceil(range[1])]);
     draw();
     load();
   }
@@ -195,12 +134,44 @@ export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange,
     },
     { passive: false },
   );
-  plot.addEventListener("pointerdown", (event) => plot.setPointerCapture(event.pointerId));
-  plot.addEventListener("pointermove", (event) => {
-    if (event.buttons & 1) {
-      const rows = (event.movementX * (range[1] - range[0])) / (plot.clientWidth - LEFT - 8);
+
+  /** Return the range whose edge is at the pointer, and its other edge, as `{kind, fixed}`. */
+  function findEdge({ clientX }) {
+    if (!ranges.set) return null;
+    const [x, at] = [getX(), clientX - plot.getBoundingClientRect().left];
+    for (const [kind, marked] of Object.entries(ranges.getRanges())) {
+      const place = (marked ?? []).findIndex((row) => Math.abs(x.at(row) - at) <= EDGE);
+      if (place >= 0) return { kind, fixed: marked[1 - place] };
+    }
+    return null;
+  }
+
+  const limitRow = (row) => clamp(Math.round(row), 0, samples);
+
+  function startDrag(event) {
+    plot.setPointerCapture(event.pointerId);
+    const edge = findEdge(event);
+    drag = marking ? { kind: marking, fixed: limitRow(rowAt(event)) } : edge;
+    // The two ranges touch in the default split: the edge of the range that is selected moves.
+    if (marking && edge?.kind === marking) drag = edge;
+  }
+
+  function continueDrag(event) {
+    if (drag === null) {
+      const rows = (event.movementX * (range[1] - range[0])) / (plot.clientWidth - LEFT - RIGHT);
       move(range[0] - rows, range[1] - rows);
-    } else {
+      return;
+    }
+    const rows = [drag.fixed, limitRow(rowAt(event))].sort((a, b) => a - b);
+    if (rows[1] - rows[0] >= LEAST_ROWS) ranges.set(drag.kind, rows);
+  }
+
+  plot.addEventListener("pointerdown", startDrag);
+  plot.addEventListener("pointerup", () => (drag = null));
+  plot.addEventListener("pointermove", (event) => {
+    if (event.buttons & 1) continueDrag(event);
+    else {
+      plot.classList.toggle("edge", findEdge(event) !== null);
       pointed = clamp(rowAt(event), ...range);
       draw();
     }
@@ -245,6 +216,20 @@ export function makeSignalPlot({ samples, dt, heldOut = samples, ask }, onRange,
       draw();
       load();
     },
+    draw,
     showAll: () => move(0, samples),
+    getVisibleRows: () => [Math.floor(range[0]), Math.ceil(range[1])],
+    mark(kind) {
+      marking = kind;
+      plot.classList.toggle("marking", kind !== null);
+    },
+    showRows(rows) {
+      marks = rows;
+      const [first, last] = [Math.min(...rows), Math.max(...rows)];
+      const space = Math.max(20, (last - first) / 4);
+      move(first - space, last + space);
+      plot.focus();
+      plot.scrollIntoView({ block: "center" });
+    },
   };
 }

@@ -1,37 +1,108 @@
 /** Page of a data set: its signals, its columns, the facts about the record, and the start of a job. */
 
+import { clearBanner, showNotice, showProblem } from "../components/banner.js";
 import { makeColumnChoice } from "../components/column_choice.js";
 import { listFacts } from "../components/dataset.js";
 import { makeDiagnosisForm } from "../components/diagnosing/diagnosis_form.js";
+import { makeRecordNotes } from "../components/record_notes.js";
+import { makeRowRanges } from "../components/row_ranges.js";
 import { makeRunForm } from "../components/run_form.js";
 import { HINT, makeSignalPlot } from "../components/signal_plot.js";
-import { getJson } from "../lib/api.js";
-import { el, makeFacts } from "../lib/dom.js";
+import { getJson, postJson } from "../lib/api.js";
+import { announce, el, makeFacts } from "../lib/dom.js";
 import { formatBytes, formatCount, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
+
+/** What a drag in the plot does. */
+const DRAGS = [
+  ["Move", null],
+  ["Mark estimation", "estimation"],
+  ["Mark validation", "validation"],
+];
+
+const getPath = (id) => `v1/datasets/${encodeURIComponent(id)}`;
 
 /** Return the function that requests columns of a data set for a plot. */
 const askDataset = (id, signal) => (query, names) => {
   for (const name of names) query.append("column", name);
-  return getJson(`v1/datasets/${encodeURIComponent(id)}/samples?${query}`, { signal });
+  return getJson(`${getPath(id)}/samples?${query}`, { signal });
 };
 
-function makeContent(dataset, signal) {
+/** Read the record in another way, and open the page of that data set with the same choices. */
+async function readAgain(dataset, reading, choices) {
+  clearBanner("problem");
+  showNotice("Reading the record…");
+  try {
+    const { id } = await postJson(`${getPath(dataset.id)}/readings`, { reading });
+    const { dataset: _, validation, ...others } = choices;
+    const isOwn = typeof validation === "object" && validation.dataset === dataset.id;
+    const moved = isOwn ? { ...validation, dataset: id } : validation;
+    const request = JSON.stringify({ ...others, ...(moved !== undefined && { validation: moved }) });
+    location.hash = `#/data/${id}?${new URLSearchParams({ request })}`;
+    announce("The record was read again");
+  } catch (error) {
+    showProblem(error);
+  } finally {
+    clearBanner("notice");
+  }
+}
+
+/** Make the choice of what a drag does. */
+function makeDragChoice(mark) {
+  const buttons = DRAGS.map(([text, kind]) =>
+    el("button", { type: "button", on: { click: () => choose(kind) } }, text),
+  );
+  function choose(chosen) {
+    mark(chosen);
+    buttons.forEach((button, at) => button.setAttribute("aria-pressed", String(DRAGS[at][1] === chosen)));
+  }
+  choose(null);
+  return el("div", { class: "row drags", role: "group", "aria-label": "Dragging in the plot" }, buttons);
+}
+
+function makeSignalCard(plot, ranges) {
+  const button = (text, click) => el("button", { type: "button", class: "quiet", on: { click } }, text);
+  return el(
+    "section",
+    { class: "card" },
+    el("div", { class: "heading" }, el("h2", {}, "Signals"), makeDragChoice(plot.mark)),
+    plot.node,
+    el(
+      "div",
+      { class: "row" },
+      el("span", { class: "soft small" }, HINT),
+      button("Show all rows", plot.showAll),
+      button("Use the visible rows", () => ranges.use(plot.getVisibleRows())),
+    ),
+    ranges.node,
+  );
+}
+
+function makeContent(dataset, initial, signal) {
   const { preview } = dataset;
+  const { samples, reading = {} } = preview;
   const units = Object.fromEntries(preview.columns.map(({ name, unit }) => [name, unit]));
   const makeLine = (name, colour) => ({ name, unit: units[name], colour });
-  let simulated = null;
-  const forms = [makeRunForm(dataset), makeDiagnosisForm(dataset, showSimulated, signal)];
-  const setRows = (rows) => forms.forEach((form) => form.setRows(rows));
-  const plot = makeSignalPlot({ ...preview, ask: askDataset(dataset.id, signal) }, setRows, signal);
-  const choice = makeColumnChoice(preview, update);
+  // A record with gaps has a usual step.
+  const dt = preview.dt ?? preview.inspection?.sampling?.dt ?? null;
+  // Rows of a record that is resampled, or that has gaps, are not equally spaced by its sampling time.
+  const step = reading.resample || reading.gaps ? null : preview.dt;
+  let [plot, form, simulated] = [null, null, null];
+  const ranges = makeRowRanges(dataset.id, samples, initial, () => {
+    plot?.draw();
+    form?.update();
+  });
+  plot = makeSignalPlot({ samples, dt: step, ask: askDataset(dataset.id, signal) }, ranges, signal);
+  form = makeRunForm(dataset, initial, ranges, signal);
+  const diagnosis = makeDiagnosisForm(dataset, plot.getVisibleRows, showSimulated, signal);
+  const choice = makeColumnChoice(preview, initial, update);
 
   function showSignals() {
-    const { inputs, output } = choice.getChoice();
-    const measured = simulated
-      ? [makeLine(output, "ink"), makeLine(simulated, "before")]
-      : [makeLine(output)];
-    plot.show([...inputs.map((name) => [makeLine(name)]), ...(output ? [measured] : [])]);
+    const columns = choice.listColumns();
+    const panels = columns.map((name) => [makeLine(name)]);
+    if (simulated && choice.getChoice().output)
+      panels.splice(-1, 1, [makeLine(columns.at(-1), "ink"), makeLine(simulated, "before")]);
+    plot.show(panels);
   }
 
   /** Draw a recorded simulation over the measured output. */
@@ -41,45 +112,65 @@ function makeContent(dataset, signal) {
   }
 
   function update() {
-    forms.forEach((form) => form.show(choice.getChoice()));
+    form.show(choice.getChoice());
+    diagnosis.show(choice.getChoice());
     showSignals();
   }
 
   // The plot has no width before the page contains it.
-  requestAnimationFrame(update);
-  const all = el("button", { type: "button", class: "quiet", on: { click: plot.showAll } }, "Show all rows");
+  requestAnimationFrame(() => {
+    update();
+    ranges.show();
+  });
+  const notes = makeRecordNotes(preview, {
+    read: (reading) => readAgain(dataset, reading, form.getRequest()),
+    setSamplingTime: form.setSamplingTime,
+    showRows: plot.showRows,
+  });
   return [
     el(
       "section",
-      { class: "card" },
+      { class: "card", "aria-label": "Record" },
       makeFacts([
         ["Rows", formatCount(preview.samples)],
-        ["Sampling time", preview.dt === null ? "unknown" : `${formatShort(preview.dt)} s`],
+        ["Sampling time", dt === null ? "unknown" : `${formatShort(dt)} s`],
         ["Time", preview.time],
         ["Size", formatBytes(dataset.bytes)],
       ]),
-      ...preview.warnings.map((warning) => el("p", { class: "complaint" }, warning)),
+      notes,
     ),
-    el(
-      "section",
-      { class: "card" },
-      el(
-        "div",
-        { class: "heading" },
-        el("h2", {}, "Signals"),
-        el("span", { class: "soft small" }, HINT, all),
-      ),
-      plot.node,
-    ),
-    ...forms.map((form) => form.node),
+    makeSignalCard(plot, ranges),
+    form.node,
+    diagnosis.node,
     el("section", { class: "card" }, el("h2", {}, "Columns"), choice.node),
     preview.inspection &&
       el("section", { class: "card" }, el("h2", {}, "Facts"), listFacts(preview.inspection)),
   ].filter(Boolean);
 }
 
+/** Return the request of an address that a reading of the record has kept; none if it is not JSON. */
+function parseRequest(text) {
+  try {
+    return JSON.parse(text) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+/** Return the fields of a request that an address sets: those of a job, of another reading, or of a drop. */
+async function loadInitial({ job, request, together }, signal) {
+  if (request) return parseRequest(request);
+  if (job) {
+    const { spec, name } = await getJson(`v1/jobs/${encodeURIComponent(job)}`, { signal });
+    return { preset: "auto", ...spec, name };
+  }
+  if (!together) return {};
+  const others = together.split(",").map((each) => getJson(getPath(each), { signal }));
+  return { recordings: (await Promise.all(others)).map(({ id, name }) => ({ dataset: id, name })) };
+}
+
 /** Show a data set in a host until the signal aborts. */
-export function mountDataset(host, { id }, signal) {
+export function mountDataset(host, { id, ...query }, signal) {
   const title = el("h1", { tabindex: "-1" }, "Data set");
   const body = el("div", { class: "stack" }, el("p", { class: "loading" }, "Loading…"));
   const back = el("a", { class: "back", href: "#/data" }, "← Data");
@@ -87,10 +178,13 @@ export function mountDataset(host, { id }, signal) {
   document.title = "Data set · islands";
   poll(async () => {
     try {
-      const dataset = await getJson(`v1/datasets/${encodeURIComponent(id)}`, { signal });
+      const [dataset, initial] = await Promise.all([
+        getJson(getPath(id), { signal }),
+        loadInitial(query, signal),
+      ]);
       title.replaceChildren(el("bdi", {}, dataset.name));
       document.title = `${dataset.name} · islands`;
-      body.replaceChildren(...makeContent(dataset, signal));
+      body.replaceChildren(...makeContent(dataset, initial, signal));
     } catch (error) {
       if (error.status !== 404) throw error;
       body.replaceChildren(el("p", { class: "empty" }, error.message));

@@ -1,6 +1,7 @@
 /** Page of a job: state, convergence, result, data set, settings and actions. */
 
 import { clearBanner, showProblem } from "../components/banner.js";
+import { makeRunAgainLink } from "../components/compare_choice.js";
 import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
 import { makeCoupledPanel } from "../components/coupled_model.js";
@@ -179,6 +180,7 @@ export function mountJob(host, { id, rank }, signal) {
       if (current) show(current);
     };
     aboutHost.replaceChildren(makeSettingsPanel(job.spec), makeDatasetPanel(job.spec, onUnitKnown, signal));
+    buttons.node.append(makeRunAgainLink(job) ?? "");
     host.replaceChildren(
       el("a", { class: "back", href: "#/jobs" }, "← Jobs"),
       titleBar,

@@ -2,7 +2,7 @@
 
 import { getJson } from "../../lib/api.js";
 import { el } from "../../lib/dom.js";
-import { makeField, makeJobForm, makeRowsField, quote } from "../job_request.js";
+import { makeField, makeJobForm, quote } from "../job_request.js";
 import { makeSimulationChoice } from "./simulation_choice.js";
 
 const ABSENT = "Choose the input of the simulation and the measured output in the table of columns.";
@@ -20,11 +20,27 @@ function describe({ input, output, channels = [], rows, tolerance = {} }, simula
   return { call: "diagnose", command: "diagnose", options, before };
 }
 
+/** Make the field of the rows of a diagnosis, and the button that takes those of a plot. */
+function makeRowsField(samples, getVisibleRows, onChange) {
+  const rows = el("input", { name: "rows", placeholder: "all", pattern: "\\d*:\\d*", maxlength: 40 });
+  function takeVisible() {
+    const [start, stop] = getVisibleRows();
+    rows.value = start === 0 && stop === samples ? "" : `${start}:${stop}`;
+    onChange();
+  }
+  const take = el("button", { type: "button", on: { click: takeVisible } }, "Use the visible rows");
+  const hint = "START:STOP of the rows that are used, counted from 0; all by default.";
+  return {
+    nodes: [...makeField("diagnose", "Rows", rows, hint), el("span"), take, el("span")],
+    get: () => rows.value,
+  };
+}
+
 /**
- * Make the form of a data set; `show({inputs, output})` and `setRows([start, stop])` update it.
- * `onSimulation` is called with the column of a recorded simulation, or null.
+ * Make the form of a data set; `show({inputs, output})` updates it. `getVisibleRows()` returns the rows of the
+ * plot; `onSimulation` is called with the column of a recorded simulation, or null.
  */
-export function makeDiagnosisForm({ id, name, preview }, onSimulation, signal) {
+export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimulation, signal) {
   const usable = preview.columns.filter((column) => column.name !== preview.time && !column.problem);
   const units = Object.fromEntries(usable.map((column) => [column.name, column.unit]));
   const driver = el("select", { name: "input" });
@@ -33,7 +49,7 @@ export function makeDiagnosisForm({ id, name, preview }, onSimulation, signal) {
     { class: "fields", hidden: true },
     makeField("diagnose", "Driven by", driver, "The other inputs are channels, such as a temperature."),
   );
-  const rows = makeRowsField("diagnose", preview.samples, update);
+  const rows = makeRowsField(preview.samples, getVisibleRows, update);
   const host = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   let [choice, simulated, column] = [{ inputs: [], output: "" }, null, null];
 
@@ -119,6 +135,5 @@ export function makeDiagnosisForm({ id, name, preview }, onSimulation, signal) {
       driverField.hidden = choice.inputs.length < 2;
       setRecord();
     },
-    setRows: rows.setVisible,
   };
 }

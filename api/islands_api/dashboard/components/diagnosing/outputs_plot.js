@@ -19,7 +19,9 @@ const askOutputs = (job, signal) => async (query) => {
 export function makeOutputsPlot(job, { record, verdict, gain, estimation_samples: heldOut }, signal) {
   if (heldOut === undefined) return null;
   const ask = askOutputs(job.id, signal);
-  const plot = makeSignalPlot({ samples: record.samples, dt: record.dt, heldOut, ask }, () => {}, signal);
+  const { samples, dt } = record;
+  const ranges = { getRanges: () => ({ validation: [heldOut, samples] }) };
+  const plot = makeSignalPlot({ samples, dt, ask }, ranges, signal);
   const after = verdict === "gross error" ? "corrected" : "extended";
   const names = gain === null ? ["simulated"] : ["simulated", after];
   const makeLine = (name, at) => ({ name, unit: record.units.output, colour: COLOURS[at] ?? "ink" });

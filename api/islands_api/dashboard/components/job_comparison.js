@@ -1,0 +1,141 @@
+/** Parts of the comparison of models: tables of errors, terms and settings, and charts. */
+
+import { el, makeScrollable, makeTable } from "../lib/dom.js";
+import { NONE, formatInterval, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
+import { makeLineChart } from "./chart.js";
+
+const getFreeRun = ({ metrics }, part) => metrics[part]?.free_run ?? {};
+
+const makeLink = ({ job, model, name }) => el("a", { href: `#/jobs/${job.id}/models/${model.rank}` }, name);
+
+const findUnit = ({ job, dataset }) =>
+  dataset?.preview.columns.find(({ name }) => name === job.spec.output)?.unit ?? "";
+
+const withUnit = (value, unit) => (Number.isFinite(value) ? `${formatNumber(value)} ${unit}`.trim() : NONE);
+
+/** Make the table of the models with their data, sizes and errors. */
+export const makeModelTable = (entries) =>
+  makeTable(
+    "Compared models",
+    [
+      ...["Model", "Data set"],
+      ...["Terms", "Error est.", "Error val.", "RMSE val."].map((name) => [name, "figure"]),
+    ],
+    entries.map((entry) => {
+      const { model, dataset } = entry;
+      const [estimated, validated] = ["estimation", "validation"].map((part) => getFreeRun(model, part));
+      return [
+        makeLink(entry),
+        el("bdi", {}, dataset?.name ?? "deleted"),
+        String(model.size),
+        formatPercent(estimated.mape),
+        formatPercent(validated.mape),
+        withUnit(validated.rmse, findUnit(entry)),
+      ];
+    }),
+  );
+
+/** Make the list of the equations. */
+export const listEquations = (entries) =>
+  entries.map(({ name, model }) =>
+    el("div", { class: "compared" }, el("h3", {}, name), el("code", {}, model.equation)),
+  );
+
+const getPoints = (times, values) => times.map((time, at) => [time, values[at]]);
+
+/** Return the models by the signal that they are compared with: its times and values. */
+function groupByMeasured(entries) {
+  const groups = new Map();
+  for (const entry of entries) {
+    const { time_s: times, measured } = entry.simulation;
+    const key = JSON.stringify([entry.job.spec.output, times, measured]);
+    groups.set(key, [...(groups.get(key) ?? []), entry]);
+  }
+  return [...groups.values()];
+}
+
+function makeOverlay(group, isOnly) {
+  const [first] = group;
+  const { output } = first.job.spec;
+  const unit = findUnit(first);
+  const names = group.map(({ name }) => name).join(" and ");
+  const chart = makeLineChart({
+    title: isOnly ? `Measured and simulated ${output}` : `Validation data of ${names}`,
+    x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
+    y: { label: unit ? `${output} (${unit})` : output },
+  });
+  const { time_s: times, measured } = first.simulation;
+  chart.draw([
+    { name: "measured", points: getPoints(times, measured) },
+    ...group.map(({ name, simulation }) => ({ name, points: getPoints(times, simulation.free_run) })),
+  ]);
+  return chart.node;
+}
+
+/** Make a chart for each validation data, with the free runs of all models that have them. */
+export function makeOverlays(entries) {
+  const groups = groupByMeasured(entries);
+  if (!groups.length) return [el("p", { class: "soft" }, "Models of several outputs have no common chart.")];
+  return groups.map((group) => makeOverlay(group, groups.length === 1));
+}
+
+/** Make the chart of the errors of all models of each job against their numbers of terms. */
+export function makeFrontChart(entries) {
+  const chart = makeLineChart({
+    title: "Validation error of all models of each job",
+    x: { label: "terms", integer: true },
+    y: { label: "error of the free run (%)", log: true },
+    marks: true,
+  });
+  const jobs = [...new Map(entries.map((entry) => [entry.job.id, entry])).values()];
+  chart.draw(
+    jobs.map(({ models, jobName }) => ({
+      name: jobName,
+      points: models
+        .map((model) => [model.size, getFreeRun(model, "validation").mape ?? null])
+        .sort(([one], [other]) => one - other),
+    })),
+  );
+  return chart.node;
+}
+
+/** Return a term with the names of its signals, which jobs number differently. */
+const nameTerm = ({ term, regressor }) => term ?? regressor;
+
+/** Make the table of the parameters of all terms, a column for each model. */
+export function makeTermTable(entries) {
+  const regressors = [...new Set(entries.flatMap(({ model }) => model.terms.map(nameTerm)))];
+  return makeTable(
+    "Parameters of the compared models",
+    ["Term", ...entries.map(({ name }) => [name, "figure"])],
+    regressors.map((regressor) => [
+      el("code", { class: "term" }, regressor),
+      ...entries.map(({ model }) => {
+        const term = model.terms.find((each) => nameTerm(each) === regressor);
+        return term ? formatInterval(term.parameter, 1.96 * term.standard_error) : NONE;
+      }),
+    ]),
+  );
+}
+
+const flatten = ({ settings = {}, ...fields }) => ({ ...fields, ...settings });
+
+const format = (value) => {
+  if (value === undefined || value === null) return "default";
+  return typeof value === "object" ? JSON.stringify(value) : String(value);
+};
+
+/** Make the table of the fields of the requests that are not equal in all jobs. */
+export function makeSettingTable(entries) {
+  const specs = entries.map(({ job }) => flatten(job.spec));
+  const names = [...new Set(specs.flatMap(Object.keys))].filter(
+    (name) => new Set(specs.map((spec) => format(spec[name]))).size > 1,
+  );
+  if (!names.length) return el("p", { class: "soft" }, "The jobs have the same settings.");
+  const table = makeTable(
+    "Settings that differ",
+    ["Setting", ...entries.map(({ name }) => name)],
+    names.map((name) => [el("code", {}, name), ...specs.map((spec) => format(spec[name]))]),
+  );
+  return makeScrollable("Settings that differ", table);
+}
