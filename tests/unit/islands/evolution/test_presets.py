@@ -1,10 +1,10 @@
 """Presets: the settings of the paper, parsed from its printed lists."""
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 
 import pytest
 
-from islands.evolution.presets import PRESETS
+from islands.evolution.presets import AUTO, PRESETS, common_settings, resolve_kinds
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
@@ -128,3 +128,14 @@ def test_phi_functions_are_single_nodes_with_two_arguments():
     gene = parse("phi2(q5(q5(q4(u(k-1)))), q5(q5(q1(u(k-1)))))")
     assert isinstance(gene, Apply)
     assert height(gene) == 4
+
+
+def test_common_settings_do_not_depend_on_the_record():
+    assert common_settings("narx") == {
+        each.name: getattr(PRESETS["narx"], each.name) for each in fields(Settings)
+    }
+    kinds = resolve_kinds({}).values()
+    common = common_settings(AUTO)
+    assert all(getattr(kind, name) == value for kind in kinds for name, value in common.items())
+    assert "tolerance" in common
+    assert not {"library", "structure"} & common.keys()

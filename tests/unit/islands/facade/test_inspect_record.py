@@ -187,3 +187,22 @@ def test_long_names_with_equal_beginnings_differ_in_the_table(tmp_path):
     path.write_text("\n".join([f't_s,"{names[0]}","{names[1]}"', *rows]) + "\n")
     table = format_inspection(islands.inspect_record(path)).splitlines()[3:6]
     assert [line[:28].rstrip()[-6:] for line in table] == ["t_s", " room)", "tdoor)"]
+
+
+def test_a_remedy_makes_the_record_usable_and_has_no_problem_left(tmp_path):
+    times = [*range(100), *range(150, 250)]
+    rng = np.random.default_rng(0)
+    u = rng.normal(size=len(times))
+    y = np.convolve(u, [0.0, 1.0, 0.5])[: len(times)]
+    rows = (f"{t},{a:.4f},{b:.4f}" for t, a, b in zip(times, u, y, strict=True))
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *rows]))
+    found = islands.inspect_record(tmp_path / "a.csv", ["u"], "y")
+    (problem,) = (note for note in found.notes if note.is_problem)
+    assert problem.rows == (100,)
+    assert found.remedy == {"gaps": "split"}
+    repaired = islands.inspect_record(tmp_path / "a.csv", ["u"], "y", reading=ReadingOptions(**found.remedy))
+    assert not any(note.is_problem for note in repaired.notes)
+    assert (repaired.remedy, repaired.sampling.problem) == ({}, "")
+    # Rows are counted from the beginning of the file.
+    part = islands.inspect_record(tmp_path / "a.csv", ["u"], "y", rows=slice(50, 200))
+    assert [note.rows for note in part.notes if note.is_problem] == [(100,)]

@@ -373,3 +373,22 @@ def test_readers_of_rare_formats_import_their_libraries_on_demand():
     program = f"import sys, islands.io.records; print([m for m in {rare} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_column_has_the_sampling_time_of_its_samples(tmp_path):
+    rows = (f"{0.1 * k:.1f},{k % 7},{k % 5 if k % 4 == 0 else ''}" for k in range(400))
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *rows]))
+    found = {column.name: column.dt for column in preview(tmp_path / "a.csv").columns}
+    assert found == {"t_s": pytest.approx(0.1), "u": pytest.approx(0.1), "y": pytest.approx(0.4)}
+
+
+def test_only_warnings_that_prevent_reading_are_problems(tmp_path):
+    times = [*range(100), *range(150, 250)]
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *(f"{t},{t % 7},{t % 5}" for t in times)]))
+    found = preview(tmp_path / "a.csv")
+    assert found.problems == found.warnings
+    assert "gap" in found.problems[0]
+    days = (f"{45987.5 + k / 1440:.9f},{k % 7},{k % 5}" for k in range(100))
+    (tmp_path / "b.csv").write_text("\n".join(["Date,u,y", *days]))
+    found = preview(tmp_path / "b.csv")
+    assert (len(found.warnings), found.problems) == (1, ())
