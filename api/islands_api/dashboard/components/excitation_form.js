@@ -42,18 +42,17 @@ function listValues({ unit, range: [low, high], dt, frequency }) {
 export function makeSliderField(id, { label, unit, least, most, start, isLog = false }, onChange) {
   const [to, from] = isLog ? [Math.log10, (at) => 10 ** at] : [Number, Number];
   const [low, high] = [to(least), to(most)];
-  const limits = { min: low, max: high, step: (high - low) / STEPS };
-  const slider = el("input", { type: "range", "aria-label": label, ...limits });
+  const slider = el("input", { type: "range", "aria-label": label, min: 0, max: STEPS });
   const field = el("input", { type: "number", id, step: "any", required: true });
   // Frequencies have limits; other values may leave the slider, and the service warns of them.
   if (isLog) [field.min, field.max] = [Number.MIN_VALUE, most];
   function show(value, isTyped = false) {
-    slider.value = to(value);
+    slider.value = (STEPS * (to(value) - low)) / (high - low);
     slider.setAttribute("aria-valuetext", `${formatShort(value)} ${unit}`.trim());
     if (!isTyped) field.value = value;
   }
   slider.addEventListener("input", () => {
-    show(Math.min(round(from(Number(slider.value))), most));
+    show(Math.min(round(from(low + (slider.value / STEPS) * (high - low))), most));
     onChange();
   });
   field.addEventListener("input", () => {

@@ -20,7 +20,7 @@ export function findLimits(values) {
 /** Make the plot; `draw(x, y)` shows `{label, values}` of the input and of the output. */
 export function makeLoopPlot(title, signal) {
   const canvas = el("canvas", { "aria-hidden": "true" });
-  const plot = el("div", { class: "loop", role: "img", "aria-label": title }, canvas);
+  const plot = el("div", { class: "loop s0", role: "img", "aria-label": title }, canvas);
   let axes = null;
 
   function render() {

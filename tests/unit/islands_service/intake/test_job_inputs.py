@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
-from islands_service.intake.job_inputs import read_record_and_columns, read_record_and_validation
+from islands_service.intake.job_inputs import (
+    read_beginning,
+    read_record_and_columns,
+    read_record_and_validation,
+)
 from islands_service.store.blobs import Blobs
 from islands_service.store.datasets import StoredDataset
 from support.service import csv, spec
@@ -69,3 +73,43 @@ def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
     }
     assert validation == 0.5
     assert order.datasets == ("a", "b", "b")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("rows", "most", "expected"),
+    [
+        (None, 50, slice(0, 50)),
+        (None, 500, slice(0, 120)),
+        ("-60:-20", 500, slice(60, 100)),
+        ("60:", 40, slice(60, 100)),
+    ],
+)
+def test_the_beginning_of_a_job_has_its_first_samples_and_inputs_as_measured(
+    tmp_path: Path, rows: str | None, most: int, expected: slice
+) -> None:
+    blobs = Blobs(tmp_path)
+    stored = StoredDataset("me", "a", "a.csv", ".csv", blobs.write(csv(120)), 7, {"samples": 120}, 0.0)
+    order = Identification.model_validate(
+        {**spec("a"), "inputs": ["u_V"], **({"rows": rows} if rows else {})}
+    )
+    whole, _ = read_record_and_validation(order.model_copy(update={"rows": None}), {"a": stored}, blobs)
+    early = order.model_copy(update={"inputs": ("u_V+1",)})
+    for each in (order, early):
+        found = read_beginning(each, {"a": stored}, blobs, most)
+        assert found.input_names == ("u_V",)
+        assert np.array_equal(found.u, whole.u[expected])
+        assert np.array_equal(found.y, whole.y[expected])
+
+
+@pytest.mark.ci
+def test_the_beginning_of_a_record_with_a_slow_output_has_the_samples_of_the_output(tmp_path: Path) -> None:
+    blobs = Blobs(tmp_path)
+    rows = [f"{0.01 * k:.2f},{k % 7},{k if k % 10 == 0 else ''}" for k in range(600)]
+    stored = blobs.write("\n".join(["t_s,u_V,y_um", *rows]).encode())
+    datasets = {"a": StoredDataset("me", "a", "a.csv", ".csv", stored, 7, {"samples": 600}, 0.0)}
+    order = Identification.model_validate(spec("a"))
+    whole, _ = read_record_and_validation(order, datasets, blobs)
+    found = read_beginning(order, datasets, blobs, 50_000)
+    assert found.samples == whole.samples
+    assert np.array_equal(found.u, whole.u)
