@@ -19,7 +19,7 @@ WIDE, NARROW = (1280, 800), (360, 800)
 def places(desk: Service) -> dict[str, str]:
     """Addresses of all views without a result."""
     problem = {"title": "The job failed", "detail": "data.csv, line 8, column y_um is empty: " + "x" * 200}
-    failed = desk.submit(500, name="a-name-without-a-space-" * 8)
+    failed = desk.submit(500, name="a-name-without-a-space-" * 8, tags=["rig 2", "t" * 40])
     cancelled = desk.submit(500, name="cancelled")
     running = desk.submit(500, name="running", settings={"islands": 8})
     with stored(desk) as store:

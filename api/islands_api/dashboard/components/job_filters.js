@@ -13,8 +13,8 @@ export function makeJobsAddress(filters = {}) {
   return query.size ? `#/jobs?${query}` : "#/jobs";
 }
 
-/** Make the filters; `show(filters)` updates them to those of the address. */
-export function makeJobFilters() {
+/** Make the filters until the signal aborts; `show(filters)` updates them to those of the address. */
+export function makeJobFilters(signal) {
   const states = el("nav", { class: "filters", "aria-label": "Jobs by state" });
   const kind = el(
     "select",
@@ -32,16 +32,18 @@ export function makeJobFilters() {
   /** Change the address without a further entry of the history while the user types. */
   function type() {
     clearTimeout(timer);
-    const address = makeJobsAddress({ ...current, q: search.value.trim(), cursor: "" });
-    timer = setTimeout(() => location.replace(address), TYPING_MS);
+    timer = setTimeout(() => {
+      timer = null;
+      location.replace(makeJobsAddress({ ...current, q: search.value.trim(), cursor: "" }));
+    }, TYPING_MS);
   }
   search.addEventListener("input", type);
+  signal.addEventListener("abort", () => clearTimeout(timer));
   kind.addEventListener("change", () => {
     location.hash = makeJobsAddress({ ...current, kind: kind.value, cursor: "" });
   });
 
   function show(filters) {
-    clearTimeout(timer);
     current = filters;
     const { state = "", q = "" } = filters;
     const makeLink = (name, value) => {
@@ -52,7 +54,8 @@ export function makeJobFilters() {
     states.replaceChildren(makeLink("all", ""), ...STATES.map((each) => makeLink(each, each)));
     if (hadFocus) states.querySelector("[aria-current]").focus();
     kind.value = filters.kind ?? "";
-    if (search.value.trim() !== q) search.value = q;
+    // While the user types, the text is newer than the address.
+    if (timer === null && search.value.trim() !== q) search.value = q;
     const href = makeJobsAddress({ ...filters, tag: "", cursor: "" });
     const label = `Tag ${filters.tag}: show jobs with and without it`;
     const link = () => el("a", { class: "tag chosen", href, "aria-label": label }, filters.tag, " ×");

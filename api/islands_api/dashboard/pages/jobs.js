@@ -102,7 +102,7 @@ function makeSortHeading(name, sort, order, filters) {
 export function mountJobs(host, firstFilters, signal) {
   document.title = "Jobs · islands";
   const heading = el("h1", { tabindex: "-1" }, "Jobs");
-  const [bars, list] = [makeJobFilters(), el("div")];
+  const [bars, list] = [makeJobFilters(signal), el("div")];
   let [filters, table, selection] = [null, null, null];
 
   function refresh() {
