@@ -46,6 +46,7 @@ include-name = [
     "POST /v1/jobs", "POST /v1/discrepancies", "POST /v1/datasets", "GET /v1/jobs", "GET /v1/datasets",
     "POST /v1/datasets/fetch", "POST /v1/webhooks", "POST /v1/monitors", "GET /v1/monitors",
     "POST /v1/monitors/{{monitor}}/records", "POST /v1/jobs/{{job}}/models/{{rank}}/simulate",
+    "POST /v1/simulations/equations",
 ]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "410", "422", "429"]
 
@@ -59,6 +60,7 @@ checks.allow_header_conformance.enabled = false
 include-name = [
     "GET /v1/jobs/{{job}}/extended", "GET /v1/jobs/{{job}}/figures", "GET /v1/jobs/{{job}}/history",
     "GET /v1/jobs/{{job}}/models", "GET /v1/jobs/{{job}}/report", "GET /v1/monitors/{{monitor}}/state",
+    "GET /v1/jobs/{{job}}/extended/export", "GET /v1/jobs/{{job}}/outputs",
 ]
 checks.ensure_resource_availability.enabled = false
 """

@@ -58,7 +58,7 @@ function describeRequest({ path, call, command, options, before = [] }, request)
 
 /**
  * Make the form of a job. `makeRequest()` returns the request, or null if it is incomplete;
- * `describe(request)` its form for other programs; `explain(request)` a text beside the button; `fields(row)`
+ * `describe(request)` its form for other programs; `explain(request)` a text for its button; `fields(row)`
  * the content above the commands, with the row of the button. `update()` shows a changed request.
  */
 export function makeJobForm({ action, path, makeRequest, describe, explain, fields }) {

@@ -13,7 +13,7 @@ import { LEFT, RIGHT, drawSignals, makeRowScale } from "./signal_panels.js";
 /** Distance in pixels from an edge of a marked range in which a drag moves the edge. */
 const EDGE = 7;
 
-/** How a plot is read; for a text beside it. */
+/** How a plot is read. */
 export const HINT = "Click, then wheel: zoom. Drag: move. Keys: arrows, +, −, Home.";
 
 /** Fewest rows of a range, largest number of points of a request, and panels of a plot. */

@@ -68,7 +68,7 @@ async def exported(job: Id, caller: Reader, state: AppStateDep, form: ExportForm
     if model is None:
         raise ResourceNotFoundError(
             f"the extended simulation of job {job} is not one difference equation: save its /extended as "
-            "extended.json, and export that with islands.load(FILE).export(FORMAT)"
+            "extended.json, and write it with 'islands show extended.json --format c', matlab or python"
         )
     return await export_response(state, model, form, f"extended-{job[:8]}")
 

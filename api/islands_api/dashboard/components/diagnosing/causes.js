@@ -1,4 +1,4 @@
-/** Causes that a diagnosis has screened: score, confidence, and those that cannot be told apart. */
+/** Causes that a diagnosis has screened: score, confidence, and equivalent causes. */
 
 import { el, makeFacts, makeScrollable, makeTable, svg } from "../../lib/dom.js";
 import { formatNumber } from "../../lib/numbers.js";
@@ -38,7 +38,7 @@ function makeCauseTable(candidates, effects, most) {
   const headings = [
     ...["Cause", "Score"],
     ...["Explained", "Confidence"].map((name) => [name, "figure"]),
-    "Cannot be told apart from",
+    "Equivalent causes",
   ];
   const rows = candidates.map((each) =>
     makeRow(each, effects.find(({ name }) => name === each.name), most),
@@ -66,6 +66,6 @@ export function makeCauses({ candidates, effects, decisive_experiment: experimen
     make(candidates.slice(0, SHOWN)),
     rest.length > 0 &&
       el("details", { class: "rest" }, el("summary", {}, `${rest.length} further causes`), make(rest)),
-    isUnsure && makeFacts([["Experiment that tells them apart", experiment ?? "none was found"]]),
+    isUnsure && makeFacts([["Experiment that separates them", experiment ?? "none was found"]]),
   );
 }

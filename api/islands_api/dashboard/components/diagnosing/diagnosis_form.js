@@ -37,8 +37,8 @@ function makeRowsField(samples, getVisibleRows, onChange) {
 }
 
 /**
- * Make the form of a data set; `show({inputs, output})` updates it. `getVisibleRows()` returns the rows of the
- * plot; `onSimulation` is called with the column of a recorded simulation, or null.
+ * Make the form of a data set; `show({inputs, output})` updates it. `getVisibleRows()` returns the rows of
+ * the plot; `onSimulation` is called with the column of a recorded simulation, or null.
  */
 export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimulation, signal) {
   const usable = preview.columns.filter((column) => column.name !== preview.time && !column.problem);

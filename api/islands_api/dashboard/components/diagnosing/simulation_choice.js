@@ -113,7 +113,7 @@ function makeModelFields(onChange, signal) {
  */
 export function makeSimulationChoice(simulations, onChange, signal) {
   const byKind = new Map(simulations.map((each) => [each.kind, each]));
-  // A recorded simulation is shown beside the measured output before anything runs.
+  // A recorded simulation is drawn over the measured output before anything runs.
   const kinds = [...byKind.keys()].sort((a, b) => (b === "column") - (a === "column"));
   const kind = makeSelect("simulation", kinds.map((each) => [each, LABELS[each] ?? each]));
   let record = { columns: [], units: ["", ""] };
@@ -145,7 +145,7 @@ export function makeSimulationChoice(simulations, onChange, signal) {
     onChange();
   }
 
-  /** Make only those fields anew that depend on what has changed: a text or values may have been entered. */
+  /** Replace only the fields that depend on the change: a text or values may have been entered. */
   function setRecord(newRecord) {
     const hasChanged = (part) => String(record[part]) !== String(newRecord[part]);
     const [columns, units] = [hasChanged("columns"), hasChanged("units")];
