@@ -103,7 +103,8 @@ def test_all_controls_are_reachable_by_keyboard(
         "← Jobs",
         "Cancel",
         "Error of each island",
-        "Best error by number of terms",
+        "Front of size against error",
+        "Stop and keep the best",
     } <= reached
     assert "Columns of the data set" in reached
 
