@@ -297,6 +297,8 @@ def test_a_figure_is_saved_as_svg_png_and_csv(
     page = opened(f"#/jobs/{finished}", color_scheme="dark")
     figure = page.locator("figure.rendered", has=page.get_by_role("heading", name="Residual correlations"))
     figure.scroll_into_view_if_needed()
+    # The first request draws all figures, which takes half a minute on a busy machine.
+    figure.get_by_role("img").wait_for(timeout=120_000)
     expect(figure.get_by_role("img")).to_have_css("filter", "invert(1) hue-rotate(180deg)")
     made = {}
     for form in ("SVG", "PNG", "CSV"):

@@ -9,8 +9,10 @@ const PNG_SCALE = 300 / 96;
 
 /** Make the links of a loaded picture; `table` is the address of its numbers. */
 export function makeFileLinks(table, name, title, picture) {
-  const link = (text, attributes) =>
-    el("a", { "aria-label": `${title} as ${text}`, download: `${name}.${text.toLowerCase()}`, ...attributes }, text);
+  const link = (text, attributes) => {
+    const file = `${name}.${text.toLowerCase()}`;
+    return el("a", { "aria-label": `${title} as ${text}`, download: file, ...attributes }, text);
+  };
   const intercept = (save) => {
     const run = runOnceAtATime(() => save().catch(showProblem));
     return (event) => {

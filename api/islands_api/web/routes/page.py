@@ -1,4 +1,4 @@
-"""Dashboard at ``/``: static files; the page uses the REST interface like any other client."""
+"""Dashboard at ``/``, and reference of REST at ``/docs``: static files; the page uses the REST interface like any other client."""
 
 import gzip
 import hashlib
@@ -20,14 +20,17 @@ _STYLE = "text/css; charset=utf-8"
 #: Media types of the files of the dashboard. A new module needs an entry here and a preload in index.html.
 FILES = {
     "index.html": "text/html; charset=utf-8",
+    "docs.html": "text/html; charset=utf-8",
     "icon.svg": "image/svg+xml",
     "data.css": _STYLE,
+    "docs.css": _STYLE,
     "islands.css": _STYLE,
     "job.css": _STYLE,
     "jobs.css": _STYLE,
     "live.css": _STYLE,
     "monitor.css": _STYLE,
     "try.css": _STYLE,
+    "docs.js": _SCRIPT,
     "islands.js": _SCRIPT,
     "components/added_records.js": _SCRIPT,
     "components/banner.js": _SCRIPT,
@@ -114,6 +117,15 @@ async def index(
 ) -> Response:
     """Return the dashboard."""
     return _file_response("index.html", if_none_match, accept_encoding)
+
+
+@router.get("/docs")
+async def docs(
+    if_none_match: Annotated[str | None, Header()] = None,
+    accept_encoding: Annotated[str, Header()] = "",
+) -> Response:
+    """Return the reference of the REST interface, which shows ``openapi.json``."""
+    return _file_response("docs.html", if_none_match, accept_encoding)
 
 
 @router.get("/dashboard/{name:path}")
