@@ -32,7 +32,7 @@ _TITLE = 14
 #: Columns of a file that are listed, at most, and characters of a name.
 _MOST_COLUMNS, _NAME = 40, 28
 
-#: Rows of a kind that are listed.
+#: Rows of a kind, and problems of columns, that are listed.
 _LISTED = 3
 
 
@@ -52,8 +52,10 @@ def format_inspection(inspection: RecordInspection) -> str:
         ]
         if sentences:
             lines += _format_paragraph(title, " ".join(sentences))
-    for warning in inspection.warnings:
-        lines += _format_paragraph("note", warning)
+    # Without a choice, what is wrong with the columns is what to mend.
+    problems = [] if choice.output else [each.problem for each in inspection.columns if each.problem]
+    for note in dict.fromkeys([*inspection.warnings, *problems[:_LISTED]]):
+        lines += _format_paragraph("note", note)
     if inspection.command:
         lines += ["", "Next:", *_format_command(inspection.command)]
     return "\n".join(lines) + "\n"

@@ -206,3 +206,10 @@ def test_a_remedy_makes_the_record_usable_and_has_no_problem_left(tmp_path):
     # Rows are counted from the beginning of the file.
     part = islands.inspect_record(tmp_path / "a.csv", ["u"], "y", rows=slice(50, 200))
     assert [note.rows for note in part.notes if note.is_problem] == [(100,)]
+
+
+def test_the_text_says_why_columns_are_unusable_if_none_can_be_chosen(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("\n".join(["t,u,y", *(f"{k},a{k},{k % 3}" for k in range(90))]) + "\n")
+    text = " ".join(format_inspection(islands.inspect_record(path)).split())
+    assert "r.csv, line 2, column u: 'a0' is not a number: correct the cell" in text
