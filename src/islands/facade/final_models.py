@@ -60,6 +60,10 @@ _GAINING = 0.05
 #: that are still simulated on the validation data, at most; one model always is. Each takes half a second.
 _ASSESSED_SAMPLES, _SCREENED_SAMPLES = 250_000, 1_500_000
 
+#: Time of the final estimation of a size for each sample and each square of the size, relative to the part
+#: that depends on neither. Of 20 000 samples, 15 terms take 2.6 s and one takes 0.1 s.
+_SQUARE_SECONDS = 5e-6
+
 #: Name of the step that refines parameters.
 _REFINEMENT = "refinement of parameters"
 
@@ -156,8 +160,9 @@ def estimate_candidates(
     settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
     found = []
     groups = _group_by_size(_evaluate_structures(hall_of_fame, problem))
-    for done, group in enumerate(groups):
-        steps.report(f"estimation of the final models of {group[0].size} terms", done / len(groups))
+    completed = completed_parts([group[0].size for group in groups], split.estimation.samples)
+    for done, group in zip(completed, groups, strict=True):
+        steps.report(f"estimation of the final models of {group[0].size} terms", done)
         compared, count = group, _REFINED
         if steps.skip("estimation of further structures"):
             compared = _take_fittest(group, max(1, _SCREENED_SAMPLES // validation.samples))
@@ -168,6 +173,20 @@ def estimate_candidates(
         found += _estimate_models(kept, settings, split, offsets, steps)
     # A search without a model reports why it has none.
     return [*found, *_fit_simulations(settings, split, steps)] if found else []
+
+
+def completed_parts(sizes: Sequence[int], samples: int) -> list[float]:
+    """Return the completed part of the final estimation before each size, by the times that they take.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Numbers of terms.
+    samples : int
+        Samples of the estimation data.
+    """
+    seconds = [1.0 + _SQUARE_SECONDS * samples * size**2 for size in sizes]
+    return [sum(seconds[:place]) / sum(seconds) for place in range(len(seconds))]
 
 
 def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Candidate]:
