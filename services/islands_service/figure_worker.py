@@ -25,6 +25,7 @@ from islands.data.split import average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import SearchResult, SearchStatistics
+from islands.export import FILE_EXPORTS
 from islands.facade.coupled.result import read_fitted_model
 from islands.figures.drawn_numbers import tabulate_lines
 from islands.figures.free_run import draw_free_run
@@ -43,7 +44,7 @@ from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 from islands.validation.prediction_bands import PredictionBand
-from islands_service.domain.job import REPORT, Job
+from islands_service.domain.job import FMU, REPORT, Job
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.settings import ServiceSettings, service_settings
@@ -72,6 +73,7 @@ def main() -> int:
     parser.add_argument("--owner", required=True)
     parser.add_argument("--rank", type=int, help="rank of a model; without it, the figures of the search")
     parser.add_argument("--numbers", action="store_true", help="only the free run of the model as numbers")
+    parser.add_argument("--fmu", action="store_true", help="only the model as FMU, which has to be compiled")
     arguments = parser.parse_args()
     settings = service_settings()
     _limit(settings)
@@ -80,7 +82,9 @@ def main() -> int:
         with Store(settings.url) as store:
             job = store.jobs.get(arguments.owner, arguments.job)
             rank = arguments.rank
-            if len(parse_identification(job.spec).outputs) > 1:
+            if arguments.fmu:
+                made = compile_fmu(job, store, rank)
+            elif len(parse_identification(job.spec).outputs) > 1:
                 made = render_outputs(job, store, blobs)
             elif rank is None:
                 made = render_figures(job, read_search_result(job, store, blobs, rank))
@@ -215,6 +219,18 @@ def render_simulation(found: SearchResult, rank: int) -> dict[str, bytes]:
     return {f"{rank}/free-run.json": _free_run_document(data, run.y, run.outcome, band)}
 
 
+def compile_fmu(job: Job, store: Store, rank: int) -> dict[str, bytes]:
+    """Return a model as FMU of FMI 3.0, by artefact name.
+
+    Raises
+    ------
+    IslandsError
+        The model no longer exists, or this machine has no C compiler.
+    """
+    _, _, (stored, *_) = _read_result(job, store, rank)
+    return {f"{rank}/{FMU}": FILE_EXPORTS["fmu"](any_model_from_json(stored.file, f"model {rank}"))}
+
+
 def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     """Render the free run of every output of the model of a job, and its report.
 
@@ -250,7 +266,7 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
 
 def _save_all(figures: Mapping[str, Figure]) -> dict[str, bytes]:
     """Return every figure as SVG and as a table of its lines, by artefact name."""
-    made = {}
+    made = dict[str, bytes]()
     for name, figure in figures.items():
         stream = io.BytesIO()
         save(figure, stream)

@@ -36,6 +36,7 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/models/{rank}/figures/{figure}.csv"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}/simulation"): "read",
     ("POST", "/v1/jobs/{job}/models/{rank}/simulate"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/fmu"): "read",
     ("GET", "/v1/jobs/{job}/result"): "read",
     ("GET", "/v1/jobs/{job}/figures"): "read",
     ("GET", "/v1/jobs/{job}/figures/{figure}.svg"): "read",

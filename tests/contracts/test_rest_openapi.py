@@ -1,13 +1,17 @@
 """Responses of all routes match the OpenAPI document."""
 
+import io
 import json
 import re
 import xml.etree.ElementTree as ET
+import zipfile
 
 import pytest
 from jsonschema import Draft202012Validator
 
-from islands.export import EXPORTS
+from islands.export import EXPORTS, FILE_EXPORTS
+from islands.export.fmu.compiler import find_compiler
+from islands.io.models import model_from_json
 from support.service import (
     columns,
     csv,
@@ -236,6 +240,19 @@ def test_a_model_is_exported_in_every_format(service, document, finished, form):
     (parameter,) = [each for each in documented["parameters"] if each["name"] == "format"]
     assert form in parameter["schema"]["enum"]
     assert answer.headers["content-type"].partition(";")[0] in documented["responses"]["200"]["content"]
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(find_compiler() is None, reason="there is no C compiler named cc")
+def test_a_model_is_exported_as_fmu(service, document, finished):
+    answer = check_response(document, service.client.get(f"/v1/jobs/{finished}/models/1/fmu"))
+    assert answer.headers["content-disposition"] == 'attachment; filename="model-01.fmu"'
+    stored = service.client.get(f"/v1/jobs/{finished}/models/1/export", params={"format": "json"}).text
+    expected = FILE_EXPORTS["fmu"](model_from_json(stored, "model 1"))
+    first, second = (zipfile.ZipFile(io.BytesIO(each)) for each in (answer.content, expected))
+    assert first.namelist() == second.namelist()
+    for name in ("modelDescription.xml", "sources/model.h"):
+        assert first.read(name) == second.read(name)
 
 
 def test_an_unknown_export_format_is_rejected(service, finished):

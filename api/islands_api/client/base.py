@@ -107,6 +107,7 @@ class BaseClient(Generic[H]):
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)
     simulate = Endpoint(simulation_calls.simulate)
+    fmu = Endpoint(calls.fmu)
     create_monitor = Endpoint(monitor_calls.create_monitor)
     monitors = Endpoint(monitor_calls.monitors)
     monitor = Endpoint(monitor_calls.monitor)

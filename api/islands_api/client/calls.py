@@ -260,6 +260,13 @@ def export(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[st
     return RequestSpec("GET", path, lambda response: response.text, params={"format": form})
 
 
+def fmu(which: JobRef, rank: int = 1) -> RequestSpec[bytes]:
+    """Return a model as FMU of FMI 3.0, compiled for the machine of the service."""
+    return RequestSpec(
+        "GET", f"/v1/jobs/{quote_id(which)}/models/{rank}/fmu", lambda response: response.content
+    )
+
+
 def figure(which: JobRef, name: str, rank: int | None = 1, form: str = "svg") -> RequestSpec[bytes]:
     """Return a figure of a model, or of the search if the rank is None: svg, or csv with its lines."""
     of = "" if rank is None else f"/models/{rank}"

@@ -73,6 +73,9 @@ KINDS = (IDENTIFICATION, DISCREPANCY, MONITORING)
 #: Artefact with the HTML report of a result.
 REPORT = "report.html"
 
+#: Artefact of a model: the model as FMU, below its rank.
+FMU = "model.fmu"
+
 #: Artefact of a discrepancy job with the simulation extended by the effects found.
 EXTENDED = "extended.json"
 

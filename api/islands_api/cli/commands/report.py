@@ -37,7 +37,7 @@ def report(
     folder = Path(source)
     if folder.exists():
         # The models take a second to import.
-        from islands.reports.saved_report import report_saved_result  # noqa: PLC0415
+        from islands.reports.saved_result import report_saved_result  # noqa: PLC0415
 
         page = report_saved_result(folder)
         path = out or (folder if folder.is_dir() else folder.parent) / REPORT_FILE

@@ -160,8 +160,13 @@ const listExcursion = ({ name, bounded, range_percent: range }) => [
 function makeExportButtons(path, rank) {
   const save = (form) =>
     runOnceAtATime(() => download(`${path}/export?format=${form}`, `model-${rank}.txt`).catch(showProblem));
-  return Object.entries(EXPORTS).map(([form, name]) =>
-    el("button", { type: "button", "data-format": form, on: { click: save(form) } }, name));
+  const fmu = runOnceAtATime(() => download(`${path}/fmu`, `model-${rank}.fmu`).catch(showProblem));
+  const button = (form, name, click) =>
+    el("button", { type: "button", "data-format": form, on: { click } }, name);
+  return [
+    ...Object.entries(EXPORTS).map(([form, name]) => button(form, name, save(form))),
+    button("fmu", "FMU", fmu),
+  ];
 }
 
 export const makeExportRow = (path, rank) =>

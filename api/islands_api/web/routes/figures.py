@@ -1,4 +1,4 @@
-"""Figures and reports of finished jobs: drawn by a separate process at the first request, then stored."""
+"""Figures, reports and FMUs of jobs: made by a separate process at the first request, then stored."""
 
 import asyncio
 import errno
@@ -21,7 +21,7 @@ from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.requests import StrictRoute
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
-from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, MONITORING, REPORT
+from islands_service.domain.job import DISCREPANCY, FMU, IDENTIFICATION, MONITORING, REPORT
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.confined_process import REQUESTS
 from islands_service.store.backends.object_store import ObjectStoreError
@@ -50,8 +50,17 @@ _MAX_FAILURES = 1000
 #: Artefact with the simulation of a model as numbers.
 SIMULATION_ARTEFACT = "free-run.json"
 
+#: Options of the process that makes an artefact without all figures, by the end of its name.
+_PARTS = {SIMULATION_ARTEFACT: "--numbers", FMU: "--fmu"}
+
 _SVG_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}
+}
+
+_FMU_TYPE = "application/octet-stream"
+
+_FMU_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {_FMU_TYPE: {"schema": {"type": "string", "format": "binary"}}}}
 }
 
 _CSV = "text/csv; charset=utf-8"
@@ -93,23 +102,23 @@ class FigureFailures:
     """Recent failures of figure processes: repeated attempts would delay the figures of other jobs."""
 
     def __init__(self) -> None:
-        self._failures: dict[tuple[str, int | None], tuple[float, IslandsError]] = {}
+        self._failures: dict[tuple[str, int | None, str | None], tuple[float, IslandsError]] = {}
 
-    def remember(self, job: str, rank: int | None, error: IslandsError) -> None:
+    def remember(self, job: str, rank: int | None, error: IslandsError, part: str | None = None) -> None:
         """Store the error of a failed attempt."""
-        self._failures.pop((job, rank), None)
+        self._failures.pop((job, rank, part), None)
         if len(self._failures) == _MAX_FAILURES:
             del self._failures[next(iter(self._failures))]
-        self._failures[job, rank] = monotonic() + _FAILURE_SECONDS, error
+        self._failures[job, rank, part] = monotonic() + _FAILURE_SECONDS, error
 
-    def refuse(self, job: str, rank: int | None) -> None:
+    def refuse(self, job: str, rank: int | None, part: str | None = None) -> None:
         """Raise the error of a recent failed attempt, if there is one.
 
         Raises
         ------
         FigureError, BlobNotFoundError
         """
-        until, error = self._failures.get((job, rank), (0.0, None))
+        until, error = self._failures.get((job, rank, part), (0.0, None))
         if error is not None and monotonic() < until:
             raise type(error)(*error.args)
 
@@ -184,6 +193,15 @@ async def simulation(
     return await _figure_response(state, caller, job, name, rank, "application/json")
 
 
+@router.get("/{job}/models/{rank}/fmu", response_class=Response, responses=_FMU_RESPONSES)
+async def fmu(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Response:
+    """Export a model as FMU of FMI 3.0 for co-simulation, compiled for the machine of the service."""
+    await get_model(state, caller, job, rank)
+    response = await _figure_response(state, caller, job, f"{rank}/{FMU}", rank, _FMU_TYPE)
+    response.headers["Content-Disposition"] = f'attachment; filename="model-{rank:02d}.fmu"'
+    return response
+
+
 @router.get("/{job}/report", response_class=Response, responses=_HTML_RESPONSES)
 async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return the report of a job: a self-contained HTML file with the result and its figures."""
@@ -242,7 +260,7 @@ async def _figure_response(
                 # Another request may have drawn the figure in the meantime.
                 blob = await state.run_blocking(state.store.results.artefact, job, name)
                 if blob is None:
-                    await _draw(state, caller, job, rank, name.endswith(SIMULATION_ARTEFACT))
+                    await _draw(state, caller, job, rank, _find_part(name))
                     blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
         raise ResourceNotFoundError(f"job {job} has no figure {name}")
@@ -252,26 +270,33 @@ async def _figure_response(
     return Response(data, media_type=media, headers=headers)
 
 
-async def _draw(state: AppState, caller: Principal, job: str, rank: int | None, numbers: bool) -> None:
+def _find_part(name: str) -> str | None:
+    """Return the option of the process that makes an artefact alone; None if it is made with all figures."""
+    # The page shows the free run first; the figures take several seconds.
+    return next((option for end, option in _PARTS.items() if name.endswith(end)), None)
+
+
+async def _draw(state: AppState, caller: Principal, job: str, rank: int | None, part: str | None) -> None:
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     for dataset in parse_identification(found.spec).datasets:
         # Raises if an earlier version deleted it.
         await state.run_blocking(state.store.datasets.get, caller.owner, dataset, deleted=True)
-    _FAILURES.refuse(job, rank)
+    _FAILURES.refuse(job, rank, part)
     try:
-        await _run_figure_worker(state, caller, job, rank, numbers)
+        await _run_figure_worker(state, caller, job, rank, part)
     except (FigureError, BlobNotFoundError) as error:
-        _FAILURES.remember(job, rank, error)
+        _FAILURES.remember(job, rank, error, part)
         raise
 
 
 async def _run_figure_worker(
-    state: AppState, caller: Principal, job: str, rank: int | None, numbers: bool
+    state: AppState, caller: Principal, job: str, rank: int | None, part: str | None
 ) -> None:
     options = [] if rank is None else ["--rank", str(rank)]
-    if numbers:
-        # The page shows the free run first; the figures take several seconds.
-        options.append("--numbers")
+    if part is not None:
+        options.append(part)
+    what, done = ("FMU", "compiled") if part == _PARTS[FMU] else ("figures", "drawn")
+    failure = f"the {what} of job {job} cannot be {done}"
     readers = state.settings.readers
     inherited = {} if readers is None else {REQUESTS: str(readers)}
     process = await asyncio.create_subprocess_exec(
@@ -292,9 +317,7 @@ async def _run_figure_worker(
         async with asyncio.timeout(_DRAWING_TIMEOUT):
             stdout, stderr = await process.communicate()
     except TimeoutError:
-        raise FigureError(
-            f"the figures of job {job} take longer than {_DRAWING_TIMEOUT:.0f} s to draw"
-        ) from None
+        raise FigureError(f"{failure}: it would take longer than {_DRAWING_TIMEOUT:.0f} s") from None
     finally:
         if process.returncode is None:
             process.kill()
@@ -305,7 +328,7 @@ async def _run_figure_worker(
     reason = _decode(stderr)
     match process.returncode:
         case errno.EINVAL:
-            raise FigureError(f"the figures of job {job} cannot be drawn: {_decode(stdout)}")
+            raise FigureError(f"{failure}: {_decode(stdout)}")
         case errno.ENOSPC:
             raise StorageFullError(reason)
         case errno.EROFS:
@@ -317,7 +340,7 @@ async def _run_figure_worker(
         case errno.ENODATA:
             raise BlobNotFoundError(reason)
     log.error("drawing failed", job=job, status=process.returncode, reason=reason)
-    raise FigureError(f"the figures of job {job} cannot be drawn: the log of the service gives the reason")
+    raise FigureError(f"{failure}: the log of the service gives the reason")
 
 
 def _decode(output: bytes) -> str:

@@ -1,4 +1,4 @@
-"""Dashboard at ``/``, and reference of REST at ``/docs``: static files; the page uses the REST interface like any other client."""
+"""Dashboard at ``/`` and reference at ``/docs``: static files, which use REST like any other client."""
 
 import gzip
 import hashlib
