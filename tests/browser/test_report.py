@@ -12,7 +12,7 @@ from PIL import Image
 import islands
 from islands.figures.names import ALL_FIGURES
 from islands.figures.style import FRAME, MEASURED, RESIDUAL, SIMULATED
-from islands.reports.saved_report import report_saved_result
+from islands.reports.saved_result import report_saved_result
 from support.contrast import LINE_CONTRAST, contrast, shown_in_dark
 from support.identifications import record
 from support.screen import Screen

@@ -31,7 +31,7 @@ def tabulate_lines(figure: Figure) -> str:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(("panel", "line", "x", "y"))
     for number, axes in enumerate(figure.axes, start=1):
-        panel = f"{number}: {axes.get_ylabel() or axes.get_title(loc="left")} over {_find_abscissa(axes)}"
+        panel = f"{number}: {axes.get_ylabel() or axes.get_title(loc='left')} over {_find_abscissa(axes)}"
         for position, (name, points) in enumerate(_list_lines(axes), start=1):
             line = f"line {position}" if name.startswith("_") else name
             writer.writerows((panel, line, *map(_format, point)) for point in points)

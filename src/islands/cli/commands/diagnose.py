@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -144,8 +145,9 @@ def diagnose(
             show(REPORT_FILE, BEFORE_REPORT)
             found = DiagnosisResult.from_diagnosis(diagnosis, formula, limits, wall)
             # Further processes of the same fork server, which has loaded matplotlib. A signal has ended it.
+            day = datetime.now(UTC).date()
             with process_pool(workers if before is None else 1, start_after=0.0) as parallel:
-                found.save(out, ", ".join(path.name for path in records), steps, parallel)
+                found.save(out, ", ".join(path.name for path in records), steps, parallel, day)
             if steps.left_out:
                 write_fits(out, fits)
     for paragraph in found.summary.splitlines():

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from datetime import date
 from pathlib import Path
-from time import time
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -91,6 +91,7 @@ class DiagnosisResult(Diagnosis):
         name: str = "record",
         steps: Steps | None = None,
         parallel_map: ParallelMap = map,
+        day: date | None = None,
     ) -> Path:
         """Write ``report.html``, ``extended.json`` if an effect was added, and, last, ``discrepancy.json``.
 
@@ -105,14 +106,15 @@ class DiagnosisResult(Diagnosis):
             that were left out.
         parallel_map : ParallelMap
             Draws the figures of the report, which does not depend on it.
+        day : date, optional
+            Day of the diagnosis, for the report.
         """
         folder, steps = Path(folder), steps or Steps()
         folder.mkdir(parents=True, exist_ok=True)
         for file in (EXTENDED_FILE, DIAGNOSIS_FILE, REPORT_FILE):
             (folder / file).unlink(missing_ok=True)
         if not steps.skip(REPORT_FILE):
-            origin = Origin.from_seconds(name, time())
-            (folder / REPORT_FILE).write_bytes(self.write_report(origin, parallel_map))
+            (folder / REPORT_FILE).write_bytes(self.write_report(Origin(name, day), parallel_map))
         if (extended := self.extended_document) is not None:
             (folder / EXTENDED_FILE).write_text(extended, encoding="utf-8")
         complete = replace(self, left_out=(*self.left_out, *steps.left_out))

@@ -5,7 +5,7 @@ from pathlib import Path
 from islands.errors import ModelError
 from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.saved_documents import SavedDocument, open_document, read_saved_model
-from islands.models.coupled_narx import CoupledModel
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from islands.reports.origin import REPORT_FILE, Origin
@@ -45,7 +45,7 @@ def report_saved_result(folder: Path) -> bytes:
         ) from error
 
 
-def _write(saved: SavedDocument, model: object) -> bytes:
+def _write(saved: SavedDocument, model: AnyModel) -> bytes:
     folder = saved.file.parent
     origin = Origin.from_seconds(folder.absolute().name, saved.file.stat().st_mtime)
     drawn = {path.name: path.read_bytes() for path in sorted((folder / "figures").glob("*.svg"))}

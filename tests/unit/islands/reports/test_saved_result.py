@@ -7,7 +7,7 @@ import pytest
 
 import islands
 from islands.errors import ModelError
-from islands.reports.saved_report import report_saved_result
+from islands.reports.saved_result import report_saved_result
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.identifications import record
 
