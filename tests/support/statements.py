@@ -30,7 +30,7 @@ EXCLUSIVE = (
     (r"the output (diverges|leaves its recorded range) .*1\.2 of the rec", r"Good for: .*up to 1\.2 times"),
     (r"the output (diverges|leaves its recorded range) .*\(1 of the rec", r"Good for: .*up to 1(\.2)? times"),
     (r"the free run on the validation data diverges", r"RMSE \S+( times)? the noise level of"),
-    (r"RMSE at the noise level of", r"simulation from the inputs alone: R2 [-.\d]+\d(?! ?of|\d)"),
+    (r"RMSE at the noise level of", r"simulation from the inputs alone: R2 [-.\d]+\d(?! ?of|[.\d])"),
     (r"the common free run on the validation data diverges", r"As a simulation: (good|usable)"),
     (r"the common free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs"),
     (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),

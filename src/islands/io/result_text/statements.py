@@ -621,10 +621,11 @@ def describe_error_level(facts: RunFacts, name: str) -> str:
     Returns
     -------
     str
-        Empty if neither is known, the free run diverges, or its error is a rounding error.
+        Empty if neither is known, the free run diverges, its error is a rounding error, or nothing predicts
+        the output.
     """
     ratio, noise = facts.noise_ratio, facts.data.get("noise")
-    if ratio is None:
+    if ratio is None or facts.is_unrelated:
         return ""
     if not noise:
         return f"RMSE {ratio:.3g} times the unpredictable error one step ahead"
