@@ -85,7 +85,7 @@ def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
         ("60:", 40, slice(60, 100)),
     ],
 )
-def test_the_beginning_of_a_job_has_its_first_samples_and_inputs_as_measured(
+def test_the_beginning_of_a_job_has_inputs_as_measured(
     tmp_path: Path, rows: str | None, most: int, expected: slice
 ) -> None:
     blobs = Blobs(tmp_path)
@@ -103,7 +103,7 @@ def test_the_beginning_of_a_job_has_its_first_samples_and_inputs_as_measured(
 
 
 @pytest.mark.ci
-def test_the_beginning_of_a_record_with_a_slow_output_has_the_samples_of_the_output(tmp_path: Path) -> None:
+def test_the_beginning_of_a_record_has_the_samples_of_a_slow_output(tmp_path: Path) -> None:
     blobs = Blobs(tmp_path)
     rows = [f"{0.01 * k:.2f},{k % 7},{k if k % 10 == 0 else ''}" for k in range(600)]
     stored = blobs.write("\n".join(["t_s,u_V,y_um", *rows]).encode())
