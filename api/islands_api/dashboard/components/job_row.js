@@ -13,7 +13,7 @@ function describeBest({ state, progress }) {
   return state === "running" && Number.isFinite(best) ? `best error ${formatNumber(best)}` : "";
 }
 
-/** Make the outcome of a job: its progress, or what it has found and its verdict. */
+/** Make the outcome of a job: its progress, or its finding and its verdict. */
 function makeOutcome() {
   const bar = makeProgressBar({ showsReason: true });
   const [finding, verdict] = [el("code", { class: "line" }), el("span", { class: "small verdict" })];
