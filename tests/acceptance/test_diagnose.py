@@ -200,7 +200,7 @@ def test_self_test_reports_detection_limits_and_false_alarms(
     assert f"Of {clean} surrogate records without an effect" in printed
     text = (offset_record / out / "report.html").read_text()
     assert "smallest detected strength" in text
-    assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
+    assert re.search(r'<th scope="row">offset</th><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
 
 
 @pytest.mark.nightly
