@@ -20,17 +20,26 @@ def test_every_file_of_the_dashboard_is_served() -> None:
     assert set(TEXTS) == set(FILES)
 
 
-def test_every_module_is_preloaded() -> None:
-    preloaded = set(re.findall(r'rel="modulepreload" href="dashboard/([\w./]+)"', TEXTS["index.html"]))
-    assert preloaded == set(SCRIPTS) - {"docs.js", "islands.js"}
+def list_imports(name: str) -> set[str]:
+    """Return the modules that a module imports before it runs."""
+    imported = re.findall(r'^(?:import|export)[^;]*?"(\.[^"]+)";', SCRIPTS[name], re.MULTILINE)
+    return {posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) for path in imported}
+
+
+def test_every_module_of_the_lists_of_jobs_and_data_is_preloaded() -> None:
+    """Those of other pages are loaded when a page is first shown."""
+    found, added = set(), {"islands.js", "pages/jobs.js", "pages/data.js"}
+    while added:
+        found |= added
+        added = {each for name in added for each in list_imports(name)} - found
+    preloaded = re.findall(r'rel="modulepreload" href="dashboard/([\w./]+)"', TEXTS["index.html"])
+    assert preloaded == sorted(found - {"islands.js"})
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_a_module_imports_only_served_files(name: str) -> None:
-    imported = re.findall(r'^(?:import|export)[^;]*?"(\.[^"]+)";', SCRIPTS[name], re.MULTILINE)
-    assert {posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) for path in imported} <= set(
-        FILES
-    )
+    loaded = re.findall(r'\bimport\("\./([^"]+)"\)', SCRIPTS[name])
+    assert list_imports(name) | set(loaded) <= set(FILES)
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

@@ -24,7 +24,7 @@ from support.stores import LONG, taken
 
 #: Maximum number of transferred bytes: the files of the dashboard and the list of jobs. The history and the
 #: models of a job are not counted, because they grow with the search.
-MAX_BYTES = 120_000
+MAX_BYTES = 150_000
 
 #: Maximum first contentful paint in milliseconds; 180 to 230 ms were measured on a busy machine.
 MAX_PAINT_MS = 2000

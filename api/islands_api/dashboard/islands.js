@@ -1,59 +1,59 @@
 /** Entry point: shows the page that the address selects, or the key form if the service needs a key. */
 
-import "./components/banner.js";
+import { showProblem } from "./components/banner.js";
 import { listenForDroppedFiles } from "./components/file_upload.js";
 import { connection, key } from "./lib/api.js";
 import { el } from "./lib/dom.js";
-import { mountCompare } from "./pages/compare.js";
-import { mountData } from "./pages/data.js";
-import { mountDataset } from "./pages/dataset.js";
-import { mountJob } from "./pages/job.js";
-import { mountJobs } from "./pages/jobs.js";
 import { mountKeyForm } from "./pages/key.js";
-import { mountMonitor } from "./pages/monitor.js";
-import { mountMonitors } from "./pages/monitors.js";
 
 const SCROLL_ITEM = "islands.place";
 
-/** Page of each address. A page that has `update` is kept if only its details change. */
+/**
+ * Page of each address, whose module is loaded when it is first shown. A page that has `update` is kept if
+ * only its details change.
+ */
 const ROUTES = [
   {
     pattern: /^\/jobs\/([^/]+)(?:\/models\/(\d+))?$/,
     view: ([, id]) => `job ${id}`,
-    mount: (host, [, id, rank], query, signal) => mountJob(host, { id, rank: Number(rank) || null }, signal),
+    load: async () => (await import("./pages/job.js")).mountJob,
     details: ([, id, rank]) => ({ id, rank: Number(rank) || null }),
   },
   {
     pattern: /^\/jobs$/,
     view: () => "jobs",
-    mount: (host, _match, query, signal) => mountJobs(host, Object.fromEntries(query), signal),
+    load: async () => (await import("./pages/jobs.js")).mountJobs,
     details: (_match, query) => Object.fromEntries(query),
   },
   {
     pattern: /^\/data\/([^/]+)$/,
     view: ([, id], query) => `data set ${id} ${query}`,
-    mount: (host, [, id], query, signal) =>
-      mountDataset(host, { ...Object.fromEntries(query), id }, signal),
+    load: async () => (await import("./pages/dataset.js")).mountDataset,
+    details: ([, id], query) => ({ ...Object.fromEntries(query), id }),
   },
   {
     pattern: /^\/compare$/,
     view: (_match, query) => `job comparison ${query}`,
-    mount: (host, _match, query, signal) => mountCompare(host, Object.fromEntries(query), signal),
+    load: async () => (await import("./pages/compare.js")).mountCompare,
+    details: (_match, query) => Object.fromEntries(query),
   },
   {
     pattern: /^\/data$/,
     view: (_match, query) => `data ${query}`,
-    mount: (host, _match, query, signal) => mountData(host, Object.fromEntries(query), signal),
+    load: async () => (await import("./pages/data.js")).mountData,
+    details: (_match, query) => Object.fromEntries(query),
   },
   {
     pattern: /^\/monitors\/([^/]+)$/,
     view: ([, id]) => `monitor ${id}`,
-    mount: (host, [, id], query, signal) => mountMonitor(host, { id }, signal),
+    load: async () => (await import("./pages/monitor.js")).mountMonitor,
+    details: ([, id]) => ({ id }),
   },
   {
     pattern: /^\/monitors$/,
     view: (_match, query) => `monitors ${query}`,
-    mount: (host, _match, query, signal) => mountMonitors(host, Object.fromEntries(query), signal),
+    load: async () => (await import("./pages/monitors.js")).mountMonitors,
+    details: (_match, query) => Object.fromEntries(query),
   },
 ];
 
@@ -70,7 +70,7 @@ function matchRoute() {
   return null;
 }
 
-function show() {
+async function show() {
   if (current.view === "key") return;
   const target = matchRoute();
   if (target === null) {
@@ -84,10 +84,18 @@ function show() {
   const first = current.view === null;
   current.controller.abort();
   const controller = new AbortController();
-  const page = target.mount(main, target.match, target.query, controller.signal);
-  current = { view: target.view, controller, ...page };
+  current = { view: target.view, controller };
   renderTools();
   markSection();
+  let mount;
+  try {
+    mount = await target.load();
+  } catch {
+    showProblem(new Error("The page could not be loaded: check the connection, and reload."));
+    return;
+  }
+  if (controller.signal.aborted) return;
+  Object.assign(current, mount(main, target.details(target.match, target.query), controller.signal));
   if (first) return;
   scrollTo(0, 0);
   main.querySelector("h1")?.focus({ preventScroll: true });

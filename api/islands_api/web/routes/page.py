@@ -17,7 +17,8 @@ DASHBOARD_DIR = Path(__file__).parents[2] / "dashboard"
 _SCRIPT = "text/javascript; charset=utf-8"
 _STYLE = "text/css; charset=utf-8"
 
-#: Media types of the files of the dashboard. A new module needs an entry here and a preload in index.html.
+#: Media types of the files of the dashboard. A new module needs an entry here, and a preload in
+#: index.html if the lists of jobs and data import it.
 FILES = {
     "index.html": "text/html; charset=utf-8",
     "docs.html": "text/html; charset=utf-8",
