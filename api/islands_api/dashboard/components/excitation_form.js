@@ -74,13 +74,13 @@ export function makeSliderField(id, { label, unit, least, most, start, isLog = f
 }
 
 /**
- * Make the controls of an input with `name`, `unit`, `range` in the estimation data, `dt`, a typical
+ * Make the controls of an input with `place`, `name`, `unit`, `range` in the estimation data, `dt`, a typical
  * `frequency` and initial `kind`; `getExcitation()` returns the entry of the request, null if a value is not
  * valid.
  */
 export function makeExcitationForm(input, onChange) {
-  const { name, unit, kind } = input;
-  const id = (value) => `try-${name}-${value}`;
+  const { place, name, unit, kind } = input;
+  const id = (value) => `try-${place}-${value}`;
   const fields = Object.fromEntries(
     Object.entries(listValues(input)).map(([value, settings]) => [
       value,

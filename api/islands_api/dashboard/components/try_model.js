@@ -34,9 +34,9 @@ function makePanel(path, output, found, signal) {
   const label = (name) => (units[name] ? `${name} (${units[name]})` : name);
   const getFrequency = (name) => findFrequency(found.inputs[name], dt);
   const frequency = getFrequency(names[0]);
-  const forms = names.map((name, at) => {
-    const kind = at ? "hold" : "sine";
-    const input = { name, unit: units[name], range: ranges[name], dt, frequency: getFrequency(name), kind };
+  const forms = names.map((name, place) => {
+    const [kind, rate] = [place ? "hold" : "sine", { dt, frequency: getFrequency(name) }];
+    const input = { place, name, unit: units[name], range: ranges[name], kind, ...rate };
     return makeExcitationForm(input, update);
   });
   const usual = Math.min(USUAL_SAMPLES, Math.max(LEAST_SAMPLES, Math.round(PERIODS / frequency / dt)));
@@ -145,6 +145,8 @@ export function makeTryModel(path, { inputs, output }, signal) {
       const recorded = inputs.map((name) => [name.replace(/\+1$/, ""), { kind: "record" }]);
       const request = { inputs: Object.fromEntries(recorded), samples: USUAL_SAMPLES };
       const found = await postJson(`${path}/simulate`, request, { signal });
+      if (!Object.keys(found.ranges).length)
+        throw new Error("The result is of an earlier version, without ranges of inputs: identify again.");
       host.replaceChildren(...makePanel(path, output, found, signal));
     } catch (error) {
       const complaint = el("p", { class: "complaint", role: "alert" }, error.message);
