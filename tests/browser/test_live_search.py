@@ -41,20 +41,20 @@ def test_a_running_job_states_its_phase_in_words(
         # Before the first report the bar moves.
         expect(page.locator(".status progress")).not_to_have_attribute("value", "0")
         for phase, name, sentence in (
-            ("reading the record", "Record", "Reads the record."),
-            ("preset auto: fit of friction", "Preset", "Chooses the preset: fits friction models."),
+            ("reading the record", "Record", "Reading the record."),
+            ("preset auto: fit of friction", "Preset", "Choice of the preset: fit of friction."),
             (
                 "swap search among 144 candidates: 9 terms",
                 "First models",
-                "Selects the first models: swap search among 144 candidates: 9 terms.",
+                "Swap search among 144 candidates: 9 terms.",
             ),
             (
                 "estimation of the final models of 7 terms",
                 "Final models",
-                "Estimates the final models: 7 terms.",
+                "Estimation of the final models of 7 terms.",
             ),
-            ("prediction bands", "Validation", "Calculates the prediction bands."),
-            ("storing the result", "Result", "Stores the result."),
+            ("prediction bands", "Validation", "Prediction bands."),
+            ("storing the result", "Result", "Storing the result."),
         ):
             store.leases.report(lease, ProgressReport({"phase": phase}))
             expect(doing).to_have_text(sentence)
@@ -63,7 +63,7 @@ def test_a_running_job_states_its_phase_in_words(
                 # Screen readers announce every new stage, after the state of the job.
                 expect(page.get_by_role("status")).to_have_text(f"\u2068piezo\u2069: {sentence}")
         advance(store, lease, 0, 40)
-        expect(doing).to_have_text("Evolves equations on 2 islands: generation 40 of 500.")
+        expect(doing).to_have_text("Evolution of equations on 2 islands: generation 40 of 500.")
         expect(stage).to_have_text("Search")
 
 

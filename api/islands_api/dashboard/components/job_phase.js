@@ -27,23 +27,8 @@ const DIAGNOSIS = [
   ["Report", ["writing the report"]],
 ];
 
-/** Sentences about phases, by their beginnings; `rest` is what follows in the phase. */
-const SENTENCES = [
-  ["loading the library", () => "Loads the library and its compiled functions."],
-  ["reading the record", () => "Reads the record."],
-  ["preset auto: trial of ", (rest) => `Chooses the preset: trial of ${rest} models.`],
-  ["preset auto: dead times", () => "Chooses the preset: estimates dead times."],
-  ["preset auto: fit of ", (rest) => `Chooses the preset: fits ${rest} models.`],
-  ["sampling rate and", () => "Chooses the sampling rate, and inputs that act within a sample."],
-  ["forward selection among ", (rest) => `Selects the first models: forward selection among ${rest}.`],
-  ["swap search among ", (rest) => `Selects the first models: swap search among ${rest}.`],
-  ["starting", () => "Starts the processes of the islands."],
-  ["estimation of the final models of ", (rest) => `Estimates the final models: ${rest}.`],
-  ["estimation from ", (rest) => `Estimates the model from ${rest}.`],
-  ["assessment of ", (rest) => `Validates ${rest}.`],
-  ["prediction bands", () => "Calculates the prediction bands."],
-  ["storing the result", () => "Stores the result."],
-];
+/** Phases whose reason is the note of the progress. */
+const WAITING = ["starting", "waiting for capacity"];
 
 const capitalise = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
 
@@ -59,17 +44,16 @@ function describeSearch({ generation, generations, islands = [] }) {
   const where = islands.length > 1 ? ` on ${formatCount(islands.length)} islands` : "";
   const reached =
     generation === undefined ? "" : `: generation ${formatCount(generation)} of ${formatCount(generations)}`;
-  return `Evolves equations${where}${reached}.`;
+  return `Evolution of equations${where}${reached}.`;
 }
 
 /** Describe what a running job does now. */
 export function describePhase(job) {
   const [output, phase] = splitPhase(job);
-  const found = SENTENCES.find(([beginning]) => phase.startsWith(beginning));
-  let sentence = "Starts.";
+  const step = phase.replace(/^preset auto: /, "choice of the preset: ");
+  let sentence = "Starting.";
   if (phase === "search") sentence = describeSearch(job.progress);
-  else if (found) sentence = found[1](phase.slice(found[0].length));
-  else if (phase) sentence = `${capitalise(job.progress.note ?? phase)}.`;
+  else if (phase) sentence = `${capitalise((WAITING.includes(phase) && job.progress.note) || step)}.`;
   const stopped = job.stop_requested ? " The search ends with its best models." : "";
   return `${output ? `${output}: ` : ""}${sentence}${stopped}`;
 }

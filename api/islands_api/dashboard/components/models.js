@@ -8,8 +8,8 @@ import { showProblem } from "./banner.js";
 import { makeCompareChoice } from "./compare_choice.js";
 import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
-import { makeModelFront } from "./model_front.js";
 import { makeReportButtons } from "./report.js";
+import { makeModelFront } from "./size_front.js";
 
 /** Display names of the export formats. */
 const EXPORTS = {

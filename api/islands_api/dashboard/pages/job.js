@@ -18,9 +18,9 @@ import {
   makeProgressBar,
 } from "../components/job_state.js";
 import { makePhasePanel } from "../components/job_phase.js";
-import { makeLivePanel } from "../components/live_search.js";
 import { makeModelsPanel } from "../components/models.js";
 import { makeResultCard } from "../components/result_card.js";
+import { makeLivePanel } from "../components/size_front.js";
 import { download, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge, makeCountdown } from "../lib/clock.js";
 import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";

@@ -1,0 +1,131 @@
+/** Fronts of size against error: of a running search with its equations, and of a finished job. */
+
+import { el, makeScrollable, setText } from "../lib/dom.js";
+import { formatNumber, formatTerms } from "../lib/numbers.js";
+import { makeLineChart } from "./chart.js";
+import { makeLine } from "./equation.js";
+
+/** Make a chart of errors by size. */
+const makeChart = (title, error, unit) =>
+  makeLineChart({
+    title,
+    x: { label: "terms", integer: true },
+    y: { label: unit ? `${error} / ${unit}` : error, log: true },
+    marks: true,
+  });
+
+/** Call `choose(x)` for a chosen point of a line chart; `chooses` says to screen readers what that does. */
+function letChoose(chart, chooses, choose) {
+  const plot = chart.node.querySelector(".plot");
+  plot.classList.add("choosing");
+  plot.setAttribute("aria-description", `Enter ${chooses}.`);
+  const chooseNow = () => choose(Number(plot.getAttribute("aria-valuenow")));
+  plot.addEventListener("click", ({ clientX }) => {
+    // A touch has moved no pointer before.
+    plot.dispatchEvent(new PointerEvent("pointermove", { clientX }));
+    chooseNow();
+  });
+  plot.addEventListener("keydown", ({ key }) => {
+    if (key === "Enter") chooseNow();
+  });
+}
+
+/** Return the models of the front, smallest first; a search in many processes reports errors only. */
+function getFront({ front, best_by_size: best = {} } = {}) {
+  if (front?.length) return front;
+  const errors = Object.entries(best).map(([size, error]) => ({ size: Number(size), error }));
+  return errors.filter(({ error }) => Number.isFinite(error)).sort((a, b) => a.size - b.size);
+}
+
+/** Error of the model that is shown unless another is chosen, relative to the least error, at most. */
+const SHOWN_RATIO = 1.1;
+
+/** Return the smallest model whose error is near the least one. */
+function findSmall(front) {
+  const least = Math.min(...front.map((each) => each.error));
+  return front.find((each) => each.error <= SHOWN_RATIO * least);
+}
+
+/** Make the panel; `show(job)` updates it. It is hidden before the first models, and with a result. */
+export function makeLivePanel(unit) {
+  const equation = el("code", { class: "plain" });
+  const host = makeScrollable("Equation of the best model so far", equation);
+  host.classList.add("equation");
+  const statement = el("p", { class: "soft small" });
+  let [front, size] = [[], null];
+  const chart = makeChart("Front of size against error", "RMS error", unit);
+  letChoose(chart, "shows the equation of a point", (at) => {
+    size = at;
+    showModel();
+  });
+  const preliminary = el(
+    "p",
+    { class: "soft small" },
+    "These are models of the running search. The final estimation changes their parameters, and the "
+      + "validation data choose among them.",
+  );
+  const node = el(
+    "section",
+    { class: "card live", hidden: true },
+    el("h2", {}, "Best models so far"),
+    el("div", { class: "live-model" }, host, statement, preliminary),
+    chart.node,
+  );
+
+  function showModel() {
+    const model = front.find((each) => each.size === size) ?? findSmall(front);
+    const text = model.equation ?? "";
+    host.hidden = !text;
+    if (equation.textContent !== text) equation.replaceChildren(...makeLine(text));
+    const which = model.size === size ? "Chosen point" : "Smallest model within 10 % of the least error";
+    const error = `${formatNumber(model.error)} ${unit}`.trim();
+    setText(statement, `${which}: ${formatTerms(model.size)}, error ${error}`);
+    const points = front.map((each) => [each.size, each.error]);
+    chart.draw([{ name: "least error", points }], [{ kind: "chosen", at: model.size }]);
+  }
+
+  return {
+    node,
+    show(job) {
+      front = getFront(job.progress ?? {});
+      node.hidden = front.length === 0 || job.state === "succeeded";
+      if (node.hidden) return;
+      showModel();
+    },
+  };
+}
+
+/** Errors of the free run, on both parts of the record. */
+const PARTS = ["validation", "estimation"];
+
+/** Make the series of the errors of models by size; of several models of a size the best one counts. */
+function makeFrontSeries(models) {
+  const bySize = new Map(models.toReversed().map((model) => [model.size, model]));
+  const sorted = [...bySize.values()].sort((a, b) => a.size - b.size);
+  return PARTS.map((part) => ({
+    name: part,
+    points: sorted.map((model) => [model.size, model.metrics[part].free_run.rmse]),
+  }));
+}
+
+/** Make the chart with the equation of a model; `show(model)` marks another model. */
+export function makeModelFront(job, models, unit) {
+  const [statement, equation] = [el("p", {}), el("code", { class: "plain" })];
+  const chart = makeChart("Size against error", "RMSE of the free run", unit);
+  letChoose(chart, "opens the model of a point", (size) => {
+    const { rank } = models.find((model) => model.size === size);
+    location.hash = `#/jobs/${job.id}/models/${rank}`;
+  });
+  const host = makeScrollable("Equation of the point", equation);
+  host.classList.add("equation");
+  return {
+    node: el("div", { class: "front" }, chart.node, el("div", { class: "live-model" }, statement, host)),
+    show(model) {
+      const { rmse } = model.metrics.validation.free_run;
+      const error = Number.isFinite(rmse) ? `RMSE ${formatNumber(rmse)} ${unit}`.trim() : "diverged";
+      setText(statement, `Model ${model.rank}: ${formatTerms(model.size)}, ${error}`);
+      equation.replaceChildren(...makeLine(model.equation));
+      chart.draw(makeFrontSeries(models), [{ kind: "chosen", at: model.size }]);
+    },
+  };
+}
