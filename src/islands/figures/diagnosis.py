@@ -32,7 +32,7 @@ from islands.figures.windows import last_loops, representative_window
 from islands.inspection.excitation import estimate_spectrum
 
 #: Colour of the simulation before extension.
-BEFORE = "#bd8200"
+BEFORE = "#c56fa0"
 
 #: Number of screened effects shown.
 _MAX_EFFECTS = 12

@@ -57,7 +57,7 @@ def test_residual_figure_has_a_panel_per_signal() -> None:
     # Both residuals are drawn, and all values are finite.
     for panel in axes:
         coloured = {line.get_color() for line in panel.lines}
-        assert {"#bd8200", "#0072b2"} <= coloured
+        assert {"#c56fa0", "#0072b2"} <= coloured
         assert all(np.isfinite(line.get_xydata()).all() for line in panel.lines)
 
 
@@ -105,7 +105,7 @@ def test_dry_friction_separates_the_directions_only_before_extension() -> None:
         for line in lines
         if len(line.get_ydata()) > 2
     }
-    before = mean["#bd8200", "-"] - mean["#e69f00", "--"]
+    before = mean["#c56fa0", "-"] - mean["#c56fa0", "--"]
     after = mean["#0072b2", "-"] - mean["#0072b2", "--"]
     assert before == pytest.approx(-0.6, abs=0.05)
     assert after == pytest.approx(0.0, abs=0.05)
