@@ -56,7 +56,7 @@ async def half():
     [
         ("PUT", "/v1/jobs", "GET, HEAD, POST"),
         ("DELETE", "/v1/datasets", "GET, HEAD, POST"),
-        ("PATCH", "/v1/jobs/{job}", "GET, HEAD, DELETE"),
+        ("PUT", "/v1/jobs/{job}", "GET, HEAD, PATCH, DELETE"),
         ("GET", "/v1/jobs/{job}/cancel", "POST"),
         ("OPTIONS", "/v1/jobs/{job}/models/1", "GET, HEAD"),
         ("TRACE", "/healthz", "GET, HEAD"),

@@ -68,6 +68,7 @@ def test_a_job_document_with_all_values_round_trips_through_its_schema():
         version=9,
         attempt=2,
         cancel_requested=True,
+        stop_requested=True,
         progress={"generation": 7, "phase": JobState.FAILED},
         checkpoint="c",
         summary={"equation": "y(k) = 0"},
