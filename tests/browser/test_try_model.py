@@ -6,14 +6,9 @@ from typing import Any
 
 import pytest
 
-from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.settings import ServiceSettings
-from islands_service.store.blobs import Blobs
-from support.job_runs import make_run
-from support.played import stored
+from support.played import run_submitted
 from support.reading import unreadable
 from support.service_processes import Service
-from support.stores import LONG, taken
 
 pytestmark = pytest.mark.ci
 
@@ -31,13 +26,7 @@ def service(guarded: Callable[..., Any]) -> Iterator[Service]:
 @pytest.fixture(scope="module")
 def finished(service: Service) -> str:
     """A succeeded job, executed by the test process."""
-    job = service.submit(20, name="piezo")
-    with stored(service) as store:
-        lease = taken(store, job)
-        blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
-        outcome = run_identification_job(make_run(lease, store, blobs, lambda: None, LONG))
-        store.leases.finish(lease, outcome)
-    return job
+    return run_submitted(service, service.submit(20, name="piezo"))
 
 
 @pytest.fixture

@@ -52,13 +52,15 @@ export function makeResultCard(job, unit, signal) {
     x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
     y: { label: [job.spec.output, unit && `(${unit})`].filter(Boolean).join(" ") },
   });
+  const note = el("p", { class: "loading" }, "Simulating the validation data…");
   showFacts(NaN);
   getJson(`${path}/simulation`, { signal }).then(
     (simulation) => {
       showFacts(findHalfWidth(simulation));
       drawSimulation(chart, simulation);
+      note.remove();
     },
-    (error) => signal.aborted || chart.node.after(el("p", { class: "complaint" }, error.message)),
+    (error) => signal.aborted || note.replaceWith(el("p", { class: "complaint" }, error.message)),
   );
   return el(
     "section",
@@ -66,6 +68,7 @@ export function makeResultCard(job, unit, signal) {
     el("h2", { class: "visually-hidden" }, "Result"),
     makeEquation(path, { equation: job.summary.equation }, signal),
     facts,
+    note,
     chart.node,
     verdict.map((line) => el("p", {}, line)),
     makeTryModel(path, job.spec, signal),
