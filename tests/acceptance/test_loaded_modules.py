@@ -22,9 +22,9 @@ finally:
 LIMITS = {
     "--version": (280, ""),
     "fit --help": (705, ""),
-    "inspect {record}": (542, ""),
-    "jobs --help": (870, ""),
-    "jobs list --url http://127.0.0.1:9": (825, ""),
+    "inspect {record}": (545, ""),
+    "jobs --help": (880, ""),
+    "jobs list --url http://127.0.0.1:9": (830, ""),
     "show {model}": (560, ""),
     "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),

@@ -93,7 +93,7 @@ def test_all_controls_are_reachable_by_keyboard(
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.textContent") == "Skip to the content"
     reached = set()
-    for _ in range(12):
+    for _ in range(24):
         page.keyboard.press("Tab")
         reached.add(
             page.evaluate("document.activeElement.ariaLabel ?? document.activeElement.textContent.trim()")

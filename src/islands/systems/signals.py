@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError
@@ -58,6 +57,9 @@ def filtered_noise(
         raise SettingsError(
             f"the cutoff must be between 0 and half the sampling frequency, {0.5 / dt} Hz, got {cutoff}"
         )
+    # The API imports this module, and loads no numerical package at its start.
+    import scipy  # noqa: PLC0415
+
     sections = scipy.signal.butter(order, cutoff, fs=1 / dt, output="sos")
     noise = np.random.default_rng(seed).standard_normal(samples)
     apply_filter = scipy.signal.sosfiltfilt if zero_phase else scipy.signal.sosfilt

@@ -28,7 +28,7 @@ def report(
     url: Url = LOCAL,
     key: ApiKey = None,
 ) -> None:
-    """Write the report of a result as one HTML file that loads nothing.
+    """Write the report of a result folder or of a job as one HTML file.
 
     It has the error and the free run first, then equation, parameters, validation and
     residuals, and the other models in an appendix. It prints on A4. The figures are

@@ -144,14 +144,14 @@ def test_job_of_a_newer_version_waits_for_a_coordinator_of_it(
     replace_runner(monkeypatch, fail_first)
     accepted_by(store, "999.1")
     thread = coordinator()
-    eventually(lambda: len(store.jobs.events(job.id)) == 3)
+    eventually(lambda: len(store.jobs.events(job.id)) == 4)
     second = store.jobs.submit(Submission(ALICE, job.spec))[0]
     assert wait_until_finished(store, second).state == JobState.SUCCEEDED
     thread.stop()  # type: ignore[attr-defined]
     thread.join()
     waiting = store.jobs.get(ALICE, job.id)
     # It was claimed once, and other jobs are not delayed.
-    assert (waiting.state, waiting.attempt, waiting.version) == (JobState.QUEUED, 0, 3)
+    assert (waiting.state, waiting.attempt, waiting.version) == (JobState.QUEUED, 0, 4)
     assert waiting.progress is not None
     assert "waiting for a coordinator of islands 999.1" in waiting.progress["note"]
     assert store.leases.claim("old", 60.0) is None

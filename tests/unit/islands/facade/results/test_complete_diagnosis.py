@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -40,7 +41,9 @@ def found(files):
 
 
 def test_the_files_are_those_of_the_command(files, found, tmp_path):
-    folder = found.save(tmp_path / "saved", name="r.csv")
+    written = (files / "command" / "report.html").stat().st_mtime
+    day = datetime.fromtimestamp(written, UTC).date()
+    folder = found.save(tmp_path / "saved", name="r.csv", day=day)
     names = ["discrepancy.json", "extended.json", "report.html"]
     assert [path.name for path in sorted(folder.iterdir())] == names
     for name in names[1:]:

@@ -11,8 +11,8 @@ CREATE TABLE artefacts (
 	CONSTRAINT pk_artefacts PRIMARY KEY (job_id, name), 
 	CONSTRAINT fk_artefacts_job_id FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE
 );
-INSERT INTO "artefacts" VALUES('af39dd64f43345cb9b7725f5331417a8','pareto.svg','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb');
-INSERT INTO "artefacts" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416','pareto.svg','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb');
+INSERT INTO "artefacts" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf','pareto.svg','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb');
+INSERT INTO "artefacts" VALUES('2e764cf446bb4b8681e714c4c7d151da','pareto.svg','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb');
 CREATE TABLE audit (
 	number INTEGER NOT NULL, 
 	at FLOAT NOT NULL, 
@@ -23,8 +23,8 @@ CREATE TABLE audit (
 	address VARCHAR(64) NOT NULL, details TEXT, 
 	CONSTRAINT pk_audit PRIMARY KEY (number)
 );
-INSERT INTO "audit" VALUES(1,1.79581069553500866889e+09,'cancel-job','alice','1293e5ed90e84fbfb972ea8b7230b7d3','0123456789abcdef','192.0.2.1',NULL);
-INSERT INTO "audit" VALUES(2,1.7958106955389916897e+09,'delete-job','alice','1293e5ed90e84fbfb972ea8b7230b7d3',NULL,'command line',NULL);
+INSERT INTO "audit" VALUES(1,1.79581392221998119348e+09,'cancel-job','alice','ebfce12dec7048afb656a91e9bb3cf21','0123456789abcdef','192.0.2.1',NULL);
+INSERT INTO "audit" VALUES(2,1.79581392222501039506e+09,'delete-job','alice','ebfce12dec7048afb656a91e9bb3cf21',NULL,'command line',NULL);
 CREATE TABLE datasets (
 	owner VARCHAR(64) NOT NULL, 
 	id VARCHAR(48) NOT NULL, 
@@ -36,7 +36,7 @@ CREATE TABLE datasets (
 	created FLOAT NOT NULL, summary TEXT, deleted FLOAT, source TEXT, idle_since FLOAT, 
 	CONSTRAINT pk_datasets PRIMARY KEY (owner, id)
 );
-INSERT INTO "datasets" VALUES('alice','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb-csv','Bühne.csv','.csv','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb',12,'{"columns": [{"name": "u", "unit": "\u00b5m"}]}',1.79581069439500284196e+09,'{"samples": null, "columns": 1, "time": null, "dt": null, "warnings": 0, "reading": {}}',NULL,'https://example.org/a.csv',NULL);
+INSERT INTO "datasets" VALUES('alice','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb-csv','Bühne.csv','.csv','bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb',12,'{"columns": [{"name": "u", "unit": "\u00b5m"}]}',1.79581392211899614329e+09,'{"samples": null, "columns": 1, "time": null, "dt": null, "warnings": 0, "reading": {}}',NULL,'https://example.org/a.csv',NULL);
 CREATE TABLE deliveries (
 	id VARCHAR(32) NOT NULL, 
 	webhook_id VARCHAR(32) NOT NULL, 
@@ -53,7 +53,7 @@ CREATE TABLE deliveries (
 	CONSTRAINT pk_deliveries PRIMARY KEY (id), 
 	CONSTRAINT fk_deliveries_webhook_id FOREIGN KEY(webhook_id) REFERENCES webhooks (id) ON DELETE CASCADE
 );
-INSERT INTO "deliveries" VALUES('1a05a4b6a4a84c189d19c7b5806bb3f0','0049fdcc47424e32bae6db0764a3bbec','job.succeeded','af39dd64f43345cb9b7725f5331417a8','{"type":"job.succeeded","timestamp":"2026-11-27T20:18:15.292+00:00","data":{"job":"af39dd64f43345cb9b7725f5331417a8","kind":"identification","name":"it''s done; really","state":"succeeded","links":{"job":"/v1/jobs/af39dd64f43345cb9b7725f5331417a8","result":"/v1/jobs/af39dd64f43345cb9b7725f5331417a8/result","report":"/v1/jobs/af39dd64f43345cb9b7725f5331417a8/report"}}}',1.79581069529200053214e+09,0,1.79581069529200053214e+09,NULL,NULL,NULL,NULL);
+INSERT INTO "deliveries" VALUES('c63dcc2433754208afe8cab44bf3b3c6','07bd0009bbc943078242f96106c9959e','job.succeeded','7dbd167ce6e04dc5a552dbf97a9448cf','{"type":"job.succeeded","timestamp":"2026-11-27T21:12:02.185+00:00","data":{"job":"7dbd167ce6e04dc5a552dbf97a9448cf","kind":"identification","name":"it''s done; really","state":"succeeded","links":{"job":"/v1/jobs/7dbd167ce6e04dc5a552dbf97a9448cf","result":"/v1/jobs/7dbd167ce6e04dc5a552dbf97a9448cf/result","report":"/v1/jobs/7dbd167ce6e04dc5a552dbf97a9448cf/report"}}}',1.79581392218501853944e+09,0,1.79581392218501853944e+09,NULL,NULL,NULL,NULL);
 CREATE TABLE events (
 	job_id VARCHAR(32) NOT NULL, 
 	number BIGINT NOT NULL, 
@@ -63,22 +63,22 @@ CREATE TABLE events (
 	CONSTRAINT pk_events PRIMARY KEY (job_id, number), 
 	CONSTRAINT fk_events_job_id FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE
 );
-INSERT INTO "events" VALUES('7c1f77fc2ab54ebe849cbb412d8d3504',1,'queued','{}',1.79581069476100349427e+09);
-INSERT INTO "events" VALUES('7c1f77fc2ab54ebe849cbb412d8d3504',2,'cancelled','{}',1.79581069494000077242e+09);
-INSERT INTO "events" VALUES('af39dd64f43345cb9b7725f5331417a8',1,'queued','{}',1.79581069509598469733e+09);
-INSERT INTO "events" VALUES('af39dd64f43345cb9b7725f5331417a8',2,'running','{"attempt": 1}',1.79581069514398288726e+09);
-INSERT INTO "events" VALUES('af39dd64f43345cb9b7725f5331417a8',3,'progress','{"generation": 3}',1.79581069526500415808e+09);
-INSERT INTO "events" VALUES('af39dd64f43345cb9b7725f5331417a8',4,'succeeded','{"best": 0.5}',1.79581069529200053214e+09);
-INSERT INTO "events" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416',1,'queued','{}',1.7958106954170048237e+09);
-INSERT INTO "events" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416',2,'running','{"attempt": 1}',1.795810695426017046e+09);
-INSERT INTO "events" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416',3,'progress','{"generation": 3}',1.79581069548101568229e+09);
-INSERT INTO "events" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416',4,'failed','{"type": "broken", "detail": "it broke"}',1.79581069551098942756e+09);
-INSERT INTO "events" VALUES('7d91077b76a24aecb2ac065c1636122d',1,'queued','{}',1.79581069551899576187e+09);
-INSERT INTO "events" VALUES('7d91077b76a24aecb2ac065c1636122d',2,'cancelled','{}',1.79581069552700233458e+09);
-INSERT INTO "events" VALUES('6ff40b52b47f4b7ba78a67ea748f32c8',1,'queued','{}',1.7958106955399975777e+09);
-INSERT INTO "events" VALUES('6ff40b52b47f4b7ba78a67ea748f32c8',2,'running','{"attempt": 1}',1.7958106955430150032e+09);
-INSERT INTO "events" VALUES('6ff40b52b47f4b7ba78a67ea748f32c8',3,'progress','{"generation": 5}',1.79581069554498648638e+09);
-INSERT INTO "events" VALUES('e1ff69206f174c0e9e68f38f11840372',1,'queued','{}',1.79581069554699802393e+09);
+INSERT INTO "events" VALUES('fc66d3cf24614f1ebc57e67584f75c29',1,'queued','{}',1.79581392213999772077e+09);
+INSERT INTO "events" VALUES('fc66d3cf24614f1ebc57e67584f75c29',2,'cancelled','{}',1.79581392214699840552e+09);
+INSERT INTO "events" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',1,'queued','{}',1.79581392215798187257e+09);
+INSERT INTO "events" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',2,'running','{"attempt": 1}',1.79581392217399477958e+09);
+INSERT INTO "events" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',3,'progress','{"generation": 3}',1.79581392217801809308e+09);
+INSERT INTO "events" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',4,'succeeded','{"best": 0.5}',1.79581392218501853944e+09);
+INSERT INTO "events" VALUES('2e764cf446bb4b8681e714c4c7d151da',1,'queued','{}',1.79581392219600224488e+09);
+INSERT INTO "events" VALUES('2e764cf446bb4b8681e714c4c7d151da',2,'running','{"attempt": 1}',1.79581392219998550417e+09);
+INSERT INTO "events" VALUES('2e764cf446bb4b8681e714c4c7d151da',3,'progress','{"generation": 3}',1.79581392220199704168e+09);
+INSERT INTO "events" VALUES('2e764cf446bb4b8681e714c4c7d151da',4,'failed','{"type": "broken", "detail": "it broke"}',1.79581392220698595049e+09);
+INSERT INTO "events" VALUES('1cdbe60de4f84f988383adcb3cffa00a',1,'queued','{}',1.79581392221201515194e+09);
+INSERT INTO "events" VALUES('1cdbe60de4f84f988383adcb3cffa00a',2,'cancelled','{}',1.79581392221398639681e+09);
+INSERT INTO "events" VALUES('7749448431ef476e85e4a6e737bec57d',1,'queued','{}',1.79581392222698187823e+09);
+INSERT INTO "events" VALUES('7749448431ef476e85e4a6e737bec57d',2,'running','{"attempt": 1}',1.79581392223100519186e+09);
+INSERT INTO "events" VALUES('7749448431ef476e85e4a6e737bec57d',3,'progress','{"generation": 5}',1.79581392223398232459e+09);
+INSERT INTO "events" VALUES('ec39776fddc54b79bda66ad3a12447dd',1,'queued','{}',1795813922.237);
 CREATE TABLE jobs (
 	id VARCHAR(32) NOT NULL, 
 	owner VARCHAR(64) NOT NULL, 
@@ -103,23 +103,23 @@ CREATE TABLE jobs (
 	created FLOAT NOT NULL, 
 	updated FLOAT NOT NULL, 
 	started FLOAT, 
-	finished FLOAT, islands_version VARCHAR(64), checkpoint_version VARCHAR(64), result_version VARCHAR(64), not_before FLOAT DEFAULT 0 NOT NULL, declined TEXT DEFAULT '' NOT NULL, islands INTEGER DEFAULT 1 NOT NULL, monitor_id VARCHAR(32), record_number BIGINT, run_seconds FLOAT DEFAULT 0 NOT NULL, max_run_seconds BIGINT, tags TEXT DEFAULT '' NOT NULL, search_labels TEXT DEFAULT '' NOT NULL, search_result TEXT DEFAULT '' NOT NULL, dataset_name VARCHAR(255), stop_requested BOOLEAN DEFAULT 0 NOT NULL, 
+	finished FLOAT, islands_version VARCHAR(64), checkpoint_version VARCHAR(64), result_version VARCHAR(64), not_before FLOAT DEFAULT 0 NOT NULL, declined TEXT DEFAULT '' NOT NULL, islands INTEGER DEFAULT 1 NOT NULL, monitor_id VARCHAR(32), record_number BIGINT, run_seconds FLOAT DEFAULT 0 NOT NULL, max_run_seconds BIGINT, tags TEXT DEFAULT '' NOT NULL, search_labels TEXT DEFAULT '' NOT NULL, search_result TEXT DEFAULT '' NOT NULL, dataset_name VARCHAR(255), model_error FLOAT, stop_requested BOOLEAN DEFAULT 0 NOT NULL, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id), 
 	CONSTRAINT uq_jobs_owner_idempotency_key UNIQUE (owner, idempotency_key)
 );
-INSERT INTO "jobs" VALUES('7c1f77fc2ab54ebe849cbb412d8d3504','alice','identification','','{"seed": 7}','f926a8ac2bb33cbb3367b345fc57db279a841bb6de19b218d837e39364ef54b8',NULL,0,'cancelled',2,0,0,NULL,0,0.0,1,NULL,NULL,NULL,NULL,1.79581069476100349427e+09,1.79581069494000077242e+09,NULL,1.79581069494000077242e+09,'0.1.0',NULL,NULL,0.0,'',1,'63daff9e7fdc475bbb305a6f91bc8204',1,0.0,NULL,'','
-','',NULL,0);
-INSERT INTO "jobs" VALUES('af39dd64f43345cb9b7725f5331417a8','alice','identification','it''s done; really','{"seed": 7}','f5866d15c0cda76da4739fb6deefb1021b93bb38e3184cc2f87a31b3c273b1bc','k',0,'succeeded',4,1,0,NULL,1,1.79581429514398288726e+09,0,'{"generation": 3}',NULL,'{"best": 0.5}',NULL,1.79581069509598469733e+09,1.79581069529200053214e+09,1.79581069514398288726e+09,1.79581069529200053214e+09,'0.1.0','0.1.0','0.1.0',0.0,'',1,NULL,NULL,0.0,NULL,'','it''s done; really
-','',NULL,0);
-INSERT INTO "jobs" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416','bob','identification','it''s done; really','{"seed": 7}','f5866d15c0cda76da4739fb6deefb1021b93bb38e3184cc2f87a31b3c273b1bc','k',0,'failed',4,1,0,NULL,1,1.79581429542601704596e+09,0,'{"generation": 3}','0000000000000000000000000000000000000000000000000000000000000003',NULL,'{"type": "broken", "detail": "it broke"}',1.7958106954170048237e+09,1.79581069551098942756e+09,1.795810695426017046e+09,1.79581069551098942756e+09,'0.1.0','0.1.0',NULL,0.0,'',1,NULL,NULL,0.0,NULL,'','it''s done; really
-','',NULL,0);
-INSERT INTO "jobs" VALUES('7d91077b76a24aecb2ac065c1636122d','alice','identification','','{"seed": 7}','f926a8ac2bb33cbb3367b345fc57db279a841bb6de19b218d837e39364ef54b8',NULL,0,'cancelled',2,0,0,NULL,0,0.0,1,NULL,NULL,NULL,NULL,1.79581069551899576187e+09,1.79581069552700233458e+09,NULL,1.79581069552700233458e+09,'0.1.0',NULL,NULL,0.0,'',1,NULL,NULL,0.0,NULL,'','
-','',NULL,0);
-INSERT INTO "jobs" VALUES('6ff40b52b47f4b7ba78a67ea748f32c8','alice','identification','','{"seed": 7}','a67a554034db15d7f73dda2a799c5c9614239099cea2418d61d6af96df538230',NULL,-7,'running',3,1,0,'0fae4a2b224f44078173f2e807ef40b1',1,1.79581069454301500316e+09,0,'{"generation": 5}','0000000000000000000000000000000000000000000000000000000000000005',NULL,NULL,1.7958106955399975777e+09,1.79581069554498648638e+09,1.7958106955430150032e+09,NULL,'0.1.0','0.1.0',NULL,0.0,'',1,NULL,NULL,0.0,NULL,',rig 2,','
+INSERT INTO "jobs" VALUES('fc66d3cf24614f1ebc57e67584f75c29','alice','identification','','{"seed": 7}','f926a8ac2bb33cbb3367b345fc57db279a841bb6de19b218d837e39364ef54b8',NULL,0,'cancelled',2,0,0,NULL,0,0.0,1,NULL,NULL,NULL,NULL,1.79581392213999772077e+09,1.79581392214699840552e+09,NULL,1.79581392214699840552e+09,'0.1.0',NULL,NULL,0.0,'',1,'a0aac4fdc26d423ebe4eba0c2add53df',1,0.0,NULL,'','
+','',NULL,NULL,0);
+INSERT INTO "jobs" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf','alice','identification','it''s done; really','{"seed": 7}','f5866d15c0cda76da4739fb6deefb1021b93bb38e3184cc2f87a31b3c273b1bc','k',0,'succeeded',4,1,0,NULL,1,1.79581752217399477958e+09,0,'{"generation": 3}',NULL,'{"best": 0.5}',NULL,1.79581392215798187257e+09,1.79581392218501853944e+09,1.79581392217399477958e+09,1.79581392218501853944e+09,'0.1.0','0.1.0','0.1.0',0.0,'',1,NULL,NULL,0.0,NULL,'','it''s done; really
+','',NULL,NULL,0);
+INSERT INTO "jobs" VALUES('2e764cf446bb4b8681e714c4c7d151da','bob','identification','it''s done; really','{"seed": 7}','f5866d15c0cda76da4739fb6deefb1021b93bb38e3184cc2f87a31b3c273b1bc','k',0,'failed',4,1,0,NULL,1,1.79581752219998550413e+09,0,'{"generation": 3}','0000000000000000000000000000000000000000000000000000000000000003',NULL,'{"type": "broken", "detail": "it broke"}',1.79581392219600224488e+09,1.79581392220698595049e+09,1.79581392219998550417e+09,1.79581392220698595049e+09,'0.1.0','0.1.0',NULL,0.0,'',1,NULL,NULL,0.0,NULL,'','it''s done; really
+','',NULL,NULL,0);
+INSERT INTO "jobs" VALUES('1cdbe60de4f84f988383adcb3cffa00a','alice','identification','','{"seed": 7}','f926a8ac2bb33cbb3367b345fc57db279a841bb6de19b218d837e39364ef54b8',NULL,0,'cancelled',2,0,0,NULL,0,0.0,1,NULL,NULL,NULL,NULL,1.79581392221201515194e+09,1.79581392221398639681e+09,NULL,1.79581392221398639681e+09,'0.1.0',NULL,NULL,0.0,'',1,NULL,NULL,0.0,NULL,'','
+','',NULL,NULL,0);
+INSERT INTO "jobs" VALUES('7749448431ef476e85e4a6e737bec57d','alice','identification','','{"seed": 7}','a67a554034db15d7f73dda2a799c5c9614239099cea2418d61d6af96df538230',NULL,-7,'running',3,1,0,'b3bd0eea268549f896b488e39476f60b',1,1.79581392123100519182e+09,0,'{"generation": 5}','0000000000000000000000000000000000000000000000000000000000000005',NULL,NULL,1.79581392222698187823e+09,1.79581392223398232459e+09,1.79581392223100519186e+09,NULL,'0.1.0','0.1.0',NULL,0.0,'',1,NULL,NULL,0.0,NULL,',rig 2,','
 rig 2
-','',NULL,0);
-INSERT INTO "jobs" VALUES('e1ff69206f174c0e9e68f38f11840372','bob','identification','','{"value": 0.30000000000000004}','82373462d26bbbd3624b2132ac4a1e2dda7aa144af0f8d5c98cab00845edf90d',NULL,100,'queued',1,0,0,NULL,0,0.0,0,NULL,NULL,NULL,NULL,1.79581069554699802393e+09,1.79581069554699802393e+09,NULL,NULL,'0.1.0',NULL,NULL,0.0,'',1,NULL,NULL,0.0,NULL,'','
-','',NULL,0);
+','',NULL,NULL,0);
+INSERT INTO "jobs" VALUES('ec39776fddc54b79bda66ad3a12447dd','bob','identification','','{"value": 0.30000000000000004}','82373462d26bbbd3624b2132ac4a1e2dda7aa144af0f8d5c98cab00845edf90d',NULL,100,'queued',1,0,0,NULL,0,0.0,0,NULL,NULL,NULL,NULL,1795813922.237,1795813922.237,NULL,NULL,'0.1.0',NULL,NULL,0.0,'',1,NULL,NULL,0.0,NULL,'','
+','',NULL,NULL,0);
 CREATE TABLE keys (
 	id VARCHAR(16) NOT NULL, 
 	owner VARCHAR(64) NOT NULL, 
@@ -132,7 +132,7 @@ CREATE TABLE keys (
 	CONSTRAINT pk_keys PRIMARY KEY (id), 
 	CONSTRAINT uq_keys_secret_sha256 UNIQUE (secret_sha256)
 );
-INSERT INTO "keys" VALUES('c2af6f21b356f2e7','alice','revoked','e3d532c3eecf5d02a8b4a20f95cc2a19bf23577c7e5a4af5939404f1afa11ccd','["read", "write"]',1.79581069428798246381e+09,1.79581429428798246381e+09,1.79581069436800622946e+09);
+INSERT INTO "keys" VALUES('4f491f008d040566','alice','revoked','4d03e7f268bc4ad5c5cc7f3757e48b30b9478d6a67dab2bd791cdc98e4b04a69','["read", "write"]',1.79581392210901832581e+09,1.79581752210901832581e+09,1.79581392211501312261e+09);
 CREATE TABLE models (
 	job_id VARCHAR(32) NOT NULL, 
 	rank INTEGER NOT NULL, 
@@ -141,8 +141,8 @@ CREATE TABLE models (
 	CONSTRAINT pk_models PRIMARY KEY (job_id, rank), 
 	CONSTRAINT fk_models_job_id FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE
 );
-INSERT INTO "models" VALUES('af39dd64f43345cb9b7725f5331417a8',1,'{"fitness": 0.5}','first');
-INSERT INTO "models" VALUES('af39dd64f43345cb9b7725f5331417a8',2,'{"fitness": 0.7}','second');
+INSERT INTO "models" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',1,'{"fitness": 0.5}','first');
+INSERT INTO "models" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',2,'{"fitness": 0.7}','second');
 CREATE TABLE monitor_records (
 	monitor_id VARCHAR(32) NOT NULL, 
 	is_rejected BOOLEAN NOT NULL, 
@@ -154,7 +154,7 @@ CREATE TABLE monitor_records (
 	CONSTRAINT pk_monitor_records PRIMARY KEY (monitor_id, is_rejected, place), 
 	CONSTRAINT fk_monitor_records_monitor_id_monitors FOREIGN KEY(monitor_id) REFERENCES monitors (id) ON DELETE CASCADE
 );
-INSERT INTO "monitor_records" VALUES('63daff9e7fdc475bbb305a6f91bc8204',0,0,'record 4','0000000000000000000000000000000000000000000000000000000000000004','4','{"index": 0, "name": "record 4", "sha256": "0000000000000000000000000000000000000000000000000000000000000004"}');
+INSERT INTO "monitor_records" VALUES('a0aac4fdc26d423ebe4eba0c2add53df',0,0,'record 4','0000000000000000000000000000000000000000000000000000000000000004','4','{"index": 0, "name": "record 4", "sha256": "0000000000000000000000000000000000000000000000000000000000000004"}');
 CREATE TABLE monitors (
 	id VARCHAR(32) NOT NULL, 
 	owner VARCHAR(64) NOT NULL, 
@@ -173,7 +173,7 @@ CREATE TABLE monitors (
 	islands_version VARCHAR(64), start BIGINT DEFAULT 0 NOT NULL, last_alarm TEXT, 
 	CONSTRAINT pk_monitors PRIMARY KEY (id)
 );
-INSERT INTO "monitors" VALUES('63daff9e7fdc475bbb305a6f91bc8204','alice','press','{"input": "u"}',0,1,1,'normal',1,0,'{"schema": "islands.monitor-head/1", "state": {"records": []}, "rejected": []}','{"count": 1}',1.7958106944759919644e+09,1.79581069508701276779e+09,'0.1.0',0,NULL);
+INSERT INTO "monitors" VALUES('a0aac4fdc26d423ebe4eba0c2add53df','alice','press','{"input": "u"}',0,1,1,'normal',1,0,'{"schema": "islands.monitor-head/1", "state": {"records": []}, "rejected": []}','{"count": 1}',1.7958139221280083656e+09,1.7958139221519873142e+09,'0.1.0',0,NULL);
 CREATE TABLE owners (
 	name VARCHAR(64) NOT NULL, 
 	weight INTEGER NOT NULL, 
@@ -197,16 +197,16 @@ CREATE TABLE points (
 	CONSTRAINT pk_points PRIMARY KEY (job_id, generation), 
 	CONSTRAINT fk_points_job_id FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE
 );
-INSERT INTO "points" VALUES('af39dd64f43345cb9b7725f5331417a8',3,30,'{"3": 0.25}','[0.5, null]');
-INSERT INTO "points" VALUES('b5e4fe0d53f84cd18a6b3433cd47e416',3,30,'{"3": 0.25}','[0.5, null]');
-INSERT INTO "points" VALUES('6ff40b52b47f4b7ba78a67ea748f32c8',5,50,'{"3": 0.16666666666666666}','[0.5, null]');
+INSERT INTO "points" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf',3,30,'{"3": 0.25}','[0.5, null]');
+INSERT INTO "points" VALUES('2e764cf446bb4b8681e714c4c7d151da',3,30,'{"3": 0.25}','[0.5, null]');
+INSERT INTO "points" VALUES('7749448431ef476e85e4a6e737bec57d',5,50,'{"3": 0.16666666666666666}','[0.5, null]');
 CREATE TABLE results (
 	job_id VARCHAR(32) NOT NULL, 
 	document TEXT NOT NULL, 
 	CONSTRAINT pk_results PRIMARY KEY (job_id), 
 	CONSTRAINT fk_results_job_id FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE
 );
-INSERT INTO "results" VALUES('af39dd64f43345cb9b7725f5331417a8','{"search": {"seed": 7}}');
+INSERT INTO "results" VALUES('7dbd167ce6e04dc5a552dbf97a9448cf','{"search": {"seed": 7}}');
 CREATE TABLE retired_keys (
 	owner VARCHAR(64) NOT NULL, 
 	idempotency_key VARCHAR(255) NOT NULL, 
@@ -215,7 +215,7 @@ CREATE TABLE retired_keys (
 	finished FLOAT NOT NULL, 
 	CONSTRAINT pk_retired_keys PRIMARY KEY (owner, idempotency_key)
 );
-INSERT INTO "retired_keys" VALUES('alice','deleted','1293e5ed90e84fbfb972ea8b7230b7d3','f926a8ac2bb33cbb3367b345fc57db279a841bb6de19b218d837e39364ef54b8',1.79581069553098535539e+09);
+INSERT INTO "retired_keys" VALUES('alice','deleted','ebfce12dec7048afb656a91e9bb3cf21','f926a8ac2bb33cbb3367b345fc57db279a841bb6de19b218d837e39364ef54b8',1.79581392221901559825e+09);
 CREATE TABLE webhooks (
 	id VARCHAR(32) NOT NULL, 
 	owner VARCHAR(64) NOT NULL, 
@@ -226,7 +226,7 @@ CREATE TABLE webhooks (
 	busy_until FLOAT DEFAULT 0 NOT NULL, 
 	CONSTRAINT pk_webhooks PRIMARY KEY (id)
 );
-INSERT INTO "webhooks" VALUES('0049fdcc47424e32bae6db0764a3bbec','alice','https://hooks.example.org/a','["job.succeeded"]','whsec_CH2VL4crrFG7HlhnbAAVm6I5tMyDwPn1bCb2lxxCPe0=',1.7958106944129869938e+09,0.0);
+INSERT INTO "webhooks" VALUES('07bd0009bbc943078242f96106c9959e','alice','https://hooks.example.org/a','["job.succeeded"]','whsec_tdGLFvUUHSqnaRq2iKP/e73U+fBmM1P6CWjDy6qSHwY=',1.79581392212398505215e+09,0.0);
 CREATE INDEX ix_jobs_owner_created_id ON jobs (owner, created, id);
 CREATE INDEX ix_jobs_owner_state_created_id ON jobs (owner, state, created, id);
 CREATE INDEX ix_audit_at ON audit (at);
@@ -239,4 +239,5 @@ CREATE INDEX ix_jobs_queue ON jobs (state, owner, priority DESC, created, id, is
 CREATE INDEX ix_monitors_owner_created_id ON monitors (owner, created, id);
 CREATE INDEX ix_jobs_monitor ON jobs (monitor_id, state, record_number) WHERE monitor_id IS NOT NULL;
 CREATE INDEX ix_monitor_records_monitor_id_sha256 ON monitor_records (monitor_id, sha256);
+CREATE INDEX ix_jobs_model_error ON jobs (owner, model_error, id) WHERE model_error IS NOT NULL;
 COMMIT;
