@@ -36,7 +36,7 @@ GENERATIONS = 4000
 def write_motor(folder: Path) -> Path:
     """Write the record of the motor with a simulation of it that lacks the friction."""
     record = EXAMPLE_RECORDS["motor"].make()
-    drive, speed = record.u[0], record.y
+    drive, speed = record.u[:, 0], record.y
     simulated = np.zeros_like(speed)
     for k in range(1, len(speed)):
         simulated[k] = 0.95 * simulated[k - 1] + 0.8 * drive[k - 1]
@@ -106,30 +106,32 @@ def save_data(page: Page, url: str, record: Path) -> None:
     save(page, "data")
 
 
-def save_searches(page: Page) -> None:
-    """Save the page of a job while it runs, and after its owner has stopped it."""
-    data = page.url
+def save_result(page: Page) -> None:
+    """Identify with the defaults, and save the page of the result."""
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.locator(".result .equation math").wait_for(timeout=1000 * PATIENCE)
+    page.locator(".result figure.chart path").first.wait_for(timeout=1000 * PATIENCE)
+    page.evaluate("scrollTo(0, 0)")
+    save(page, "result")
+
+
+def save_search(page: Page) -> None:
+    """Save the page of a search of two islands while it runs."""
     page.get_by_text("Settings", exact=True).first.click()
     page.get_by_label("Preset", exact=True).select_option("narx")
     page.get_by_text("Advanced settings").click()
     page.get_by_label("islands", exact=True).fill("2")
     page.get_by_label("generations", exact=True).fill(str(GENERATIONS))
     page.get_by_role("button", name="Identify", exact=True).click()
-    page.locator(".front").first.wait_for(timeout=1000 * PATIENCE)
-    page.wait_for_timeout(8000)
+    page.get_by_text("Front of size against error").wait_for(timeout=1000 * PATIENCE)
+    page.wait_for_timeout(20_000)
     save(page, "search")
-    page.get_by_role("button", name="Stop and keep the best").click()
-    page.locator(".result .equation math").wait_for(timeout=1000 * PATIENCE)
-    page.locator(".result figure.chart path").first.wait_for(timeout=1000 * PATIENCE)
-    page.evaluate("scrollTo(0, 0)")
-    save(page, "result")
-    page.goto(data)
+    page.get_by_role("button", name="Cancel").click()
+    page.get_by_text("cancelled").first.wait_for(timeout=1000 * PATIENCE)
 
 
 def save_diagnosis(page: Page) -> None:
     """Diagnose the recorded simulation, and save the page of the result."""
-    page.get_by_label("drive_V is an input").check()
-    page.get_by_label("speed_rad_s is the output").check()
     page.get_by_text("Diagnose a simulation").click()
     page.get_by_role("button", name="Diagnose", exact=True).click()
     page.locator(".outputs canvas").wait_for(timeout=1000 * PATIENCE)
@@ -143,8 +145,12 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         save_data(page, url, write_motor(Path(name)))
-        save_searches(page)
-        save_diagnosis(page)
+        data = page.url
+        for save_next in (save_result, save_search, save_diagnosis):
+            page.goto(data)
+            page.get_by_label("drive_V is an input").check()
+            page.get_by_label("speed_rad_s is the output").check()
+            save_next(page)
         browser.close()
 
 

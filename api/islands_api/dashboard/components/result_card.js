@@ -41,8 +41,8 @@ export function makeResultCard(job, unit, signal) {
   const showFacts = (half) =>
     facts.replaceChildren(
       makeFacts([
-        ["Mean error of the free run", `${formatPercent(metrics.mape)} of the range`],
-        ["RMSE of the free run", withUnit(metrics.rmse, unit)],
+        ["Mean error, free run", `${formatPercent(metrics.mape)} of the range`],
+        ["RMSE, free run", withUnit(metrics.rmse, unit)],
         ["90 % band, half-width", withUnit(half, unit)],
         ["Terms", String(size)],
       ]),
