@@ -14,9 +14,10 @@ from tempfile import TemporaryDirectory
 from urllib.error import URLError
 from urllib.request import urlopen
 
-import numpy as np
+from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
+from islands.io.records.writer import write_record
 from islands.systems.example_records import EXAMPLE_RECORDS
 
 PICTURES = Path(__file__).parents[1] / "pictures"
@@ -31,22 +32,6 @@ PATIENCE = 120.0
 
 #: Generations of the search whose page is shown while it runs.
 GENERATIONS = 4000
-
-
-def write_motor(folder: Path) -> Path:
-    """Write the record of the motor with a simulation of it that lacks the friction."""
-    record = EXAMPLE_RECORDS["motor"].make()
-    drive, speed = record.u[:, 0], record.y
-    simulated = np.zeros_like(speed)
-    for k in range(1, len(speed)):
-        simulated[k] = 0.95 * simulated[k - 1] + 0.8 * drive[k - 1]
-    rows = (
-        f"{k * record.dt:.2f},{u:.5g},{y:.5g},{s:.5g}"
-        for k, (u, y, s) in enumerate(zip(drive, speed, simulated, strict=True))
-    )
-    path = folder / "motor.csv"
-    path.write_text("\n".join(["t_s,drive_V,speed_rad_s,simulated_rad_s", *rows]))
-    return path
 
 
 @contextmanager
@@ -86,24 +71,22 @@ def is_ready(url: str) -> bool:
 
 
 def save(page: Page, name: str) -> None:
-    """Save a screenshot of the visible part of the page."""
+    """Save a screenshot of the visible part of the page, with 256 colours."""
     page.wait_for_timeout(1500)
-    page.screenshot(path=PICTURES / f"page-{name}.png")
+    path = PICTURES / f"page-{name}.png"
+    page.screenshot(path=path)
+    Image.open(path).convert("RGB").quantize(256).save(path, optimize=True)
 
 
-def save_data(page: Page, url: str, record: Path) -> None:
-    """Upload the record, choose its columns, and save the page of the data set."""
-    page.goto(url)
+def upload(page: Page, url: str, folder: Path, name: str) -> None:
+    """Upload an example, and show its page."""
+    record = folder / f"{name}.csv"
+    write_record(EXAMPLE_RECORDS[name].make(), record)
+    page.goto(f"{url}/#/data")
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Choose").first.click()
     chooser.value.set_files(record)
     page.locator(".signals canvas").wait_for()
-    page.get_by_label("drive_V is an input").check()
-    page.get_by_label("speed_rad_s is the output").check()
-    if page.get_by_label("simulated_rad_s is an input").is_checked():
-        page.get_by_label("simulated_rad_s is an input").uncheck()
-    page.evaluate("scrollTo(0, 0)")
-    save(page, "data")
 
 
 def save_result(page: Page) -> None:
@@ -131,8 +114,10 @@ def save_search(page: Page) -> None:
 
 
 def save_diagnosis(page: Page) -> None:
-    """Diagnose the recorded simulation, and save the page of the result."""
+    """Diagnose a linear model, which lacks the hysteresis, and save the page of the result."""
     page.get_by_text("Diagnose a simulation").click()
+    page.locator("select[name=simulation]").select_option("linear")
+    page.locator("input[name=order]").fill("1")
     page.get_by_role("button", name="Diagnose", exact=True).click()
     page.locator(".outputs canvas").wait_for(timeout=1000 * PATIENCE)
     page.evaluate("scrollTo(0, 0)")
@@ -144,13 +129,15 @@ def main() -> None:
     with TemporaryDirectory() as name, run_service(Path(name)) as url, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
-        save_data(page, url, write_motor(Path(name)))
+        upload(page, url, Path(name), "motor")
+        save(page, "data")
         data = page.url
-        for save_next in (save_result, save_search, save_diagnosis):
-            page.goto(data)
-            page.get_by_label("drive_V is an input").check()
-            page.get_by_label("speed_rad_s is the output").check()
-            save_next(page)
+        save_result(page)
+        page.goto(data)
+        page.locator(".signals canvas").wait_for()
+        save_search(page)
+        upload(page, url, Path(name), "piezo")
+        save_diagnosis(page)
         browser.close()
 
 
