@@ -96,6 +96,13 @@ def guarded(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable
     return run
 
 
+@pytest.fixture(scope="module")
+def service(guarded: Callable[..., Any]) -> Iterator[Service]:
+    """A service without coordinators."""
+    with guarded("--coordinators", 0) as running:
+        yield running
+
+
 @pytest.fixture
 def opened(quiet: Callable[..., Screen], service: Service) -> Callable[..., Any]:
     """Function that opens an address of the service of the module with a stored key."""

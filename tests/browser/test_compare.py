@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -20,13 +20,6 @@ SIMULATED = 120_000
 def find_runs(page: Any) -> Any:
     """Return the card of the free runs."""
     return page.locator(".card", has=page.get_by_role("heading", name="Free runs on the validation data"))
-
-
-@pytest.fixture(scope="module")
-def service(guarded: Callable[..., Any]) -> Iterator[Service]:
-    """A service without coordinators."""
-    with guarded("--coordinators", 0) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -41,13 +41,6 @@ MEASURED = """() => {
   const [paint] = performance.getEntriesByName("first-contentful-paint");
   return [total(entries) - total(data), total(data), paint.startTime];
 }"""
-
-
-@pytest.fixture(scope="module")
-def service(guarded: Callable[..., Any]) -> Iterator[Service]:
-    """A service without coordinators."""
-    with guarded("--coordinators", 0) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

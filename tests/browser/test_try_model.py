@@ -1,7 +1,7 @@
 """Response of a model to inputs of choice on the page of a job, while sliders move."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -14,13 +14,6 @@ pytestmark = pytest.mark.ci
 
 #: Data of the path of the response.
 DRAWN = "() => document.querySelector('.try path[data-name=y_um]').getAttribute('d')"
-
-
-@pytest.fixture(scope="module")
-def service(guarded: Callable[..., Any]) -> Iterator[Service]:
-    """A service without coordinators."""
-    with guarded("--coordinators", 0) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 /** Records that were added at once: a link to each, and the offer to use them in one job. */
 
-import { getJson } from "../lib/api.js";
+import { getDatasetPath, getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
 import { formatCount, formatShort } from "../lib/numbers.js";
 
@@ -31,7 +31,7 @@ function makeOffer([first, ...others]) {
 /** Make the card of data sets that were added at once. */
 export async function makeAddedCard(ids, signal) {
   const records = await Promise.all(
-    ids.map((id) => getJson(`v1/datasets/${encodeURIComponent(id)}`, { signal })),
+    ids.map((id) => getJson(getDatasetPath(id), { signal })),
   );
   const items = records.map((record) =>
     el(

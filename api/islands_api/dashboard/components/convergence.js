@@ -1,6 +1,6 @@
 /** Convergence of a search: the error of each island by generation, and the last migration. */
 
-import { getJson } from "../lib/api.js";
+import { getJobPath, getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
 import { poll } from "../lib/polling.js";
 import { COLOURS, makeLineChart } from "./chart.js";
@@ -54,7 +54,7 @@ export function makeConvergencePanel(id, unit, signal) {
   async function load() {
     while ((points.at(-1)?.generation ?? -1) < targetGeneration && !signal.aborted) {
       const after = points.at(-1)?.generation ?? -1;
-      const { items } = await getJson(`v1/jobs/${encodeURIComponent(id)}/history?after=${after}`, { signal });
+      const { items } = await getJson(`${getJobPath(id)}/history?after=${after}`, { signal });
       if (items.length === 0) break;
       points = points.concat(items);
       while (points.length > MAX_POINTS) points = halve(points);

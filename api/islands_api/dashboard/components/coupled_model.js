@@ -1,6 +1,6 @@
 /** Model of several outputs of a succeeded job: equations, errors of each output, terms and figures. */
 
-import { getJson } from "../lib/api.js";
+import { getJobPath, getJson } from "../lib/api.js";
 import { el, makeScrollable, makeTable } from "../lib/dom.js";
 import { formatNumber } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
@@ -48,7 +48,7 @@ function getHalfWidth(bands) {
 
 /** Make the model of several outputs: equations, errors, terms and the free run of every output. */
 function makeCoupledDetail(job, model, outputs, signal) {
-  const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
+  const path = `${getJobPath(job)}/models/${model.rank}`;
   return [
     el("h3", { id: "model" }, "Equations"),
     makeEquation(path, model, signal),
@@ -66,7 +66,7 @@ export function makeCoupledPanel(job, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   const article = el("article", { class: "model", "aria-labelledby": "model" });
   poll(async () => {
-    const path = `v1/jobs/${encodeURIComponent(job.id)}/result`;
+    const path = `${getJobPath(job.id)}/result`;
     const { models: [model], outputs } = await getJson(path, { signal });
     article.replaceChildren(...makeCoupledDetail(job.id, model, outputs, signal));
     const note = el(

@@ -1,6 +1,6 @@
 /** Panels of the data set and the settings of a job. */
 
-import { Problem, getJson } from "../lib/api.js";
+import { Problem, getDatasetPath, getJson } from "../lib/api.js";
 import { el, makeFacts, makeScrollable, makeTable } from "../lib/dom.js";
 import { formatBytes, formatCount, formatNumber, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
@@ -16,7 +16,7 @@ const getInputs = ({ inputs, input }) => inputs ?? (input === undefined ? [] : [
 const getOutputs = ({ output }) => (output === undefined ? [] : [output].flat());
 
 /** Return the unit of the output; empty if it is unknown, or if several outputs have different units. */
-function findUnit(columns, spec) {
+export function findUnit(columns, spec) {
   const names = getOutputs(spec);
   const units = new Set(columns.filter(({ name }) => names.includes(name)).map(({ unit }) => unit));
   return units.size === 1 ? [...units][0] : "";
@@ -132,7 +132,7 @@ export function makeDatasetPanel(spec, onUnitKnown, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   poll(async () => {
     try {
-      const dataset = await getJson(`v1/datasets/${encodeURIComponent(spec.dataset)}`, { signal });
+      const dataset = await getJson(getDatasetPath(spec.dataset), { signal });
       body.replaceChildren(...describeDataset(dataset, spec));
       onUnitKnown(findUnit(dataset.preview.columns, spec));
     } catch (error) {

@@ -1,6 +1,6 @@
 /** Result of a discrepancy job in words and figures, or of a record of a monitor in words. */
 
-import { getJson } from "../lib/api.js";
+import { getJobPath, getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
 import { showProblem } from "./banner.js";
 import { makeCauses } from "./diagnosing/causes.js";
@@ -31,7 +31,7 @@ const makeLines = (lines) => lines.map((line) => el("p", {}, line));
 
 /** Make the equation of an extended simulation that is one difference equation, and its exports. */
 function makeExtendedEquation(job, signal) {
-  const path = `v1/jobs/${encodeURIComponent(job.id)}/extended`;
+  const path = `${getJobPath(job.id)}/extended`;
   return el(
     "div",
     { class: "stack" },
@@ -43,7 +43,7 @@ function makeExtendedEquation(job, signal) {
 
 /** Show the figure and the causes of a diagnosis in their hosts. */
 async function showResult(job, figureHost, causesHost, signal) {
-  const result = await getJson(`v1/jobs/${encodeURIComponent(job.id)}/result`, { signal });
+  const result = await getJson(`${getJobPath(job.id)}/result`, { signal });
   figureHost.replaceChildren(...[makeOutputsPlot(job, result, signal)].filter(Boolean));
   causesHost.replaceChildren(...[makeCauses(result)].filter(Boolean));
 }

@@ -1,6 +1,6 @@
 /** Links that save a figure as SVG, as PNG and as CSV. */
 
-import { download } from "../lib/api.js";
+import { download, saveBlob } from "../lib/api.js";
 import { el, runOnceAtATime } from "../lib/dom.js";
 import { showProblem } from "./banner.js";
 
@@ -36,6 +36,5 @@ async function savePng(picture, name) {
   });
   const context = canvas.getContext("2d");
   context.drawImage(picture, 0, 0, canvas.width, canvas.height);
-  const href = canvas.toDataURL("image/png");
-  el("a", { href, download: name }).click();
+  saveBlob(await new Promise((resolve) => canvas.toBlob(resolve, "image/png")), name);
 }

@@ -1,17 +1,15 @@
 /** Parts of the comparison of models: tables of errors, terms and settings, and charts. */
 
 import { el, makeScrollable, makeTable } from "../lib/dom.js";
-import { NONE, formatInterval, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
+import { NONE, formatInterval, formatPercent, formatQuantity, formatShort } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
+import { findUnit } from "./dataset.js";
 
 const getFreeRun = ({ metrics }, part) => metrics[part]?.free_run ?? {};
 
 const makeLink = ({ job, model, name }) => el("a", { href: `#/jobs/${job.id}/models/${model.rank}` }, name);
 
-const findUnit = ({ job, dataset }) =>
-  dataset?.preview.columns.find(({ name }) => name === job.spec.output)?.unit ?? "";
-
-const withUnit = (value, unit) => (Number.isFinite(value) ? `${formatNumber(value)} ${unit}`.trim() : NONE);
+const getUnit = ({ job, dataset }) => findUnit(dataset?.preview.columns ?? [], job.spec);
 
 /** Make the table of the models with their data, sizes and errors. */
 export const makeModelTable = (entries) =>
@@ -30,7 +28,7 @@ export const makeModelTable = (entries) =>
         String(model.size),
         formatPercent(estimated.mape),
         formatPercent(validated.mape),
-        withUnit(validated.rmse, findUnit(entry)),
+        formatQuantity(validated.rmse, getUnit(entry)) ?? NONE,
       ];
     }),
   );
@@ -57,7 +55,7 @@ function groupByMeasured(entries) {
 function makeOverlay(group, isOnly) {
   const [first] = group;
   const { output } = first.job.spec;
-  const unit = findUnit(first);
+  const unit = getUnit(first);
   const names = group.map(({ name }) => name).join(" and ");
   const chart = makeLineChart({
     title: isOnly ? `Measured and simulated ${output}` : `Validation data of ${names}`,

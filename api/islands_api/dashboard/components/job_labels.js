@@ -1,6 +1,6 @@
 /** Labels of a job: its name, which is changed in place, and its tags, which are links to the list. */
 
-import { sendJson } from "../lib/api.js";
+import { getJobPath, sendJson } from "../lib/api.js";
 import { announce, el } from "../lib/dom.js";
 import { clearBanner, showProblem } from "./banner.js";
 import { makeJobsAddress } from "./job_filters.js";
@@ -9,7 +9,7 @@ import { makeJobsAddress } from "./job_filters.js";
 async function label(job, changes) {
   clearBanner("problem");
   try {
-    return await sendJson("PATCH", `v1/jobs/${encodeURIComponent(job.id)}`, changes);
+    return await sendJson("PATCH", getJobPath(job.id), changes);
   } catch (error) {
     showProblem(error);
     return null;

@@ -1,6 +1,6 @@
 /** Jobs that are selected in the list, and what is done with all of them: compare, cancel, delete. */
 
-import { sendRequest } from "../lib/api.js";
+import { getJobPath, sendRequest } from "../lib/api.js";
 import { announce, el, runOnceAtATime, setText } from "../lib/dom.js";
 import { clearBanner, showProblem } from "./banner.js";
 import { askConfirmation } from "./confirm.js";
@@ -8,7 +8,6 @@ import { isSearch } from "./diagnosis.js";
 import { getIsolatedName, isEnded } from "./job_state.js";
 
 const count = (jobs) => `${jobs.length} ${jobs.length === 1 ? "job" : "jobs"}`;
-const getPath = ({ id }) => `v1/jobs/${encodeURIComponent(id)}`;
 const isComparable = (job) => isSearch(job) && job.state === "succeeded";
 
 /** Send a request for each job, one after the other; return the jobs that it succeeded for. */
@@ -71,7 +70,7 @@ export function makeJobSelection({ refresh }) {
   }
 
   async function cancelAll() {
-    const cancelJob = (job) => sendRequest(`${getPath(job)}/cancel`, { method: "POST" });
+    const cancelJob = (job) => sendRequest(`${getJobPath(job.id)}/cancel`, { method: "POST" });
     const done = await sendForEach(listActive(), cancelJob);
     announce(`${count(done)} cancelled`);
     choose([]);
@@ -86,7 +85,7 @@ export function makeJobSelection({ refresh }) {
     const action = `Delete ${count(ended)}`;
     const refusal = ended.length === 1 ? "Keep it" : "Keep them";
     if (!(await askConfirmation(`${action}?`, result, action, refusal))) return;
-    const done = await sendForEach(ended, (job) => sendRequest(getPath(job), { method: "DELETE" }));
+    const done = await sendForEach(ended, (job) => sendRequest(getJobPath(job.id), { method: "DELETE" }));
     announce(`${count(done)} deleted`);
     choose([]);
     refresh();

@@ -1,6 +1,6 @@
 /** Models of a succeeded job: metrics, equation, figures and exports. */
 
-import { download, getJson } from "../lib/api.js";
+import { download, getJobPath, getJson } from "../lib/api.js";
 import { el, makeFacts, makeScrollable, makeTable, runOnceAtATime } from "../lib/dom.js";
 import { NONE, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
@@ -200,7 +200,7 @@ export function makeGallery(path, signal, skip = () => false) {
 }
 
 function makeDetail(job, model, hysteresis, signal) {
-  const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
+  const path = `${getJobPath(job)}/models/${model.rank}`;
   const { physics, information } = model;
   return [
     el("h3", { id: "model" }, `Model ${model.rank}`),
@@ -230,7 +230,7 @@ function makeDetail(job, model, hysteresis, signal) {
 
 /** Make the figures of the whole search, loaded when the section is opened. */
 function makeSearchFigures(job, islands, signal) {
-  const path = `v1/jobs/${encodeURIComponent(job)}`;
+  const path = getJobPath(job);
   const title = el("summary", {}, "Figures of the search: record, Pareto front, convergence");
   const node = el("details", { class: "search" }, title);
   // The figure that compares islands needs at least two.
@@ -276,7 +276,7 @@ export function makeModelsPanel(job, rank, unit, signal) {
   }
 
   poll(async () => {
-    models = (await getJson(`v1/jobs/${encodeURIComponent(job.id)}/models`, { signal })).items;
+    models = (await getJson(`${getJobPath(job.id)}/models`, { signal })).items;
     const note = el(
       "p",
       { class: "soft small" },

@@ -1,19 +1,19 @@
 /** Buttons for the report of a succeeded job. */
 
-import { download, key } from "../lib/api.js";
+import { download, getJobPath, key } from "../lib/api.js";
 import { el, runOnceAtATime } from "../lib/dom.js";
 import { showProblem } from "./banner.js";
 
 /** Make a button that saves a resource of a job. */
 export function makeSaveButton(job, text, resource, name) {
-  const path = `v1/jobs/${encodeURIComponent(job.id)}/${resource}`;
+  const path = `${getJobPath(job.id)}/${resource}`;
   const save = runOnceAtATime(() => download(path, name).catch(showProblem));
   return el("button", { type: "button", "data-resource": resource, on: { click: save } }, text);
 }
 
 /** Make the buttons that open and save the report of a job. */
 export function makeReportButtons(job) {
-  const href = `v1/jobs/${encodeURIComponent(job.id)}/report`;
+  const href = `${getJobPath(job.id)}/report`;
   return [
     // A link cannot send the key.
     key.get() ? null : el("a", { class: "button", href, target: "_blank" }, "Read the report"),

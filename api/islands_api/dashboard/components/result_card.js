@@ -1,8 +1,8 @@
 /** What a reader of a result looks for first: the equation, three numbers, the verdict, and the free run. */
 
-import { getJson } from "../lib/api.js";
+import { getJobPath, getJson } from "../lib/api.js";
 import { el, makeFacts } from "../lib/dom.js";
-import { formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
+import { formatPercent, formatQuantity, formatShort } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeEquation } from "./models.js";
 import { makeTryModel } from "./try_model.js";
@@ -19,8 +19,6 @@ function findHalfWidth({ band }) {
   return widths[widths.length >> 1] ?? NaN;
 }
 
-const withUnit = (value, unit) => (Number.isFinite(value) ? `${formatNumber(value)} ${unit}`.trim() : null);
-
 /** Make the chart of measured and simulated output, with the band as its background. */
 function drawSimulation(chart, { time_s: times, measured, free_run: free, band }) {
   const points = (values) => times.map((time, at) => [time, values[at]]);
@@ -35,15 +33,15 @@ function drawSimulation(chart, { time_s: times, measured, free_run: free, band }
 /** Make the card of the recommended model of a job of one output. */
 export function makeResultCard(job, unit, signal) {
   const { rank, size, metrics, words = "" } = job.summary;
-  const path = `v1/jobs/${encodeURIComponent(job.id)}/models/${rank}`;
+  const path = `${getJobPath(job.id)}/models/${rank}`;
   const verdict = words.split("\n").filter((line) => VERDICT.some((start) => line.startsWith(start)));
   const facts = el("div");
   const showFacts = (half) =>
     facts.replaceChildren(
       makeFacts([
         ["Mean error, free run", `${formatPercent(metrics.mape)} of the range`],
-        ["RMSE, free run", withUnit(metrics.rmse, unit)],
-        ["90 % band, half-width", withUnit(half, unit)],
+        ["RMSE, free run", formatQuantity(metrics.rmse, unit)],
+        ["90 % band, half-width", formatQuantity(half, unit)],
         ["Terms", String(size)],
       ]),
     );

@@ -90,6 +90,12 @@ async function readBody(response, form, signal) {
   }
 }
 
+/** Return the path of a job. */
+export const getJobPath = (id) => `v1/jobs/${encodeURIComponent(id)}`;
+
+/** Return the path of a data set. */
+export const getDatasetPath = (id) => `v1/datasets/${encodeURIComponent(id)}`;
+
 /** Request a JSON document. */
 export const getJson = async (path, options = {}) =>
   readBody(await sendRequest(path, options), "json", options.signal);

@@ -76,3 +76,7 @@ export function formatBytes(value) {
   const exponent = Math.min(3, Math.max(0, Math.floor(Math.log10(value || 1) / 3)));
   return `${formatNumber(value / 1000 ** exponent)} ${["B", "kB", "MB", "GB"][exponent]}`;
 }
+
+/** Format a value with its unit; null if it is unknown. */
+export const formatQuantity = (value, unit) =>
+  Number.isFinite(value) ? `${formatNumber(value)} ${unit}`.trim() : null;

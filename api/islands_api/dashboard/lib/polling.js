@@ -2,7 +2,15 @@
 
 import { clearBanner, showProblem } from "../components/banner.js";
 import { isEnded } from "../components/job_state.js";
-import { Problem, Unavailable, makeBackoff, sendRequest, sleep, streamEvents } from "./api.js";
+import {
+  Problem,
+  Unavailable,
+  getJobPath,
+  makeBackoff,
+  sendRequest,
+  sleep,
+  streamEvents,
+} from "./api.js";
 
 /** Seconds between two requests for a job that has ended, because another client may resume it. */
 const ENDED_POLL_SECONDS = 5;
@@ -69,7 +77,7 @@ export function poll(task, signal) {
  * Return a function that takes a newer state of the job, received as the response to another request.
  */
 export function followJob(id, { show, lost }, signal) {
-  const path = `v1/jobs/${encodeURIComponent(id)}`;
+  const path = getJobPath(id);
   let current = null;
 
   function update(job) {

@@ -8,14 +8,13 @@ import {
   makeSettingTable,
   makeTermTable,
 } from "../components/job_comparison.js";
-import { getJson } from "../lib/api.js";
+import { getDatasetPath, getJobPath, getJson } from "../lib/api.js";
 import { el, makeScrollable } from "../lib/dom.js";
 import { poll } from "../lib/polling.js";
 
 /** Most models of a comparison: the colours of a chart stay distinct. */
 export const MOST_MODELS = 6;
 
-const getPath = (id) => `v1/jobs/${encodeURIComponent(id)}`;
 
 /** Parse `a,b:2`: ids of jobs, each with the rank of a model; the recommended one without a rank. */
 const parseModels = (text) =>
@@ -29,11 +28,11 @@ const parseModels = (text) =>
 async function loadModel({ id, rank }, signal) {
   let job = null;
   try {
-    job = await getJson(getPath(id), { signal });
-    const models = (await getJson(`${getPath(id)}/models`, { signal })).items;
+    job = await getJson(getJobPath(id), { signal });
+    const models = (await getJson(`${getJobPath(id)}/models`, { signal })).items;
     const model = models.find((each) => (rank ? each.rank === rank : each.recommended)) ?? models[0];
     if (!model) return { job, id, reason: `the job is ${job.state} and has no models` };
-    const path = `v1/datasets/${encodeURIComponent(job.spec.dataset)}`;
+    const path = getDatasetPath(job.spec.dataset);
     const dataset = await getJson(path, { signal }).catch(() => null);
     return { job, models, model, dataset };
   } catch (error) {
@@ -69,7 +68,8 @@ function describeData(entries) {
 /** Make the charts of the free runs, which the service calculates one after the other. */
 function makeRuns(entries, signal) {
   const host = el("div", { class: "stack" }, el("p", { class: "loading", role: "status" }, "Simulating…"));
-  const load = ({ job, model }) => getJson(`${getPath(job.id)}/models/${model.rank}/simulation`, { signal });
+  const load = ({ job, model }) =>
+    getJson(`${getJobPath(job.id)}/models/${model.rank}/simulation`, { signal });
   const simulated = entries.filter(({ job }) => !Array.isArray(job.spec.output));
   Promise.all(simulated.map(async (entry) => ({ ...entry, simulation: await load(entry) }))).then(
     (found) => host.replaceChildren(...makeOverlays(found)),

@@ -8,7 +8,7 @@ import { makeRecordNotes } from "../components/record_notes.js";
 import { makeRowRanges } from "../components/row_ranges.js";
 import { makeRunForm } from "../components/run_form.js";
 import { HINT, makeSignalPlot } from "../components/signal_plot.js";
-import { getJson, postJson } from "../lib/api.js";
+import { getDatasetPath, getJobPath, getJson, postJson } from "../lib/api.js";
 import { announce, el, makeFacts } from "../lib/dom.js";
 import { formatBytes, formatCount, formatShort } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
@@ -20,12 +20,11 @@ const DRAGS = [
   ["Mark validation", "validation"],
 ];
 
-const getPath = (id) => `v1/datasets/${encodeURIComponent(id)}`;
 
 /** Return the function that requests columns of a data set for a plot. */
 const askDataset = (id, signal) => (query, names) => {
   for (const name of names) query.append("column", name);
-  return getJson(`${getPath(id)}/samples?${query}`, { signal });
+  return getJson(`${getDatasetPath(id)}/samples?${query}`, { signal });
 };
 
 /** Read the record in another way, and open the page of that data set with the same choices. */
@@ -33,7 +32,7 @@ async function readAgain(dataset, reading, choices) {
   clearBanner("problem");
   showNotice("Reading the record…");
   try {
-    const { id } = await postJson(`${getPath(dataset.id)}/readings`, { reading });
+    const { id } = await postJson(`${getDatasetPath(dataset.id)}/readings`, { reading });
     const { dataset: _, validation, ...others } = choices;
     const isOwn = typeof validation === "object" && validation.dataset === dataset.id;
     const moved = isOwn ? { ...validation, dataset: id } : validation;
@@ -161,11 +160,11 @@ function parseRequest(text) {
 async function loadInitial({ job, request, together }, signal) {
   if (request) return parseRequest(request);
   if (job) {
-    const { spec, name } = await getJson(`v1/jobs/${encodeURIComponent(job)}`, { signal });
+    const { spec, name } = await getJson(getJobPath(job), { signal });
     return { preset: "auto", ...spec, name };
   }
   if (!together) return {};
-  const others = together.split(",").map((each) => getJson(getPath(each), { signal }));
+  const others = together.split(",").map((each) => getJson(getDatasetPath(each), { signal }));
   return { recordings: (await Promise.all(others)).map(({ id, name }) => ({ dataset: id, name })) };
 }
 
@@ -179,7 +178,7 @@ export function mountDataset(host, { id, ...query }, signal) {
   poll(async () => {
     try {
       const [dataset, initial] = await Promise.all([
-        getJson(getPath(id), { signal }),
+        getJson(getDatasetPath(id), { signal }),
         loadInitial(query, signal),
       ]);
       title.replaceChildren(el("bdi", {}, dataset.name));

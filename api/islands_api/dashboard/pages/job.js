@@ -21,19 +21,18 @@ import { makePhasePanel } from "../components/job_phase.js";
 import { makeModelsPanel } from "../components/models.js";
 import { makeResultCard } from "../components/result_card.js";
 import { makeLivePanel } from "../components/size_front.js";
-import { download, getJson, sendRequest } from "../lib/api.js";
+import { download, getJobPath, getJson, sendRequest } from "../lib/api.js";
 import { formatUtc, makeAge, makeCountdown } from "../lib/clock.js";
 import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";
 import { formatCount, formatDuration, formatNumber } from "../lib/numbers.js";
 import { followJob } from "../lib/polling.js";
 
-const getPath = (id) => `v1/jobs/${encodeURIComponent(id)}`;
 
 async function deleteJob(job) {
   const contents = isSearch(job) ? "models, figures and history" : "findings and report";
   const text = `${getIsolatedName(job)} is deleted with its ${contents}. This cannot be undone.`;
   if (!(await askConfirmation("Delete this job?", text, "Delete it"))) return null;
-  await sendRequest(getPath(job.id), { method: "DELETE" });
+  await sendRequest(getJobPath(job.id), { method: "DELETE" });
   location.hash = "#/jobs";
   return null;
 }
@@ -51,22 +50,23 @@ const ACTIONS = [
   {
     name: "Stop and keep the best",
     when: (job) => canStop(job),
-    act: (job) => getJson(`${getPath(job.id)}/stop`, { method: "POST" }),
+    act: (job) => getJson(`${getJobPath(job.id)}/stop`, { method: "POST" }),
   },
   {
     name: "Cancel",
     when: (job) => !isEnded(job) && !job.cancel_requested,
-    act: (job) => getJson(`${getPath(job.id)}/cancel`, { method: "POST" }),
+    act: (job) => getJson(`${getJobPath(job.id)}/cancel`, { method: "POST" }),
   },
   {
     name: "Resume",
     when: canResume,
-    act: (job) => getJson(`${getPath(job.id)}/resume`, { method: "POST" }),
+    act: (job) => getJson(`${getJobPath(job.id)}/resume`, { method: "POST" }),
   },
   {
     name: "Save the result",
     when: (job) => job.state === "succeeded",
-    act: (job) => download(`${getPath(job.id)}/result`, `result-${job.id.slice(0, 8)}.json`).then(() => null),
+    act: (job) =>
+      download(`${getJobPath(job.id)}/result`, `result-${job.id.slice(0, 8)}.json`).then(() => null),
   },
   { name: "Delete", danger: true, when: isEnded, act: deleteJob },
 ];

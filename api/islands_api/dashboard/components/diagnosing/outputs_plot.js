@@ -1,6 +1,6 @@
 /** Plot of the measured, simulated and extended output of a finished diagnosis, and of its residuals. */
 
-import { getJson } from "../../lib/api.js";
+import { getJobPath, getJson } from "../../lib/api.js";
 import { el } from "../../lib/dom.js";
 import { HINT, makeSignalPlot } from "../signal_plot.js";
 
@@ -9,7 +9,7 @@ const [COLOURS, RESIDUALS] = [["before", "accent"], ["residual before", "residua
 
 /** Return the function that requests the outputs of a job for a plot. */
 const askOutputs = (job, signal) => async (query) => {
-  const path = `v1/jobs/${encodeURIComponent(job)}/outputs?${query}`;
+  const path = `${getJobPath(job)}/outputs?${query}`;
   const { outputs, residuals, ...part } = await getJson(path, { signal });
   const named = residuals.map((each, at) => ({ ...each, name: RESIDUALS[at] }));
   return { ...part, columns: [...outputs, ...named] };
