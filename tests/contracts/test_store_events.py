@@ -5,7 +5,8 @@ import threading
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.job import DISCREPANCY, JobState, JobStateError
+from islands.io.models import NARX
+from islands_service.domain.job import DISCREPANCY, SEARCHED, JobState, JobStateError
 from islands_service.store.job_rows.job_claims import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.stores import (
@@ -70,6 +71,10 @@ def test_only_a_search_is_stopped(store, other):
     claimed(store)
     with pytest.raises(JobStateError, match="has no search to stop: wait for its end, or cancel it"):
         store.jobs.stop(ALICE, job.id)
+
+
+def test_a_search_finds_the_class_of_models_of_the_library():
+    assert SEARCHED == NARX
 
 
 def test_a_search_that_is_being_cancelled_is_not_stopped(store):
