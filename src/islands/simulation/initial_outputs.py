@@ -27,7 +27,7 @@ from islands.simulation.predictors import Simulation, free_run
 _LEAST_SAMPLES, _PART = 100, 0.1
 
 #: The initial outputs are estimated if their noise contributes more than this part of the mean squared error.
-_LEAST_SHARE = 0.2
+LEAST_SHARE = 0.2
 
 #: Largest change of an initial output in standard deviations of the noise; a larger one has other reasons.
 _LARGEST_CHANGE = 4.0
@@ -76,13 +76,15 @@ def has_estimated_start(model: AnyModel, record: AnyRecord, warm_up: int | None 
     return estimate_initial_outputs(model, record, warm_up) is not record
 
 
-def estimate_initial_outputs(model: AnyModel, record: AnyRecord, warm_up: int | None = None) -> AnyRecord:
+def estimate_initial_outputs(
+    model: AnyModel, record: AnyRecord, warm_up: int | None = None, least_share: float = LEAST_SHARE
+) -> AnyRecord:
     """Return the record with estimated outputs before the first prediction of every segment.
 
     The estimate is that of least squares on the first 100 samples of a segment, or on the first tenth of a
     longer one, with the initial outputs as further measurements. The record itself is returned if the model
-    is not a NARX model of one output, if the noise of the initial outputs contributes at most a fifth of the
-    mean squared error, or if an estimate differs from the measurement by more than noise. The noise is at
+    is not a NARX model of one output, if the noise of the initial outputs contributes at most ``least_share`` of
+    the mean squared error, or if an estimate differs from the measurement by more than noise. The noise is at
     most the error of the free run from the estimate, and at most what the third differences of the output
     permit, so that the error of a model is not taken for noise.
 
@@ -93,6 +95,8 @@ def estimate_initial_outputs(model: AnyModel, record: AnyRecord, warm_up: int | 
         Only known outputs are used.
     warm_up : int or None
         Number of samples before the first prediction. None is the model's largest lag.
+    least_share : float
+        With 0, the initial outputs are estimated however small the effect of their noise is.
 
     Returns
     -------
@@ -110,12 +114,12 @@ def estimate_initial_outputs(model: AnyModel, record: AnyRecord, warm_up: int | 
     # A warm-up that is too short, or a model without parameters, is an error of the free run.
     if model.theta is None or not isinstance(first, int) or first < model.maximum_lag:
         return record
-    return _estimate(model, record, first)
+    return _estimate(model, record, first, least_share)
 
 
 # Scores, bands and figures of one model on one record share the estimate.
 @lru_cache(maxsize=32)
-def _estimate(model: Model, record: Dataset, first: int) -> Dataset:
+def _estimate(model: Model, record: Dataset, first: int, least_share: float) -> Dataset:
     depth = model.output_lag
     at_rate = match_rate(model, record)
     step = STEP * at_rate.output_range if depth else 0.0
@@ -133,7 +137,7 @@ def _estimate(model: Model, record: Dataset, first: int) -> Dataset:
             solved, noise, share = found
             if iteration == 0:
                 noise = min(noise, _bound_noise(at_rate))
-                if not share * noise**2 > _LEAST_SHARE:
+                if not share * noise**2 > least_share:
                     return record
             moved = np.abs(solved - changes).max()
             changes = solved

@@ -85,9 +85,9 @@ class Assessment:
         Residual tests and physics checks, which are made when they are read.
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
-    squared_errors : ndarray, shape (samples,)
-        Squared error of the free run at every sample of the validation data, as a fraction of the squared
-        output range. NaN in the warm-up. Empty if the free run diverged.
+    errors : ndarray, shape (samples,)
+        Error of the free run at every sample of the validation data, as a fraction of the output range. NaN
+        in the warm-up. Empty if the free run diverged.
     constraints : tuple of ConstraintCheck
         The constraints, each with its target and the value of the model.
     recordings : mapping
@@ -105,11 +105,17 @@ class Assessment:
     information: InformationCriteria
     checks: Checks
     warm_up: int
-    squared_errors: NDArray[np.float64]
+    errors: NDArray[np.float64]
     constraints: tuple[ConstraintCheck, ...] = ()
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
     bands: PredictionBands | None = None
     criterion: Criterion | None = None
+
+    @property
+    def squared_errors(self) -> NDArray[np.float64]:
+        """Squares of the errors, shape (samples,)."""
+        with np.errstate(over="ignore"):
+            return self.errors**2
 
     @property
     def physics(self) -> PhysicsChecks:
@@ -196,11 +202,35 @@ def assess(
         _compute_information(split.estimation, runs["estimation"]["one_step_ahead"], free),
         Checks(model, split, warm_up),
         first,
-        _compute_squared_errors(split.validation, runs["validation"]["free_run"]),
+        _compute_errors(split.validation, runs["validation"]["free_run"]),
         check_constraints(model, constraints),
         recordings,
         criterion=criterion,
     )
+
+
+def average_errors(assessment: Assessment, count: int) -> Assessment:
+    """Return an assessment with the errors of the free run in means of consecutive samples.
+
+    The error of a mean contains less noise than that of its samples, so that models of means and models of
+    samples are compared in means of the same length.
+
+    Parameters
+    ----------
+    assessment : Assessment
+    count : int
+        Samples of a mean. The errors and the RMSE of the free run on the validation data are replaced, unless
+        it diverged.
+    """
+    whole = len(assessment.errors) // count * count
+    if count == 1 or not whole:
+        return assessment
+    errors = assessment.errors[:whole].reshape(-1, count).mean(axis=1)
+    before, after = (float(np.sqrt(np.nanmean(each**2))) for each in (assessment.errors, errors))
+    validation = assessment.metrics["validation"]
+    rmse = validation["free_run"].rmse * (after / before if before > 0.0 else 1.0)
+    changed = {**validation, "free_run": replace(validation["free_run"], rmse=rmse)}
+    return replace(assessment, errors=errors, metrics={**assessment.metrics, "validation": changed})
 
 
 def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Metrics]:
@@ -210,12 +240,8 @@ def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Me
     return {name: metrics(record.y[each], run.y[each], record.output_range) for name, each in rows.items()}
 
 
-def _compute_squared_errors(record: Dataset, run: Simulation) -> NDArray[np.float64]:
-    if not run.outcome:
-        return np.empty(0)
-    # Dividing by the range first keeps the squares in the range of numbers.
-    with np.errstate(over="ignore"):
-        return ((record.y - run.y) / (record.output_range or 1.0)) ** 2
+def _compute_errors(record: Dataset, run: Simulation) -> NDArray[np.float64]:
+    return (record.y - run.y) / (record.output_range or 1.0) if run.outcome else np.empty(0)
 
 
 def _compute_information(record: Dataset, one_step: Simulation, free: int) -> InformationCriteria:

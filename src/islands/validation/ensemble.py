@@ -6,7 +6,8 @@ validation data is proportional to ``exp(-(n log e + k log n) / 2)``: the Bayesi
 the effective number ``n`` of validation samples, which accounts for the correlation of the residual. The
 penalty of the size is necessary for inclusion probabilities. Without it the larger of two structures with
 equal errors has the same weight, and terms that are not in the law of the system have probabilities of up to
-one half.
+one half. The free run starts from the initial outputs that are most likely for the structure, since the noise
+of the measured ones does not distinguish structures.
 
 Structures with equal free runs state one law (see `find_laws`). In inclusion probabilities, they count as one
 of them: the shortest, and of equal sizes the recommended one.
@@ -21,12 +22,13 @@ from numpy.typing import NDArray
 
 from islands.data.coupled_record import AnyRecord, CoupledSplit
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimator_table import Criterion
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
-from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
+from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run, free_runs
 from islands.validation.equal_laws import ROUNDING, find_laws
 
@@ -306,11 +308,14 @@ def _weigh(
     best = simulate_freely(candidates[0].model, validation, warm_up).y
     residual = (validation.y - best)[find_predicted(best)]
     count = sum(map(effective_samples, np.atleast_2d(residual.T)))
-    errors = np.array([candidate.error for candidate in candidates]) + floor
-    # The floor is 0 if the output is constant, and the ratio of two errors remains finite.
-    errors += np.finfo(float).tiny * max(1.0, errors.max())
     sizes = np.array([candidate.model.size for candidate in candidates])
-    scores = -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
+    errors = np.array([candidate.error for candidate in candidates])
+    scores = _score(errors + floor, sizes, count)
+    # An estimate of initial outputs that the error lacks changes it by less than this part.
+    reach = -0.5 * count * np.log1p(-LEAST_SHARE) - np.log(_MIN_WEIGHT)
+    for at in np.flatnonzero(scores >= scores.max() - reach):
+        errors[at] -= _measure_initial_noise(candidates[at].model, validation, warm_up)
+    scores = _score(np.maximum(errors, 0.0) + floor, sizes, count)
     weights = np.exp(scores - scores.max())
     weights /= weights.sum()
     order = [int(index) for index in np.argsort(-weights, kind="stable") if weights[index] >= _MIN_WEIGHT]
@@ -324,6 +329,28 @@ def _weigh(
         weights = np.maximum(weights, np.finfo(float).tiny)
     kept = weights[order] / weights[order].sum()
     return [(candidates[index], float(weight)) for index, weight in zip(order, kept, strict=True)]
+
+
+def _score(errors: NDArray[np.float64], sizes: NDArray[np.int_], count: float) -> NDArray[np.float64]:
+    """Return the logarithms of the weights but for a constant."""
+    # The floor is 0 if the output is constant, and the ratio of two errors remains finite.
+    errors = errors + np.finfo(float).tiny * max(1.0, errors.max())
+    return -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
+
+
+def _measure_initial_noise(model: AnyModel, validation: AnyRecord, warm_up: int) -> float:
+    """Return the part of the mean squared error of a free run that the initial outputs contribute.
+
+    The initial outputs are parameters of each model. The noise of the measured ones decays more slowly in a
+    model with fewer past outputs.
+    """
+    started = estimate_initial_outputs(model, validation, warm_up, least_share=0.0)
+    if started is validation:
+        return 0.0
+    run = free_run(model, started, warm_up)
+    changes = started.y - match_rate(model, validation).y
+    likely = run.mean_squared_error + np.nansum(changes**2) / np.count_nonzero(find_predicted(run.y))
+    return max(0.0, float(simulate_freely(model, validation, warm_up).mean_squared_error - likely))
 
 
 def effective_samples(residual: NDArray[np.float64]) -> float:

@@ -6,7 +6,7 @@ models are compared on the validation data.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, lcm
 from types import MappingProxyType
 from typing import Any
 
@@ -19,7 +19,7 @@ from islands.facade.library_fit import CERTIFICATES, LibraryFit
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
 from islands.progress import Steps, StoppedError
-from islands.validation.assessment import Assessment
+from islands.validation.assessment import Assessment, average_errors
 from islands.validation.recommendation import recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
@@ -64,8 +64,9 @@ class Choice:
         What was chosen and why, in two sentences.
     errors : mapping
         Free-run RMSE on the validation data of the recommended model of each kind that was compared there,
-        as a fraction of the output range of the estimation data, at least `ROUNDING`. A kind is missing if it
-        has no model with a finite error.
+        as a fraction of the output range of the estimation data, at least `ROUNDING`. If a model describes
+        means of samples, the errors of all are those of means of the same length. A kind is missing if it has
+        no model with a finite error.
     trials : mapping
         The same of small models on held-out parts of the estimation data.
     """
@@ -156,10 +157,13 @@ def choose_kind(
         return Choice(kind, tuple(delays or ()), (sentence, NO_DEAD_TIME), nothing, nothing), {}
     trials = try_kinds(record, libraries, delays, steps)
     fits = _fit_promising(trials, libraries, fit_kind, steps)
-    recommended = {kind: each.found.recommended for kind, each in fits.items()}
-    compared = {kind: model for kind, model in recommended.items() if _is_bounded(model)}
+    bounded = {kind: each for kind, each in fits.items() if _is_bounded(each.found.recommended)}
+    count = lcm(*(each.average for each in bounded.values()))
+    compared = {
+        kind: average_errors(each.found.recommended, count // each.average) for kind, each in bounded.items()
+    }
     errors = {kind: _measure(model, record) for kind, model in compared.items()}
-    kind, reason = _select_kind(record, libraries, trials, compared, errors)
+    kind, reason = _select_kind(record, libraries, trials, compared, errors, count)
     choice = Choice(
         kind,
         trials.delays,
@@ -206,16 +210,18 @@ def _fit_promising(
 def _take_best(results: Sequence[SearchResult], missing: Sequence[str]) -> SearchResult:
     """Return the result with the least error on the validation data, with the steps that were left out."""
     left_out = dict.fromkeys([each for found in results for each in found.search.left_out])
-    best = min(results, key=_validation_error)
+    count = lcm(*(each.average for each in results))
+
+    def measure(result: SearchResult) -> float:
+        compared = average_errors(result.recommended, count // result.average)
+        error = compared.metrics["validation"]["free_run"].rmse
+        return error if isfinite(error) else inf
+
+    best = min(results, key=measure)
     search = replace(
         best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE, CERTIFICATES, BANDS)
     )
     return replace(best, search=search)
-
-
-def _validation_error(result: SearchResult) -> float:
-    error = result.recommended.metrics["validation"]["free_run"].rmse
-    return error if isfinite(error) else inf
 
 
 def _is_bounded(model: Assessment) -> bool:
@@ -234,8 +240,9 @@ def _select_kind(
     trials: KindTrials,
     compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
+    count: int,
 ) -> tuple[str, str]:
-    """Return the kind and the reason."""
+    """Return the kind and the reason; the errors are those of means of ``count`` samples."""
     if not compared:
         first = trials.promising[0]
         if not isfinite(trials.errors[first]):
@@ -247,11 +254,12 @@ def _select_kind(
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
     least = min(errors.values())
+    means = f", in means of {count} samples of the record," if count > 1 else ""
     close = [each for each in constrained if errors[each] <= _CLOSE * least]
     if close and check_rest(record).value:
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
-            f"model on the validation data is {percent(errors[close[0]])} of the output range of the "
+            f"model on the validation data{means} is {percent(errors[close[0]])} of the output range of the "
             "estimation data"
             f"{_list_others(errors, close[0])}"
         )
@@ -260,7 +268,8 @@ def _select_kind(
     kind = list(compared)[best.rank - 1]
     smallest = "" if errors[kind] == least else ", the smallest without a significantly larger error,"
     return kind, (
-        f"because the free-run RMSE of its recommended model{smallest} on the validation data is "
+        f"because the free-run RMSE of its recommended model{smallest} on the validation data"
+        f"{means} is "
         f"{percent(errors[kind])} of the output range of the estimation data{_list_others(errors, kind)}"
     )
 

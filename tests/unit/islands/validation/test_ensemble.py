@@ -12,7 +12,9 @@ from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import LEAST_SQUARES
 from islands.expressions.parsing import parse
 from islands.facade.fit import fit
+from islands.models.narx import make_model
 from islands.models.regressor import regressor
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
 from islands.validation.prediction_bands import calibrate_bands
@@ -173,7 +175,7 @@ def test_a_longer_form_of_a_law_counts_as_the_law(noise):
     data = split(first_order(noise, 1), 0.3)
     # Equal errors: only the number of terms and chance decide between the two forms.
     entries = [candidate(LAW, data), replace(candidate(SUBSTITUTED, data), error=0.0)]
-    entries[1] = replace(entries[1], error=0.97 * entries[0].error)
+    entries[1] = replace(entries[1], error=0.985 * entries[0].error)
     found = make_ensemble(entries, data, "none", 2, 0)
     assert found.structures[0].weight < 0.9
     assert [found.inclusion(term(text).text) for text in LAW] == [1.0, 1.0]
@@ -191,12 +193,40 @@ def test_a_structure_with_a_further_term_is_another_law():
 
 
 def test_a_rival_with_another_free_run_keeps_its_terms():
-    data = parts(0.001)
-    rival = ("y(k-2)", "u(k-1)", "u(k-2)", "u(k-1)*u(k-2)")
-    entries = [candidate(TRUE, data), replace(candidate(rival, data), error=candidate(TRUE, data).error)]
-    found = make_ensemble(entries, data, "none", 2, 0)
+    data = parts(0.1, 200)
+    found = ensemble(data, [TRUE, ("y(k-2)", "u(k-1)", "u(k-2)", "u(k-1)*u(k-2)")])
     assert [each.law for each in found.structures] == [None, None]
     assert found.inclusion(term("y(k-1)").text) == pytest.approx(found.structures[0].weight)
+
+
+def test_noise_of_the_initial_outputs_does_not_exclude_the_law_of_a_slow_process():
+    """A form with two past outputs averages that noise, and took all weight."""
+    law = make_model([(parse("y(k-1)"), 0.99), (parse("u(k-1)"), 0.01)], ("u",), "y")
+    # The law substituted in itself once and twice, half each.
+    terms = {
+        "y(k-2)": 0.5 * 0.99**2,
+        "y(k-3)": 0.5 * 0.99**3,
+        "u(k-1)": 0.01,
+        "u(k-2)": 0.0099,
+        "u(k-3)": 0.005 * 0.99**2,
+    }
+    rival = make_model([(parse(text), value) for text, value in terms.items()], ("u",), "y")
+    lost = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.choice([0.0, 1.0], 30), 50)
+        record = free_run(law, Dataset(u, np.zeros(1500), 1.0), 3).y
+        record[:3] = 0.0
+        data = split(Dataset(u, record + 0.05 * rng.standard_normal(1500), 1.0), 0.5)
+        errors = [simulate_freely(each, data.validation, 3).mean_squared_error for each in (law, rival)]
+        entries = [
+            ValidatedModel(each, LEAST_SQUARES, error)
+            for each, error in zip((law, rival), errors, strict=True)
+        ]
+        lost.append(errors[0] > 1.05 * errors[1])
+        assert make_ensemble(entries, data, "none", 3, 0).structures[0].model.size == 2
+    # In a part of the records, the noise makes a difference that exceeds the penalty of the size.
+    assert sum(lost) >= 3
 
 
 def test_the_recommended_structure_is_in_the_ensemble():

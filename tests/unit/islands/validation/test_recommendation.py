@@ -57,7 +57,7 @@ class Candidate:
             None,
             SimpleNamespace(physics=physics),
             0,
-            np.asarray(self.blocks, dtype=float),
+            np.sqrt(np.asarray(self.blocks, dtype=float)),
         )
 
 

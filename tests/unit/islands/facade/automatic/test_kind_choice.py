@@ -191,3 +191,24 @@ def test_result_of_fit_contains_the_choice():
     named = islands.fit(data, library=settings["library"], degree=1, max_terms=2, certificate=0)
     assert [each.model for each in named.models] == [each.model for each in result.models]
     assert "choice" not in named.search_result.settings
+
+
+@pytest.mark.ci
+def test_models_of_means_are_compared_with_models_of_samples_in_means():
+    """A room of 25 hours: a model of means had the smaller error, because means contain less noise."""
+    rng = np.random.default_rng(102)
+    heating, level = np.zeros(2400), 0.0
+    for k in range(2400):
+        if rng.random() < 0.01:
+            level = rng.choice([0.0, 1.0])
+        heating[k] = level
+    outside = 4.0 * np.sin(2.0 * np.pi * np.arange(2400) / 144.0 + rng.random())
+    outside += 0.05 * np.cumsum(rng.standard_normal(2400))
+    y, pole = np.zeros(2400), np.exp(-1.0 / 150.0)
+    for k in range(1, 2400):
+        y[k] = pole * y[k - 1] + (1.0 - pole) * (8.0 * heating[k - 1] + outside[k - 1])
+    measured = np.round(y + 0.05 * rng.standard_normal(2400), 1)
+    choice, result = choose(Dataset(np.column_stack([heating, outside]), measured, 600.0))
+    assert choice.kind == "smooth"
+    assert "in means of 2 samples of the record" in choice.reasons[0]
+    assert set(result.recommended.model.parameter_names) == {"y(k-1)", "u1(k-1)", "u2(k-1)"}
