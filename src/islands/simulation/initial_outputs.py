@@ -83,9 +83,9 @@ def estimate_initial_outputs(
 
     The estimate is that of least squares on the first 100 samples of a segment, or on the first tenth of a
     longer one, with the initial outputs as further measurements. The record itself is returned if the model
-    is not a NARX model of one output, if the noise of the initial outputs contributes at most ``least_share`` of
-    the mean squared error, or if an estimate differs from the measurement by more than noise. The noise is at
-    most the error of the free run from the estimate, and at most what the third differences of the output
+    is not a NARX model of one output, if the noise of the initial outputs contributes at most ``least_share``
+    of the mean squared error, or if an estimate differs from the measurement by more than noise. The noise is
+    at most the error of the free run from the estimate, and at most what the third differences of the output
     permit, so that the error of a model is not taken for noise.
 
     Parameters
