@@ -335,7 +335,8 @@ def _score(errors: NDArray[np.float64], sizes: NDArray[np.int_], count: float) -
     """Return the logarithms of the weights but for a constant."""
     # The floor is 0 if the output is constant, and the ratio of two errors remains finite.
     errors = errors + np.finfo(float).tiny * max(1.0, errors.max())
-    return -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
+    scores: NDArray[np.float64] = -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
+    return scores
 
 
 def _measure_initial_noise(model: AnyModel, validation: AnyRecord, warm_up: int) -> float:
@@ -345,10 +346,10 @@ def _measure_initial_noise(model: AnyModel, validation: AnyRecord, warm_up: int)
     model with fewer past outputs.
     """
     started = estimate_initial_outputs(model, validation, warm_up, least_share=0.0)
-    if started is validation:
+    if started is validation or not isinstance(validation, Dataset):
         return 0.0
     run = free_run(model, started, warm_up)
-    changes = started.y - match_rate(model, validation).y
+    changes: NDArray[np.float64] = started.y - match_rate(model, validation).y
     likely = run.mean_squared_error + np.nansum(changes**2) / np.count_nonzero(find_predicted(run.y))
     return max(0.0, float(simulate_freely(model, validation, warm_up).mean_squared_error - likely))
 
