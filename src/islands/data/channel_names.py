@@ -94,7 +94,7 @@ _WORDS = {
 }
 
 #: Spellings of the same symbol.
-_SPELLINGS = str.maketrans({"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm"})
+_SPELLINGS = str.maketrans({"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm", "º": "°"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,9 +167,9 @@ def is_unit(text: str) -> bool:
 
 
 def normalise_unit(text: str) -> str:
-    """Return a unit in one spelling: ``um`` for ``µm``, ``kohm`` for ``kOhm``, ``C`` for ``°C``."""
+    """Return a unit in one spelling: ``um`` for ``µm``, ``kohm`` for ``kOhm``, ``C`` for ``°C``, ``oC``."""
     spelled = text.translate(_SPELLINGS).replace("Ohm", "ohm")
-    return re.sub("(?:°|deg)(?=[CF])", "", spelled)
+    return re.sub(r"(?:°|deg|\bo)(?=[CF])", "", spelled)
 
 
 def describe_contradiction(name: str, unit: str) -> str:

@@ -7,6 +7,7 @@ from islands.data.channel_names import (
     SYMBOLS,
     conversion_factor,
     is_unit,
+    normalise_unit,
     parse_channel_name,
     parse_unit,
     simplify_unit,
@@ -137,3 +138,8 @@ def test_every_unit_is_one_of_pint():
 )
 def test_the_unit_of_a_parameter_has_no_factor_one(unit, simple):
     assert simplify_unit(unit) == simple
+
+
+@pytest.mark.parametrize("name", ["Temperature(oC)", "T [ºC]", "T (°C)", "T_degC"])
+def test_spellings_of_degrees_are_one_unit(name):
+    assert normalise_unit(parse_channel_name(name).unit) == "C"

@@ -54,11 +54,12 @@ WORDS = EMPTY | frozenset(
 OPEN_CIRCUIT = frozenset({"open", "offen"})
 
 # Lower case: ``#div/0!``, ``#¡valor!``, ``#имя?``, ``#n/d``, ``err:502`` and a column too narrow, of
-# spreadsheets; ``-1.#ind``, ``1,#qnan0``, ``-nan(ind)`` of printf; ``****``, ``+++++``, ``--.--`` of meters.
+# spreadsheets; ``-1.#ind``, ``1,#qnan0``, ``-nan(ind)`` of printf; ``****``, ``+++++``, ``--.--`` of meters;
+# ``-∞`` of oscilloscopes out of range.
 _PATTERN = re.compile(
     r"#[¡¿]?[^\W\d_][\w/]*[!?]|#[^\W\d_]{1,2}/[^\W\d_]{1,2}|err:\d+|#{2,}"
     r"|[+-]?\d[.,]#(?:ind|qnan|snan|nan|r|j|o|io|jo)\d*|[+-]?nan(?:q|s|\([^()]*\))"
-    r"|[-+*.?~]+"
+    r"|[-+*.?~]+|[-+]?∞"
 )
 
 #: Number of an error before its text: ``[-11059] No Good Data For Calculation``.

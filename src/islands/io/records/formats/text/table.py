@@ -50,6 +50,9 @@ _DECIDING = 20
 #: Samples that determine that times decrease, at least.
 _LEAST_DECREASING = 12
 
+#: Name of a column of time stamps that the header leaves empty.
+_CLOCK_NAME = "time"
+
 #: Seconds.
 _HALF_DAY = 43_200.0
 
@@ -82,6 +85,8 @@ class DelimitedText:
         Which rows are not samples.
     others : str
         Other tables of the file; see `islands.io.records.table.Table`.
+    step : float or None
+        Sampling time in seconds that a property below the header states.
     """
 
     names: tuple[str, ...]
@@ -95,6 +100,7 @@ class DelimitedText:
     starts: tuple[int, ...] = ()
     left_out: tuple[str, ...] = ()
     others: str = ""
+    step: float | None = None
     # Both are found once: a search per column would take the square of the time.
     _places: Mapping[str, int] = field(init=False, repr=False)
     _irregular: NDArray[np.int64] = field(init=False, repr=False)
@@ -105,8 +111,8 @@ class DelimitedText:
         object.__setattr__(self, "_irregular", np.flatnonzero(widths != len(self.names)))
 
     def stated(self, structure: str) -> Mapping[str, float]:  # noqa: ARG002
-        """Return an empty mapping: a text table cannot state a sampling time."""
-        return {}
+        """Return the sampling time that a property below the header states, as oscilloscopes write it."""
+        return {} if self.step is None else {"increment": self.step}
 
     def read(self, names: Sequence[str], rows: slice | None) -> Columns:
         """Convert the named columns over the selected rows; see `islands.io.records.table.Table`."""
@@ -242,12 +248,14 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
     missing = parse_words(options.missing).texts
     kept = keep_samples(numbers, rows, start.labels, counted, missing)
     left_out = kept.notes
-    if start.properties:
+    if start.properties > 1 or (start.properties and start.units != start.first - 1):
         above = describe_left_out(
             counted, start.first - start.properties + 1, start.first, "below the header"
         )
         left_out = (above, *left_out)
     names, cells = _trim(start.names, kept.cells)
+    names, notes = _name_clock(names, cells, missing)
+    left_out = (*left_out, *notes)
     clocks = _find_clocks(names, cells, missing)
     if milliseconds := find_milliseconds(names, cells, clocks, missing):
         (clock,) = clocks
@@ -266,6 +274,7 @@ def split_table(lines: Sequence[str], file: str, counted: str, options: ReadingO
         {titles[name]: unit for name, unit in units.items()},
         kept.starts,
         left_out,
+        step=start.step,
     )
     return _order_rows(table) if _has_newest_first(table) else table
 
@@ -405,6 +414,26 @@ def _find_units(
     return {name: unit for name, unit in found.items() if unit}
 
 
+def _name_clock(
+    names: tuple[str, ...], cells: Sequence[list[str]], missing: frozenset[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Name the only column of time stamps without a name, and state it.
+
+    Loggers leave the cell above the time empty, as does a data frame that is indexed by time.
+    """
+    first = list(islice(cells, _DECIDING))
+    unnamed = [
+        place
+        for place, name in enumerate(names)
+        if not name and find_kind([row[place] for row in first if len(row) > place], missing)
+    ]
+    if len(unnamed) != 1 or _CLOCK_NAME in names:
+        return names, ()
+    (place,) = unnamed
+    note = f"column {place + 1} has no name and contains time stamps: it is read as column {_CLOCK_NAME}"
+    return (*names[:place], _CLOCK_NAME, *names[place + 1 :]), (note,)
+
+
 def _find_clocks(names: Sequence[str], cells: Sequence[list[str]], missing: frozenset[str]) -> dict[str, str]:
     """Return the columns of time stamps with the columns of their dates."""
     first = list(islice(cells, _DECIDING))
@@ -426,4 +455,6 @@ def _list_notes(file: str, start: TableStart, counted: str) -> tuple[str, ...]:
         notes.append(f"the {what} of {file} is {counted} {at + 1}; the lines above are ignored")
     if start.units is not None:
         notes.append(f"{counted} {start.units + 1} of {file} is read as the units of the columns")
+    if start.step is not None:
+        notes.append(f"the sampling time of {start.step:.6g} s is the increment below the header of {file}")
     return tuple(notes)

@@ -33,6 +33,9 @@ _SAMPLES, _MOST_LINES = 5, 300
 #: Rows of properties between a header and the samples.
 _MOST_PROPERTIES = 40
 
+#: Names of a property that is the sampling time in seconds, in lower case.
+_STEPS = ("increment", "x increment", "xincrement", "tinc", "delta_x")
+
 #: Labels in the first cell of a row of units.
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
@@ -59,6 +62,8 @@ class TableStart:
         Cells of the header, without the units of the row of units; empty if there is no header.
     properties : int
         Number of lines directly above ``first`` with properties that are numbers.
+    step : float or None
+        Sampling time in seconds that these properties state.
     """
 
     separator: str
@@ -69,6 +74,7 @@ class TableStart:
     units: int | None
     labels: tuple[str, ...] = ()
     properties: int = 0
+    step: float | None = None
 
 
 def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAULT_READING) -> TableStart:
@@ -104,22 +110,58 @@ def find_table(lines: Sequence[str], file: str, options: ReadingOptions = DEFAUL
     start = top
     # A spreadsheet fills the lines of a description up to the width of the table with empty cells.
     is_header = all(cell.strip() for cell in cells) and _fits(len(cells), lines, first, separator, missing)
+    is_header = is_header and not _are_units_above(lines, first, cells, separator)
     if not is_header and (found := _find_samples(lines, top, missing)):
         separator, samples = found
         start = _find_header(lines, top, samples, separator, file)
         cells, first = _read_row(lines, start, separator)
+        cells = _drop_empty_end(cells, len(_split(lines[samples], separator)))
     if first == len(lines) > start + 1:
         raise RecordError(f"{file}, line {start + 1}: is a quote never closed?")
     names = labels = tuple(name.strip() for name in cells)
     properties = _list_properties(lines, first, separator, len(names))
+    samples = max([first, *(at + 1 for at in properties)])
+    # Oscilloscopes separate the header from the samples by a blank line.
+    samples = next((at for at in range(samples, len(lines)) if lines[at].strip()), samples)
+    first, samples = samples, _skip_properties(lines, samples, separator, missing)
     rows = {at: _read_units(lines[at], separator) for at in properties}
+    rows |= {at: _read_units(lines[at], separator, True) for at in range(first, samples)}
+    if start > top:  # a row of units may also precede the names
+        rows[start - 1] = _read_units(lines[start - 1], separator)
     units = next((at for at, row in rows.items() if len(row) == len(names)), None)
     _check_header(names, file, start + 1, units is not None)
     if units is not None:
         names = tuple(map(append_unit, names, rows[units]))
-    first = max([first, *(at + 1 for at in properties)])
-    samples = _skip_properties(lines, first, separator, missing)
-    return TableStart(separator, start, names, samples, start > top, units, labels, samples - first)
+    step = _find_step(labels, [_split(lines[at], separator) for at in range(first, samples)])
+    described = any(lines[at].strip() and at != units for at in range(top, start))
+    return TableStart(separator, start, names, samples, described, units, labels, samples - first, step)
+
+
+def _drop_empty_end(cells: list[str], width: int) -> list[str]:
+    """Return the cells of a header without empty ones behind the last column of the samples."""
+    return cells[:width] if not any(cell.strip() for cell in cells[width:]) else cells
+
+
+def _are_units_above(lines: Sequence[str], first: int, cells: Sequence[str], separator: str) -> bool:
+    """Return whether a row contains the units of the names in the line below it."""
+    if first == len(lines) or len(_read_units(separator.join(cells), separator)) != len(cells):
+        return False
+    names = [cell.strip() for cell in _split(lines[first], separator)]
+    is_names = all(names) and len(set(names)) == len(names) == len(cells)
+    return is_names and all(map(is_text, names)) and not _read_units(lines[first], separator)
+
+
+def _find_step(labels: Sequence[str], properties: Sequence[Sequence[str]]) -> float | None:
+    """Return the sampling time in seconds that a row of properties states, as of oscilloscopes.
+
+    The header ``X,CH1,Start,Increment`` and the row ``Sequence,Volt,-6e-3,2e-6`` belong to samples that are
+    counted.
+    """
+    for row in properties:
+        for label, cell in zip(labels, row, strict=False):
+            if label.lower() in _STEPS and is_number(cell) and (step := float(cell.replace(",", "."))) > 0.0:
+                return step
+    return None
 
 
 def _list_properties(lines: Sequence[str], first: int, separator: str, width: int) -> list[int]:
@@ -354,6 +396,7 @@ def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, f
     # The nearest line with different names; below it are rows of units, of types or of other properties.
     adjacent = [at for at, other in zip(reversed(fitting), reversed(above), strict=False) if at == other]
     rows = {at: [cell.strip() for cell in _split(_uncomment(lines[at]), separator)] for at in adjacent}
+    rows = {at: _drop_empty_end(cells, width) for at, cells in rows.items()}
     named = [
         at
         for at, cells in rows.items()
@@ -364,14 +407,17 @@ def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, f
     return named[0] if named else adjacent[0]
 
 
-def _read_units(line: str, separator: str) -> list[str]:
+def _read_units(line: str, separator: str, has_numbers: bool = False) -> list[str]:
     """Return the cells of a row of units without brackets; empty if it is not such a row.
 
-    The first cell may be a label: ``unit``.
+    The first cell may be a label, ``unit``, or any word if the row also has properties that are numbers,
+    ``Sequence,Volt,0.1``: these are no units.
     """
     cells = [spell_unit(cell.strip().strip("[]()").strip()) for cell in _split(_uncomment(line), separator)]
     if cells and cells[0].lower().rstrip(":") in _UNIT_LABELS:
         cells[0] = ""
+    if has_numbers:
+        cells = ["" if is_number(cell) or not place else cell for place, cell in enumerate(cells)]
     units = [cell for cell in cells if cell not in ("", "-")]
     return cells if units and all(map(is_unit, units)) else []
 

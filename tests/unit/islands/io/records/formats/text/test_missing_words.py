@@ -11,7 +11,22 @@ from support.bad_records import lines
 
 #: Words of meters, loggers, spreadsheets in eight languages, printf, historians and databases.
 WORDS = (
-    *("OL", "0L", "-OL", "+OVER", "O.L.", "BURNOUT", "Over Range", "OPEN", "*****", "-----", "+++++", "?"),
+    *(
+        "OL",
+        "0L",
+        "-OL",
+        "+OVER",
+        "O.L.",
+        "BURNOUT",
+        "Over Range",
+        "OPEN",
+        "*****",
+        "-----",
+        "+++++",
+        "?",
+        "∞",
+        "-∞",
+    ),
     *("#DIV/0!", "#NV", "#WERT!", "#VALEUR!", "#¡DIV/0!", "#DEEL/0!", "#ИМЯ?", "#Н/Д", "Err:502"),
     *("-1.#IND", "1.#QNAN", "1,#QNAN0", "-nan(ind)", "nan(snan)", "########"),
     *("Bad Input", "BAD_INPUT", "No Data", "I/O Timeout", "Comm Fail", "unavailable", "Pt Created"),

@@ -86,9 +86,9 @@ def test_recordings_of_different_steps_are_refused(tmp_path):
 def test_properties_of_an_oscilloscope_are_left_out(tmp_path):
     rows = [f"{k},{row.split(',')[1]},{row.split(',')[2]},," for k, row in enumerate(ROWS)]
     path = write(tmp_path, "X,CH1,CH2,Start,Increment", "Sequence,Volt,Volt,-0.1,0.01", *rows)
-    record = read_record(path, ["CH1"], "CH2", dt=0.01)
+    record = read_record(path, ["CH1"], "CH2")
     assert record.samples == len(ROWS)
-    assert record.reading == ("line 2 below the header is not a sample and is left out",)
+    assert (record.dt, record.output_unit, record.reading) == (0.01, "V", ())
 
 
 def test_keys_with_values_above_a_table_are_ignored(tmp_path):

@@ -103,3 +103,52 @@ def test_common_names_of_the_time_are_read(tmp_path, time):
     path.write_text("\n".join([f"{time};U_1/mV;v_m/s", *SAMPLES]))
     record = read_record(path, "U_1/mV", "v_m/s")
     assert (record.dt, record.input_units, record.output_unit) == (pytest.approx(0.01), ("mV",), "m/s")
+
+
+@pytest.mark.parametrize("above", [(), ("Motor 3", "")])
+@pytest.mark.parametrize("units", ["s;V;m3/h", ";V;m3/h", "[s];[V];[m3/h]"])
+def test_a_row_of_units_may_precede_the_names(above, units):
+    found = start(*above, units, "t;u;FI-2041.PV", *SAMPLES[:8])
+    assert found.names[1:] == ("u [V]", "FI-2041.PV [m3/h]")
+    assert (found.header, found.units) == (len(above) + 1, len(above))
+    assert found.described == bool(above)
+
+
+def test_names_that_look_like_units_remain_names():
+    assert start("V;A;s", "1;2;3", *SAMPLES[:8]).names == ("V", "A", "s")
+    assert start("s;V;A", "[ms];[mV];[mA]", *SAMPLES[:8]).header == 0
+
+
+@pytest.mark.parametrize("units", [("(ms);(mV);(V)",), ()])
+def test_a_blank_line_may_separate_the_header_from_the_samples(units):
+    found = start("Zeit;Kanal A;Kanal B", *units, "", *SAMPLES[:8])
+    assert found.first == 2 + len(units)
+    assert found.names == (("Zeit [ms]", "Kanal A [mV]", "Kanal B [V]") if units else found.labels)
+
+
+@pytest.mark.parametrize(("mark", "separator"), [(".", ","), (",", ";")])
+def test_the_increment_below_the_header_is_the_sampling_time(tmp_path, mark, separator):
+    """A Rigol oscilloscope numbers the samples and ends its lines with a separator."""
+    rows = [f"{k},{k % 7}.25,{k % 11},," for k in range(60)]
+    lines = ["X,CH1,CH2,Start,Increment,", "Sequence,Volt,Volt,-6.0e-03,2.0e-06", *rows]
+    path = tmp_path / "scope.csv"
+    path.write_text("\n".join(lines).replace(",", separator).replace(".", mark))
+    record = read_record(path, ["CH1"], "CH2")
+    assert record.dt == pytest.approx(2e-6)
+    assert (record.input_units, record.output_unit) == (("V",), "V")
+    assert record.samples == 60
+    assert (
+        "the sampling time of 2e-06 s is the increment below the header of scope.csv"
+        in preview(path).warnings
+    )
+
+
+def test_the_only_column_of_time_stamps_needs_no_name(tmp_path):
+    """PicoLog, and data frames with an index of times, leave the cell above the time empty."""
+    path = tmp_path / "logger.csv"
+    rows = [f"2024-06-11T07:{k // 4:02d}:{15 * (k % 4):02d}+02:00,{k % 7},{k % 11}" for k in range(60)]
+    path.write_text("\n".join([',"u (V)","T (°C)"', *rows]))
+    record = read_record(path, ["u"], "T")
+    assert record.dt == 15.0
+    note = "column 1 has no name and contains time stamps: it is read as column time"
+    assert note in record.reading
