@@ -1,8 +1,9 @@
 """Choice of inputs and output among the columns of a file, by their names and by which responds to which."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from islands.inspection.column_influence import (
     ColumnInfluence,
     average_middle,
 )
-from islands.inspection.column_shape import is_total
+from islands.inspection.column_shape import is_label, is_product, is_total
 from islands.inspection.gross_errors import find_gross_errors
 
 #: Names that say that a column is an input or an output, by the first word of the name.
@@ -125,21 +126,78 @@ def choose_columns(
             for name, values in signals.items()
             if name in given or not any(_adds_up(values, other) for other in signals.values())
         }
+        labels = _find_labels(signals, given)
+        signals = {name: values for name, values in signals.items() if name not in labels}
         if len(signals) < 2:
             return ColumnChoice((), "", None, _describe_too_few(tuple(signals)))
-        names = [*given & signals.keys(), *(name for name in signals if name not in given)][:_MOST_COLUMNS]
-        names = [name for name in signals if name in names]
-        choice = _compare(names, [signals[name] for name in names]).choose(tuple(inputs), output)
-    if len(signals) == len(names):
-        return choice
-    left = f"; of {len(signals)} columns {len(names)} are compared."
-    return replace(choice, reason=choice.reason.removesuffix(".") + left)
+        products = _find_products(signals, given)
+        kept = {name: values for name, values in signals.items() if name not in products}
+        choice = _choose(kept, given, tuple(inputs), output)
+        if products and not choice.output:  # the product of independent columns may be their response
+            kept, products = signals, {}
+            choice = _choose(kept, given, tuple(inputs), output)
+    remarks = [f"{label} only numbers groups of values of {name}" for label, name in labels.items()]
+    remarks += [f"{name} is the product of {one} and {other}" for name, (one, other) in products.items()]
+    if len(kept) > _MOST_COLUMNS:
+        remarks.append(f"of {len(kept)} columns {_MOST_COLUMNS} are compared")
+    return replace(choice, reason="; ".join([choice.reason.removesuffix("."), *remarks]) + ".")
+
+
+def _choose(
+    signals: Mapping[str, NDArray[np.float64]],
+    given: set[str],
+    inputs: tuple[str, ...],
+    output: str | None,
+) -> ColumnChoice:
+    """Choose among the first columns and those that are given."""
+    names = [*given & signals.keys(), *(name for name in signals if name not in given)][:_MOST_COLUMNS]
+    names = [name for name in signals if name in names]
+    return _compare(names, [signals[name] for name in names]).choose(inputs, output)
 
 
 def _adds_up(values: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     """Return whether a column counts the values of another one of one sign, such as a charge."""
-    known = np.isfinite(values) & np.isfinite(other) if len(values) == len(other) else np.zeros(0, bool)
-    return known.size > 0 and is_total(values[known], other[known])
+    known = _both_known(values, other)
+    return bool(known.any()) and is_total(values[known], other[known])
+
+
+def _find_labels(signals: Mapping[str, NDArray[np.float64]], given: Collection[str]) -> dict[str, str]:
+    """Return the columns that number groups of values of another one, with its name."""
+    found = {}
+    for name, values in signals.items():
+        for source, other in signals.items():
+            known = _both_known(values, other)
+            if name not in given and name != source and known.any() and is_label(values[known], other[known]):
+                found[name] = source
+                break
+    return found
+
+
+def _find_products(
+    signals: Mapping[str, NDArray[np.float64]], given: Collection[str]
+) -> dict[str, tuple[str, str]]:
+    """Return the columns that are the product of two others, with their names."""
+    found: dict[str, tuple[str, str]] = {}
+    if len({len(values) for values in signals.values()}) != 1 or len(signals) > _MOST_COLUMNS:
+        return found
+    known = np.all([np.isfinite(values) for values in signals.values()], axis=0)
+    for name in signals:
+        if name in given or not known.any():
+            continue
+        others = combinations([each for each in signals if each != name and each not in found], 2)
+        pair = next(
+            (each for each in others if is_product(*(signals[column][known] for column in (name, *each)))),
+            None,
+        )
+        if pair is not None:
+            found[name] = pair
+    return found
+
+
+def _both_known(values: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return (
+        np.isfinite(values) & np.isfinite(other) if len(values) == len(other) else np.zeros(len(values), bool)
+    )
 
 
 def _describe_too_few(signals: Sequence[str]) -> str:

@@ -1,5 +1,6 @@
 """Shape of a column: whether it looks like a command or like a measured response."""
 
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -24,6 +25,18 @@ _DERIVED, _BALANCED = 0.05, 0.01
 #: Correlation of the increments of a total with a column of which it adds one sign, at least, and part of the
 #: samples with each sign, at least.
 _TOTAL, _EACH_SIGN = 0.95, 0.05
+
+#: Levels of a label, and increments of the column that it groups that are jumps: at least, relative to the
+#: median and to the range.
+_MOST_LABELS, _JUMP, _NO_JUMP = 12, 10.0, 1e-3
+
+#: Part of the changes of a label in which the other column jumps, at least; jumps between them, at least, and
+#: their median relative to that of the former.
+_LABEL_CHANGES, _LEAST_BETWEEN, _LEAST_RATIO = 0.9, 5, 0.25
+
+#: Error of a column as the product of two others, relative to its standard deviation, and to the error of a
+#: sum of them, up to which it is computed from them.
+_PRODUCT, _PRODUCT_GAIN = 0.01, 0.3
 
 #: Error of the increments of a column as a sum of others, relative to their size, up to which it is computed.
 _COMPUTED = 1e-3
@@ -114,6 +127,42 @@ def is_total(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
             if np.ptp(kept) > 0.0 and np.corrcoef(rising, kept)[0, 1] >= _TOTAL:
                 return True
     return False
+
+
+def is_product(x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Return whether x is a multiple of the product of two columns, as a power that a logger computes.
+
+    A product with a column that hardly varies is a multiple of the other one, and shows nothing.
+    """
+    product = one * other
+    scale = float(np.dot(x, product) / max(float(np.dot(product, product)), np.finfo(np.float64).tiny))
+    error = float(np.sqrt(np.mean((x - scale * product) ** 2)))
+    if not error <= _PRODUCT * float(x.std()):
+        return False
+    linear = np.column_stack((one, other, np.ones(x.size)))
+    rest = x - linear @ np.linalg.lstsq(linear, x, rcond=None)[0]
+    return error <= _PRODUCT_GAIN * float(rest.std())
+
+
+def is_label(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+    """Return whether x numbers groups of the values of y, as the step of a battery cycler or a sign.
+
+    Every value of x belongs to a range of y of its own, and y also jumps while x stays: it is the input of
+    which x is a part. The command of a relay is none, since its measured response does not jump by itself.
+    """
+    levels = np.unique(x)
+    if not 1 < levels.size <= _MOST_LABELS or np.any(levels != np.round(levels)):
+        return False
+    ranges = sorted((float(y[x == level].min()), float(y[x == level].max())) for level in levels)
+    if any(above[0] <= below[1] for below, above in pairwise(ranges)):
+        return False
+    steps, changed = np.abs(np.diff(y)), np.diff(x) != 0.0
+    least = max(_JUMP * float(np.median(steps)), _NO_JUMP * float(np.ptp(y)))
+    at_changes, between = steps[changed], steps[~changed]
+    between = between[between > least]
+    if np.mean(at_changes > least) < _LABEL_CHANGES or between.size < _LEAST_BETWEEN:
+        return False
+    return bool(np.median(between) >= _LEAST_RATIO * np.median(at_changes))
 
 
 def is_feedback(

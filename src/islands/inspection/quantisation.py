@@ -12,6 +12,9 @@ _MOST_LEVELS = 2.0**16
 #: Fewest different values, and the part of them that may differ from the lattice by rounding.
 _LEAST_VALUES, _ROUNDING = 3, 1e-3
 
+#: Levels of a switched signal.
+TWO = 2
+
 #: Largest number of divisions of the Euclidean algorithm.
 _DIVISIONS = 40
 
@@ -22,9 +25,14 @@ def find_quantisation(channel: Channel) -> Fact:
     Returns
     -------
     Fact
-        The value is None if there is no such lattice, or if it has more than 65 536 levels in the range.
+        The value is None if there is no such lattice, if it has more than 65 536 levels in the range, or if
+        the signal has two levels, which every lattice of their distance contains.
     """
     levels = np.unique(channel.known)
+    if levels.size == TWO:
+        low, high = (describe_amount(level, channel.unit) for level in levels)
+        text = f"{channel.name} has two levels, {low} and {high}."
+        return Fact("quantisation", channel.name, None, channel.unit, None, None, text)
     step = _find_step(levels)
     if step is None:
         text = f"{channel.name} is not quantised."

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from islands.inspection.channel import Channel, describe_amount
 from islands.inspection.fact import Fact
+from islands.inspection.quantisation import TWO
 
 #: Consecutive samples of a flat extreme, and flat samples in all, at least.
 _LEAST_RUN, _LEAST_SAMPLES = 3, 6
@@ -29,12 +30,14 @@ def find_saturation(channel: Channel, quantisation: Fact) -> Fact:
     Returns
     -------
     Fact
-        The value is None for a signal that is held between steps: all its levels are flat.
+        The value is None for a signal that is held between steps or has two levels: all its levels are flat.
     """
     values, name = channel.values, channel.name
     step = float(quantisation.value or 0.0)
-    if _is_held(values, step):
-        text = f"{name} is held between steps, so flat extremes are no sign of saturation."
+    has_two_levels = np.unique(channel.known).size == TWO
+    if has_two_levels or _is_held(values, step):
+        state = "switched between two levels" if has_two_levels else "held between steps"
+        text = f"{name} is {state}, so flat extremes are no sign of saturation."
         return Fact("saturation", name, None, "", None, None, text)
     found = {}
     for title, sign in (("maximum", 1.0), ("minimum", -1.0)):

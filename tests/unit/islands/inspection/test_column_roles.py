@@ -233,3 +233,24 @@ def test_a_column_that_changes_together_with_an_input_is_named():
     assert (
         "voltage_V changes together with current_A" in choice.reason or "voltage_V responds" in choice.reason
     )
+
+
+def test_computed_columns_of_a_battery_cycler_are_neither_input_nor_output():
+    current = steps(3000, 3)
+    voltage = 3.7 + 0.05 * current + 0.1 * lag(current, 20.0) + 1e-3 * white(3000, 4)
+    columns = {
+        "Step": 1.0 + (current > 0.0),
+        "Voltage(V)": voltage,
+        "Current(A)": current + 1e-3 * white(3000, 5),
+        "Power(W)": voltage * current,
+    }
+    choice = choose_columns(columns)
+    assert (choice.inputs, choice.output) == (("Current(A)",), "Voltage(V)")
+    assert "Step only numbers groups of values of Current(A)" in choice.reason
+    assert "Power(W) is the product of Voltage(V) and Current(A)" in choice.reason
+
+
+def test_the_product_of_independent_inputs_is_an_output():
+    one, other = steps(3000, 3), 2.0 + steps(3000, 4)
+    choice = choose_columns({"a": one, "b": other, "c": lag(one * other, 1e-3)})
+    assert choice.output == "c"

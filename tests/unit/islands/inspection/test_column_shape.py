@@ -5,6 +5,8 @@ from islands.inspection.column_shape import (
     find_computed,
     is_derived,
     is_feedback,
+    is_label,
+    is_product,
     is_total,
     measure_command,
     measure_noise_level,
@@ -78,3 +80,29 @@ def test_a_controller_with_rounded_columns_is_a_feedback_and_a_response_is_none(
     assert is_feedback(np.round(20.0 * (set_point - measured)), set_point, measured)
     assert not is_feedback(2.0 * lag(set_point, 9.0), set_point, measured)
     assert not is_feedback(white(800, 3), set_point, measured)
+
+
+def test_a_step_number_is_a_label_of_the_current():
+    current = np.round(4.0 * steps(2000, 0)) / 4.0
+    step = 1.0 + (current > 0.1) + 2.0 * (current < -0.6)
+    measured = current + 1e-3 * white(2000, 1)
+    assert is_label(step, measured)
+    assert not is_label(measured, step)
+
+
+def test_a_switched_command_is_no_label_of_its_response():
+    command = (steps(2000, 0) > 0.0).astype(float)
+    assert not is_label(command, command * 12.0 + 1e-3 * white(2000, 1))
+    assert not is_label(command, lag(command, 10.0))
+    slow = lag(white(2000, 2), 50.0)
+    assert not is_label((slow < 0.0).astype(float), slow)
+
+
+def test_a_power_is_the_product_of_voltage_and_current():
+    current = steps(2000, 0)
+    voltage = 3.7 + 0.1 * lag(current, 10.0)
+    power = np.round(voltage * current, 3)
+    assert is_product(power, voltage + 1e-3 * white(2000, 1), current)
+    assert not is_product(voltage, power, current)
+    assert not is_product(lag(power, 5.0), voltage, current)
+    assert not is_product(1.001 * current, np.ones(2000) + 1e-3 * white(2000, 2), current)

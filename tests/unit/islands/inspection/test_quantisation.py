@@ -39,7 +39,9 @@ def test_more_levels_than_a_converter_has_are_no_quantisation():
 
 
 def test_two_levels_are_no_lattice():
-    assert find(np.tile([0.0, 1.0], 50)).value is None
+    fact = find(np.tile([0.0, 1.0], 50))
+    assert fact.value is None
+    assert fact.sentence == "y_V has two levels, 0 V and 1 V."
 
 
 def test_missing_values_are_left_out():

@@ -47,3 +47,9 @@ def test_steps_are_held_but_not_saturated():
         binary = np.sign(steps(3000, seed))
         assert find(binary).value is None
         assert find(steps(3000, seed)).value is None
+
+
+def test_a_switched_signal_is_not_saturated():
+    pulses = np.zeros(1000)
+    pulses[100::200] = 12.0
+    assert "switched between two levels" in find(pulses).sentence
