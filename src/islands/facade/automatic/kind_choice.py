@@ -250,7 +250,7 @@ def _select_kind(
         return first, (
             "because its free-run RMSE on held-out parts of the estimation data is "
             f"{percent(trials.errors[first])} of the output range of these data"
-            f"{_list_others(trials.errors, first)}"
+            f"{list_others(trials.errors, first)}"
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
     least = min(errors.values())
@@ -261,7 +261,7 @@ def _select_kind(
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
             f"model on the validation data{means} is {percent(errors[close[0]])} of the output range of the "
             "estimation data"
-            f"{_list_others(errors, close[0])}"
+            f"{list_others(errors, close[0])}"
         )
     models = list(compared.values())
     best = recommend([each.model.size for each in models], models, False)
@@ -270,12 +270,18 @@ def _select_kind(
     return kind, (
         f"because the free-run RMSE of its recommended model{smallest} on the validation data"
         f"{means} is "
-        f"{percent(errors[kind])} of the output range of the estimation data{_list_others(errors, kind)}"
+        f"{percent(errors[kind])} of the output range of the estimation data{list_others(errors, kind)}"
     )
 
 
-def _list_others(errors: Mapping[str, float], kind: str) -> str:
-    others = [f"{percent(error)} for {each}" for each, error in errors.items() if each != kind]
+def list_others(errors: Mapping[str, float], kind: str) -> str:
+    """Return the errors of the other kinds; equal digits are stated as such."""
+    written = {each: percent(error) for each, error in errors.items()}
+    others = [
+        f"{'as much' if error == written[kind] else error} for {each}"
+        for each, error in written.items()
+        if each != kind
+    ]
     return f", compared with {', '.join(others)}" if others else ""
 
 

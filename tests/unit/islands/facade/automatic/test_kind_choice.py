@@ -10,7 +10,7 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.errors import SettingsError
 from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
-from islands.facade.automatic.kind_choice import choice_from_document
+from islands.facade.automatic.kind_choice import choice_from_document, list_others
 from islands.facade.automatic.kind_trials import percent
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
@@ -212,3 +212,9 @@ def test_models_of_means_are_compared_with_models_of_samples_in_means():
     assert choice.kind == "smooth"
     assert "in means of 2 samples of the record" in choice.reasons[0]
     assert set(result.recommended.model.parameter_names) == {"y(k-1)", "u1(k-1)", "u2(k-1)"}
+
+
+def test_errors_with_equal_digits_are_as_much():
+    errors = {"smooth": 0.1431, "friction": 0.1429, "magnitude": 0.02}
+    assert list_others(errors, "smooth") == ", compared with as much for friction, 2 % for magnitude"
+    assert list_others({"smooth": 0.1}, "smooth") == ""
