@@ -9,12 +9,16 @@ equal errors has the same weight, and terms that are not in the law of the syste
 one half. The free run starts from the initial outputs that are most likely for the structure, since the noise
 of the measured ones does not distinguish structures.
 
+A structure may be good on the validation data by chance. As in a recommendation, those whose error on the
+estimation data exceeds 1.5 times the least of the others are left out.
+
 Structures with equal free runs state one law (see `find_laws`). In inclusion probabilities, they count as one
 of them: the shortest, and of equal sizes the recommended one.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -39,6 +43,10 @@ MEMBERS = 64
 
 #: Structures with a smaller weight are left out.
 _MIN_WEIGHT = 0.5 / MEMBERS
+
+#: Largest free-run error on the estimation data, relative to the least of the models that are as good on the
+#: validation data.
+LARGEST_ESTIMATION_RATIO = 1.5
 
 #: A member is left out if the squared error of its free run on the validation data exceeds that of its
 #: structure by this factor: a replicate is a linear step, which may leave the stable models.
@@ -221,7 +229,8 @@ def make_ensemble(
     structures = []
     floor = _error_floor(split.validation)
     best = _best_of_each_structure(candidates)
-    kept = _weigh(best, split.validation, floor, warm_up, recommended)
+    weighed = _weigh(best, split.validation, floor, warm_up, recommended)
+    kept = _pass_over(weighed, split.estimation, warm_up, recommended)
     laws = find_laws([candidate.model for candidate, _ in kept], split.validation, warm_up, recommended)
     for position, ((candidate, weight), law) in enumerate(zip(kept, laws, strict=True)):
         if skip():
@@ -329,6 +338,37 @@ def _weigh(
         weights = np.maximum(weights, np.finfo(float).tiny)
     kept = weights[order] / weights[order].sum()
     return [(candidates[index], float(weight)) for index, weight in zip(order, kept, strict=True)]
+
+
+def _pass_over(
+    weighed: list[tuple[ValidatedModel[M], float]],
+    estimation: AnyRecord,
+    warm_up: int,
+    recommended: AnyModel | None,
+) -> list[tuple[ValidatedModel[M], float]]:
+    """Return the candidates whose error on the estimation data is close to the least of them.
+
+    The recommended one is kept. The weights sum to 1.
+    """
+    if len(weighed) < 2:
+        return weighed
+    errors = np.array([_measure_error(candidate.model, estimation, warm_up) for candidate, _ in weighed])
+    errors += _error_floor(estimation)
+    close = errors <= LARGEST_ESTIMATION_RATIO**2 * errors.min()
+    names = None if recommended is None else recommended.parameter_names
+    kept = [
+        each
+        for each, is_close in zip(weighed, close, strict=True)
+        if is_close or each[0].model.parameter_names == names
+    ]
+    total = sum(weight for _, weight in kept)
+    return [(candidate, weight / total) for candidate, weight in kept]
+
+
+def _measure_error(model: AnyModel, record: AnyRecord, warm_up: int) -> float:
+    """Return the mean squared error of a free run; infinite if it diverges."""
+    run = simulate_freely(model, record, warm_up)
+    return float(mean_squares(record, run.y[None], find_predicted(run.y))[0]) if run.outcome else inf
 
 
 def _score(errors: NDArray[np.float64], sizes: NDArray[np.int_], count: float) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.validation.assessment import Assessment
+from islands.validation.ensemble import LARGEST_ESTIMATION_RATIO
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
 #: Standard errors by which a mean squared error may exceed the least, which is a minimum over many models.
@@ -38,10 +39,6 @@ _NEAR = 1.0
 
 #: Drift of the output at the end of such a hold, in ranges, that is not stated.
 _STILL = 0.01
-
-#: Largest free-run error on the estimation data, relative to the least of the models that are as good on the
-#: validation data.
-LARGEST_ESTIMATION_RATIO = 1.5
 
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20

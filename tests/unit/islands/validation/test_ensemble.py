@@ -247,3 +247,22 @@ def test_the_terms_of_a_recommended_law_are_certain():
     assert found.best.model.parameter_names == ("y(k-1)", "u1(k-1)")
     assert min(found.best.inclusion) > 0.95
     assert "doubtful" not in str(found)
+
+
+def test_a_term_that_only_the_estimation_data_excite_is_included():
+    """A second input rests in the validation data, where the structure without it is as good and smaller."""
+    rng = np.random.default_rng(0)
+    u = rng.uniform(-1.0, 1.0, (500, 2))
+    u[350:, 1] = 0.0
+    y = np.zeros(500)
+    for k in range(1, 500):
+        y[k] = 0.6 * y[k - 1] + 0.3 * u[k - 1, 0] + 0.2 * u[k - 1, 1]
+    data = split(Dataset(u, y + 0.02 * rng.standard_normal(500), 0.1), 0.3)
+    law = ("y(k-1)", "u1(k-1)", "u2(k-1)")
+    entries = [candidate(texts, data) for texts in (law, law[:2])]
+    found = make_ensemble(entries, data, "none", 2, 0)
+    assert [each.model.size for each in found.structures] == [3]
+    assert (found.structures[0].weight, found.inclusion(term("u2(k-1)").text)) == (1.0, 1.0)
+    kept = make_ensemble(entries, data, "none", 2, 0, recommended=entries[1].model)
+    assert sorted(each.model.size for each in kept.structures) == [2, 3]
+    assert sum(each.weight for each in kept.structures) == pytest.approx(1.0)
