@@ -47,6 +47,9 @@ _MOST_BY_SIGNALS = 4.0
 #: Logarithm of the odds of an input that is visible only if others are known, and by its shape, at least.
 _BY_INDEPENDENCE, _LEAST_INDEPENDENT = 2.0, -1.0
 
+#: Gain of an input that no column predicts and whose shape is that of a response, at least.
+_CLEAR_GAIN = 0.1
+
 #: Weight of the unlimited odds by the signals between pairs with equal odds.
 _TIE = 1e-2
 
@@ -335,19 +338,23 @@ class _Comparison:
         )
         if is_response and self.manipulated[place, target] <= 0.0:
             return False
-        return self._measure_gain(target, chosen, place) > 0.0
+        is_shaped = self.gains[place, target] > 0.0 or self.odds[place, target] > _LEAST_INDEPENDENT
+        return self._measure_gain(target, chosen, place) > (0.0 if is_shaped else _CLEAR_GAIN)
 
     def _rate_input(self, place: int, target: int) -> float:
         """Return the logarithm of the odds that a column is an input of the output.
 
         The response to a weak input, or to one that modulates others, shows only if these are known. Such a
-        column is independent of the others, so that it is not a response itself.
+        column is independent of the others, so that it is not a response itself. A slow disturbance, such as
+        the temperature of a room, has the shape of a response, but no column predicts it.
         """
         if self.influence is None or self.gains[place, target] > 0.0:
             return float(self.odds[place, target])
         if self.gains[target, place] > 0.0:
             return float(self.odds[place, target] - self.odds[target, place])
-        return _BY_INDEPENDENCE if self.odds[place, target] > _LEAST_INDEPENDENT else -_BY_INDEPENDENCE
+        is_unpredicted = not self.gains[:, place].any()
+        is_independent = is_unpredicted or self.odds[place, target] > _LEAST_INDEPENDENT
+        return _BY_INDEPENDENCE if is_independent else -_BY_INDEPENDENCE
 
     def _measure_gain(self, target: int, known: Sequence[int], added: int) -> float:
         """Return what an input adds to the known ones, alone or by its products with them."""
@@ -366,7 +373,8 @@ class _Comparison:
         reason = f"{listed} and {output} are chosen by their {'names' if named else 'signals'}"
         seen = [place for place in chosen if self.gains[place, target] > 0.0]
         if seen and self.influence is not None:
-            gain = self.influence.measure_gain(self.places[target], [], [self.places[each] for each in seen])
+            known = [self.places[each] for each in chosen if each in self.places]
+            gain = self.influence.measure_gain(self.places[target], [], known)
             part = 1.0 - np.exp(-2.0 * max(gain, *self.gains[seen, target]))
             predicts = "predict" if len(inputs) > 1 else "predicts"
             reason += (

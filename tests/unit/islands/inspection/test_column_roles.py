@@ -254,3 +254,21 @@ def test_the_product_of_independent_inputs_is_an_output():
     one, other = steps(3000, 3), 2.0 + steps(3000, 4)
     choice = choose_columns({"a": one, "b": other, "c": lag(one * other, 1e-3)})
     assert choice.output == "c"
+
+
+def test_a_slow_disturbance_is_an_input_if_no_column_predicts_it():
+    """The temperature of a room acts on a heated block; its shape is that of a response."""
+    rng = np.random.default_rng(1)
+    heater = np.repeat(rng.choice([0.0, 0.3, 0.6, 1.0], 60), rng.integers(20, 90, 60))
+    samples = heater.size
+    room = 21.0 + 3.0 * np.sin(np.arange(samples) / 300.0) + lag(0.5 * white(samples, 2), 60.0)
+    block = np.full(samples, 21.0)
+    for k in range(1, samples):
+        block[k] = block[k - 1] + 0.02 * (room[k - 1] - block[k - 1] + 100.0 * heater[k - 1])
+    columns = {
+        "a": block + 0.08 * white(samples, 3),
+        "b": room + 0.04 * white(samples, 4),
+        "c": heater,
+    }
+    choice = choose_columns(columns)
+    assert (choice.inputs, choice.output) == (("b", "c"), "a")
