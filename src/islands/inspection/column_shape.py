@@ -147,8 +147,8 @@ def is_product(x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[
 def is_label(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     """Return whether x numbers groups of the values of y, as the step of a battery cycler or a sign.
 
-    Every value of x belongs to a range of y of its own, and y also jumps while x stays: it is the input of
-    which x is a part. The command of a relay is none, since its measured response does not jump by itself.
+    The ranges of y at the values of x do not overlap, and y also jumps while x stays: x is a part of it.
+    The command of a relay is none, since its measured response does not jump by itself.
     """
     levels = np.unique(x)
     if not 1 < levels.size <= _MOST_LABELS or np.any(levels != np.round(levels)):

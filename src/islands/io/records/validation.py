@@ -142,7 +142,7 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
     raise RecordError(
         f"{rows.place(sample, name)}{and_others(int(absent.sum()))} empty or NaN: give "
         f"{name_option('gaps', 'interpolate')} to fill it or {name_option('gaps', 'split')} to leave the row "
-        "out, or select rows without it"
+        "out, or select rows without it; only an output, of several the first, may have empty cells"
     )
 
 

@@ -330,9 +330,12 @@ class ResultFacts(RunFacts):
         if "inputs" not in self.data:
             return []
         ranges, columns = self.data["inputs"], self.record
-        return compare_input_ranges(
+        found = compare_input_ranges(
             columns["names"]["inputs"], columns["units"]["inputs"], ranges["estimation"], ranges["validation"]
         )
+        # The ranges that are stated before a search are those of the samples of the record.
+        count = self.document["preprocessing"]["average"]
+        return [f"{each}, in means of {count} samples" for each in found] if count > 1 else found
 
     @property
     def is_unpredictable_ahead(self) -> bool:
@@ -995,7 +998,7 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
             + (
                 f"at most {write_percent(LARGEST_SHARE)} is predictable"
                 if facts.is_far_ahead
-                else "no structure is left"
+                else f"no structure is left (at most {write_percent(LARGEST_SHARE)} is predictable)"
             )
         ),
     ),

@@ -199,7 +199,7 @@ def test_a_rival_with_another_free_run_keeps_its_terms():
     assert found.inclusion(term("y(k-1)").text) == pytest.approx(found.structures[0].weight)
 
 
-def test_noisy_initial_outputs_do_not_exclude_a_slow_law():
+def test_noise_of_initial_outputs_does_not_exclude_the_law_of_a_slow_process():
     """A form with two past outputs averages that noise, and took all weight."""
     law = make_model([(parse("y(k-1)"), 0.99), (parse("u(k-1)"), 0.01)], ("u",), "y")
     # The law substituted in itself once and twice, half each.

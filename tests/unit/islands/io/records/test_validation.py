@@ -23,6 +23,7 @@ def test_a_missing_time_or_input_is_refused(tmp_path, cell, column, name):
     assert message.startswith(f"bad.csv, line 14, column {name} is empty or NaN")
     assert 'gaps="interpolate"' in message
     assert 'gaps="split"' in message
+    assert message.endswith("only an output, of several the first, may have empty cells")
 
 
 @pytest.mark.parametrize("cell", ["nan", "NaN", "", "  ", "NA"])

@@ -315,7 +315,7 @@ def test_an_error_one_step_ahead_far_above_the_noise_has_structure(findings, one
     metrics["validation"]["one_step_ahead"] = Metrics(5.0, 0.95, one_step, 80.0)
     changes = {"metrics": metrics, "residual_structure": hidden, "criterion": LEAST_SQUARES}
     advice = statements.describe(with_noise(findings, 0.1, **changes))[-1]
-    assert ("one step ahead, no structure is left" in advice) != is_far
+    assert ("one step ahead, no structure is left (at most 10 % is predictable)" in advice) != is_far
     stated = (
         "try terms of another form (a higher degree, another library): the error one step ahead is 20 times"
     )
@@ -377,6 +377,9 @@ def test_an_extrapolating_validation_is_a_failure(findings):
         f"extrapolation: u_V is {low:.4g} to {high:.4g} V in the validation data" in said(changed)["Fails at"]
     )
     assert "extrapolation" not in said(findings)["Fails at"]
+    document = result_document(changed)
+    document["preprocessing"]["average"] = 2
+    assert "in the estimation data, in means of 2 samples" in " ".join(statements.describe(document))
 
 
 def test_the_ratio_of_two_rounding_errors_is_not_a_failure(findings):
