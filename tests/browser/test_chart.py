@@ -258,3 +258,9 @@ def test_a_cached_figure_does_not_change_the_clock(page: Any) -> None:
 
 def test_halving_a_history_keeps_its_last_point(page: Any) -> None:
     assert call(page, "components/convergence.js", "halve", list(range(10))) == [0, 2, 4, 6, 8, 9]
+
+
+def test_a_label_has_the_unit_once(page: Any) -> None:
+    labels = [("CH1 [V]", "V"), ("Block (°C)", "°C"), ("u_V", "V"), ("u", None)]
+    found = [call(page, "lib/numbers.js", "labelQuantity", *each) for each in labels]
+    assert found == ["CH1 [V]", "Block (°C)", "u_V (V)", "u"]

@@ -1,7 +1,14 @@
 /** Parts of the comparison of models: tables of errors, terms and settings, and charts. */
 
 import { el, makeScrollable, makeTable } from "../lib/dom.js";
-import { NONE, formatInterval, formatPercent, formatQuantity, formatShort } from "../lib/numbers.js";
+import {
+  NONE,
+  formatInterval,
+  formatPercent,
+  formatQuantity,
+  formatShort,
+  labelQuantity,
+} from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { findUnit } from "./dataset.js";
 
@@ -60,7 +67,7 @@ function makeOverlay(group, isOnly) {
   const chart = makeLineChart({
     title: isOnly ? `Measured and simulated ${output}` : `Validation data of ${names}`,
     x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
-    y: { label: unit ? `${output} (${unit})` : output },
+    y: { label: labelQuantity(output, unit) },
   });
   const { time_s: times, measured } = first.simulation;
   chart.draw([

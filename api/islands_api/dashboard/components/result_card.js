@@ -2,7 +2,7 @@
 
 import { getJobPath, getJson } from "../lib/api.js";
 import { el, makeFacts } from "../lib/dom.js";
-import { formatPercent, formatQuantity, formatShort } from "../lib/numbers.js";
+import { formatPercent, formatQuantity, formatShort, labelQuantity } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeEquation } from "./models.js";
 import { makeTryModel } from "./try_model.js";
@@ -48,7 +48,7 @@ export function makeResultCard(job, unit, signal) {
   const chart = makeLineChart({
     title: "Free run on the validation data",
     x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
-    y: { label: [job.spec.output, unit && `(${unit})`].filter(Boolean).join(" ") },
+    y: { label: labelQuantity(job.spec.output, unit) },
   });
   const note = el("p", { class: "loading" }, "Simulating the validation data…");
   showFacts(NaN);

@@ -1,12 +1,15 @@
 /** Lines of a plot of signals on a canvas, and their names. */
 
+import { labelQuantity } from "../lib/numbers.js";
+
 /** Write the names of the lines of a panel, each in its colour if there are several, and their unit. */
 export function drawNames(pen, lines, [left, base], colours) {
   pen.textAlign = "left";
-  const unit = lines[0].unit ? `(${lines[0].unit})` : "";
   const texts = lines.map(({ name, colour }) => [name, lines.length > 1 ? colour : "ink"]);
+  const last = texts[texts.length - 1];
+  last[0] = labelQuantity(last[0], lines[0].unit);
   let at = left;
-  for (const [text, colour] of [...texts, [unit, "ink"]]) {
+  for (const [text, colour] of texts) {
     pen.fillStyle = colours[colour];
     pen.fillText(text, at, base);
     at += pen.measureText(text).width + (lines.length > 1 ? 14 : 4);

@@ -2,7 +2,7 @@
 
 import { postJson, saveBlob } from "../lib/api.js";
 import { el, setText } from "../lib/dom.js";
-import { formatNumber, formatShort } from "../lib/numbers.js";
+import { formatNumber, formatShort, labelQuantity } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeExcitationForm } from "./excitation_form.js";
 import { findLimits, makeLoopPlot } from "./loop_plot.js";
@@ -31,7 +31,7 @@ function writeCsv({ time_s: times, inputs, output }, name) {
 function makePanel(path, output, found, signal) {
   const { dt, ranges, units } = found;
   const names = Object.keys(ranges);
-  const label = (name) => (units[name] ? `${name} (${units[name]})` : name);
+  const label = (name) => labelQuantity(name, units[name]);
   const getFrequency = (name) => findFrequency(found.inputs[name], dt);
   const frequency = getFrequency(names[0]);
   const forms = names.map((name, place) => {

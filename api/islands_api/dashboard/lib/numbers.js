@@ -41,6 +41,10 @@ export function formatInterval(value, half) {
   return `${formatNumber(value, Math.min(12, Math.max(2, digits)))} ± ${formatNumber(half, 2)}`;
 }
 
+/** Label a quantity with its unit, unless its name ends in the unit in brackets: `u_V (V)`, `CH1 [V]`. */
+export const labelQuantity = (name, unit) =>
+  !unit || name.endsWith(`[${unit}]`) || name.endsWith(`(${unit})`) ? name : `${name} (${unit})`;
+
 /** Format a count with thousands separators. */
 export const formatCount = (value) =>
   Number.isFinite(value) ? Math.round(value).toLocaleString("en").replaceAll(",", "\u202f") : NONE;
