@@ -173,18 +173,7 @@ class FmuInstance:
     def _run(
         self, signals: Mapping[int, SampledSignal], equations: FmuEquations, start_time: float, dt: float
     ) -> FmuRun:
-        inputs = np.array(list(signals), dtype=np.uint32)
-        moments = np.stack([signal.moments for signal in signals.values()])
-        start, middle, end = (np.ascontiguousarray(each.T) for each in moments.transpose(2, 0, 1))
-        y = np.full((len(start), equations.instructions.outputs.size), np.nan)
-        description = self.description
-        if description.interface == FmiInterface.MODEL_EXCHANGE:
-            done, status = integrate(
-                *(self._functions, equations, start_time, dt, start, middle, end, inputs),
-                *(len(description.states), description.indicators, description.completes, y),
-            )
-        else:
-            done, status = take_steps(self._functions, equations, start_time, dt, start, middle, inputs, y)
+        y, done, status = call_kernel(self._functions, self.description, signals, equations, start_time, dt)
         failure = ""
         if done < len(y):
             reason = "it ends the simulation" if status == TERMINATED else f"it fails with status {status}"
@@ -197,6 +186,38 @@ class FmuInstance:
         return ": ".join([failure, *self._messages[-_MESSAGES:]])
 
 
+def call_kernel(
+    functions: FmiFunctions,
+    description: FmiDescription,
+    signals: Mapping[int, SampledSignal],
+    equations: FmuEquations,
+    start_time: float,
+    dt: float,
+) -> tuple[NDArray[np.float64], int, int]:
+    """Simulate an initialised FMU; see `FmuInstance.simulate`.
+
+    Returns
+    -------
+    y : ndarray, shape (samples, outputs)
+    done : int
+        Number of computed samples.
+    status : int
+        That of the last call.
+    """
+    inputs = np.array(list(signals), dtype=np.uint32)
+    moments = np.stack([signal.moments for signal in signals.values()])
+    start, middle, end = (np.ascontiguousarray(each.T) for each in moments.transpose(2, 0, 1))
+    y = np.full((len(start), equations.instructions.outputs.size), np.nan)
+    if description.interface == FmiInterface.MODEL_EXCHANGE:
+        done, status = integrate(
+            *(functions, equations, start_time, dt, start, middle, end, inputs),
+            *(len(description.states), description.indicators, description.completes, y),
+        )
+    else:
+        done, status = take_steps(functions, equations, start_time, dt, start, middle, inputs, y)
+    return y, done, status
+
+
 class _Resources:
     """Folder and instance of an FMU, which outlive the object that uses them until it is finalised."""
 
@@ -205,7 +226,9 @@ class _Resources:
         self.fmu: Any = None
 
     def extract(self, description: FmiDescription) -> str:
-        """Extract the FMU that was described to a new folder; return its path."""
+        """Extract the FMU that was described to a new folder; return its path, or that of its folder."""
+        if Path(description.path).is_dir():
+            return description.path
         content = Path(description.path).read_bytes()
         if hashlib.sha256(content).hexdigest() != description.digest:
             raise ModelError(

@@ -163,7 +163,7 @@ def choose_variables(
     if chosen_input.name in channels:
         raise SettingsError(f"{name}: {chosen_input.name} is the input and cannot be a channel as well")
     possible = _find_initial_values(description, chosen_input.name, chosen_output.name)
-    known = {key: each for key, each in _by_name(description.parameters).items() if key not in possible}
+    known = _find_parameters(description, possible)
     if parameters is None:
         _check_number(name, "parameters", known, MAX_DEFAULT_PARAMETERS)
         parameters = dict.fromkeys(known, FmuParameterChoice())
@@ -182,6 +182,16 @@ def choose_variables(
         tuple(_find(name, "initial value", possible, each) for each in initial),
         steps,
     )
+
+
+def list_calibrated(description: FmiDescription) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the parameters, and of the values at the first sample, that can be calibrated."""
+    initial = _find_initial_values(description, "", "")
+    return tuple(_find_parameters(description, initial)), tuple(initial)
+
+
+def _find_parameters(description: FmiDescription, initial: Mapping[str, object]) -> dict[str, FmiVariable]:
+    return {name: each for name, each in _by_name(description.parameters).items() if name not in initial}
 
 
 def _by_name(variables: Sequence[FmiVariable]) -> dict[str, FmiVariable]:

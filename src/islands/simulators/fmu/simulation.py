@@ -6,8 +6,9 @@ import numpy as np
 
 from islands.expressions.tree import FMU, Apply, Symbol
 from islands.simulators.fmu.fmi_kernel import FmuEquations
-from islands.simulators.fmu.instance import FmuInstance, FmuRun
+from islands.simulators.fmu.instance import FmuRun
 from islands.simulators.fmu.model import FmuModel
+from islands.simulators.fmu.source import LoadedFmu
 from islands.simulators.ode.kernel_arguments import LANES
 from islands.simulators.ode.lane_simulation import pack_signals
 from islands.simulators.ode.lane_values import LaneInput, LaneValues
@@ -15,14 +16,14 @@ from islands.simulators.ode.program import OdeProgram
 
 
 def simulate_fmu(
-    fmu: FmuInstance, model: FmuModel, program: OdeProgram, start_time: float, dt: float, lane: LaneInput
+    fmu: LoadedFmu, model: FmuModel, program: OdeProgram, start_time: float, dt: float, lane: LaneInput
 ) -> FmuRun:
     """Simulate an FMU and its equations.
 
     Parameters
     ----------
-    fmu : FmuInstance
-        Instance of the FMU of the model.
+    fmu : LoadedFmu
+        The FMU of the model.
     program : OdeProgram
         Instructions of the equations around the FMU, see `make_fmu_system`.
     start_time, dt : float

@@ -14,9 +14,10 @@ from islands.errors import RecordError
 from islands.expressions.tree import FMU, Apply, Expression, Symbol
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.fmu.fmi_description import FmiInterface
-from islands.simulators.fmu.instance import FmuRun, load_fmu
+from islands.simulators.fmu.instance import FmuRun
 from islands.simulators.fmu.model import FmuModel
 from islands.simulators.fmu.simulation import simulate_fmu
+from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.interface import SimulationRun
 from islands.simulators.ode.lane_values import LaneInput
 from islands.simulators.ode.program import OdeProgram, generate_program
@@ -45,9 +46,12 @@ class FmuSimulator(OdeSimulator):
     initial : mapping
         Nominal states by their names in the equations, and nominal start values by the names of the
         variables, at the first sample.
+    source : FmuSource
+        Loads the FMU.
     """
 
     model: FmuModel = field(kw_only=True)
+    source: FmuSource = field(default=LOCAL_FMUS, kw_only=True)
 
     def _list_initial_states(self) -> tuple[Parameter, ...]:
         found = []
@@ -59,7 +63,8 @@ class FmuSimulator(OdeSimulator):
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what the simulator is made of, since the functions of its effects cannot be pickled."""
         arguments = self.system, self.initial, self.sizes, self.channels
-        make = partial(FmuSimulator, is_continuous_time=self.is_continuous_time, model=self.model)
+        model, source = self.model, self.source
+        make = partial(FmuSimulator, is_continuous_time=self.is_continuous_time, model=model, source=source)
         return make, arguments
 
     def run_nominal(self, context: SimulationContext, outputs: tuple[Expression, ...]) -> FmuRun:
@@ -68,7 +73,7 @@ class FmuSimulator(OdeSimulator):
         run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
         (lane,) = self._make_lanes(program, (), [run], context)
         dt = context.dt / self._steps
-        fmu = load_fmu(self.model.description)
+        fmu = self.source.load(self.model.description)
         return simulate_fmu(fmu, self.model, program, context.start_time, dt, lane)
 
     def _simulate_lanes(
@@ -79,18 +84,22 @@ class FmuSimulator(OdeSimulator):
         lanes: Sequence[LaneInput],
         every: int,
     ) -> Signal:
-        fmu = load_fmu(self.model.description)
+        fmu = self.source.load(self.model.description)
         outputs = [simulate_fmu(fmu, self.model, program, start_time, dt, lane).y for lane in lanes]
         return np.stack(outputs)[:, :, ::every]
 
 
-def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> FmuSimulator:
+def make_fmu_simulator(
+    model: FmuModel, system: OdeSystem, record: Dataset, source: FmuSource = LOCAL_FMUS
+) -> FmuSimulator:
     """Make a simulator of an FMU for a record, which determines nominal values at the first sample.
 
     Parameters
     ----------
     system : OdeSystem
         Equations around the FMU.
+    source : FmuSource
+        Loads the FMU.
 
     Raises
     ------
@@ -113,7 +122,12 @@ def make_fmu_simulator(model: FmuModel, system: OdeSystem, record: Dataset) -> F
     is_continuous_time = is_integrated or (description.has_variable_step and description.fixed_step is None)
     states = [name for name, _ in system.derivatives]
     ones = dict.fromkeys([*initial, *(f"d{name}/dt" for name in states)], 1.0)
-    rough = FmuSimulator(system, initial, ones, channels, is_continuous_time=is_continuous_time, model=model)
+    rough = FmuSimulator(
+        *(system, initial, ones, channels),
+        is_continuous_time=is_continuous_time,
+        model=model,
+        source=source,
+    )
     context = make_nominal_context(record)
     values = [each.variable.name for each in model.initial if each.place < 0]
     expressions: list[Expression] = [system.output, *map(Symbol, states)]

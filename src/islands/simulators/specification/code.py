@@ -5,6 +5,7 @@ They are accepted on the command line and in Python only, since the code runs on
 
 import re
 import tomllib
+from collections.abc import Callable
 from math import isinf
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +14,7 @@ from urllib.parse import parse_qsl
 from pydantic import BeforeValidator, Field, FiniteFloat
 
 from islands.errors import SettingsError
-from islands.simulators.fmu.fmi_description import read_description
+from islands.simulators.fmu.fmi_description import FmiDescription, read_description
 from islands.simulators.fmu.model import FmuModel, FmuParameterChoice, choose_variables
 from islands.simulators.fmu.system import make_fmu_system, render_extension
 from islands.simulators.ode.equation_parser import MAX_CHARACTERS
@@ -85,8 +86,13 @@ class FmuSpec(SimulatorSpec):
         """Name of the file."""
         return Path(self.file).name
 
-    def make_model(self) -> FmuModel:
-        """Return the FMU with its variables; the file is read.
+    def make_model(self, describe: Callable[[str, str], FmiDescription] = read_description) -> FmuModel:
+        """Return the FMU with its variables.
+
+        Parameters
+        ----------
+        describe : callable
+            Takes the file and the interface; by default it reads the file.
 
         Raises
         ------
@@ -97,7 +103,7 @@ class FmuSpec(SimulatorSpec):
         """
         chosen = self.parameters
         return choose_variables(
-            read_description(self.file, self.interface),
+            describe(self.file, self.interface),
             self.input,
             self.output,
             self.channels,

@@ -32,6 +32,7 @@ from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel, no_model_error
 from islands.models.signal_statement import describe_values
 from islands.simulators.fmu.simulator import make_fmu_simulator
+from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator, estimate_linear
@@ -69,6 +70,7 @@ def make_simulator(
     spec: str | SimulationSpec | LocalSpec,
     record: Dataset,
     columns: Mapping[str, Any] | None = None,
+    fmus: FmuSource = LOCAL_FMUS,
 ) -> Simulator:
     """Make a simulator from its specification.
 
@@ -80,6 +82,8 @@ def make_simulator(
         Record that the simulation will be compared with.
     columns : mapping, optional
         Columns of the file of the record by name, each of shape (samples,); a column can be a simulation.
+    fmus : FmuSource
+        Describes and loads the FMU of a simulation.
 
     Raises
     ------
@@ -95,7 +99,9 @@ def make_simulator(
     # Estimates and initial values need a complete output; the calibration leaves missing samples out.
     record = replace(record, y=fill_gaps(record.y))
     if isinstance(spec, ExtendedSpec):
-        return _make_saved_extension(spec, record, columns or {})
+        return _make_saved_extension(spec, record, columns or {}, fmus)
+    if isinstance(spec, FmuSpec) and fmus != LOCAL_FMUS:
+        return _make_fmu(spec, record, fmus)
     entry = SIMULATORS[spec.kind]
     if isinstance(spec, PhysicalSpec):
         _check_parameters(entry, spec.parameters)
@@ -105,11 +111,13 @@ def make_simulator(
     return simulator
 
 
-def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
+def _make_saved_extension(
+    document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any], fmus: FmuSource
+) -> Simulator:
     # The channels may be others: effects find theirs by name.
     driving = ColumnReference(document.inputs[:1], document.output)
     match_record(driving, record.first_inputs(1), "the extended simulation", advance=False)
-    simulator = make_simulator(document.core, record, columns)
+    simulator = make_simulator(document.core, record, columns, fmus)
     inner: Simulator = simulator
     if document.output_equation is not None:
         system = document.output_equation.make_system(simulator.name)
@@ -197,8 +205,12 @@ def make_python_function(spec: ProgramSpec, _record: Dataset, _columns: Mapping[
 
 def make_fmu(spec: FmuSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
     """Read an FMU and make a simulator of it and of the equations around it."""
-    model = spec.make_model()
-    return make_fmu_simulator(model, spec.make_system(model), record)
+    return _make_fmu(spec, record, LOCAL_FMUS)
+
+
+def _make_fmu(spec: FmuSpec, record: Dataset, fmus: FmuSource) -> Simulator:
+    model = spec.make_model(fmus.describe)
+    return make_fmu_simulator(model, spec.make_system(model), record, fmus)
 
 
 def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
