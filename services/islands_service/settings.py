@@ -92,6 +92,10 @@ class ServiceSettings(BaseSettings):
         0 disables the latter.
     inspection_memory, inspection_seconds
         Memory and time budget of the process that reads an uploaded file.
+    allow_fmus
+        Whether clients may upload FMUs, and simulate them in previews and diagnoses. An FMU is native code;
+        it runs in a process that can read nothing but the FMU and the installed software, as Linux 5.13 and
+        later enforce.
     max_stored
         Largest total size of the data sets of one owner.
     max_active
@@ -196,6 +200,7 @@ class ServiceSettings(BaseSettings):
     body_rate: Annotated[float, Field(ge=0.0)] = 20_000.0
     inspection_memory: Count = 6_000_000_000
     inspection_seconds: Positive = 120.0
+    allow_fmus: bool = False
     max_stored: Count = 5_000_000_000
     max_active: Count = 10_000
     max_running: Count = 1000
@@ -318,3 +323,9 @@ def service_settings(**given: object) -> ServiceSettings:
         raise SettingsError(
             f"setting {name} (ISLANDS_{name.upper()}): {message}" if name else message
         ) from error
+
+
+def read_simulation_environment() -> dict[str, str]:
+    """Return the environment variables of processes that simulate: the cache of kernels, and no secret."""
+    kept = ("HOME", "ISLANDS_CACHE_DIR", "ISLANDS_ALLOW_FMUS")
+    return {name: os.environ[name] for name in kept if name in os.environ}

@@ -11,6 +11,11 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef ATTACK
+#include <stdio.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#endif
 
 #include "unused.h"
 
@@ -151,6 +156,11 @@ API Status fmi2DoStep(fmi2Component c, double time, double step, fmi2Boolean kee
 API const char *fmi3GetVersion(void) { return "3.0"; }
 static void *make(fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, int is_exchange)
 {
+#ifdef ATTACK
+    /* What a harmful FMU may try; there is no instance if nothing succeeds. ATTACK is a writable path. */
+    if (!fopen("/etc/passwd", "r") && !fopen(ATTACK, "w") && socket(AF_INET, SOCK_STREAM, 0) < 0 && fork() < 0)
+        return NULL;
+#endif
     Mass *mass = calloc(1, sizeof *mass);
     start(mass);
     mass->environment = environment;

@@ -54,5 +54,5 @@ class JobRun:
         return self.lease.job
 
     def get_dataset(self, identity: str) -> StoredDataset:
-        """Return a dataset of the job, which may have been deleted since its submission."""
-        return self.store.datasets.get(self.job.owner, identity, deleted=True)
+        """Return a data set or the FMU of the job, which may have been deleted since its submission."""
+        return self.store.datasets.get(self.job.owner, identity, deleted=True, is_fmu=None)

@@ -358,8 +358,10 @@ class Coordinator:
         """Let Ray start while a job reads its record and selects seeds."""
         from islands_service.coordinator.job_engine import expects_cluster  # noqa: PLC0415
 
-        datasets = [self._store.datasets.get(job.owner, each, deleted=True) for each in job.datasets]
-        samples = sum(each.preview["samples"] for each in datasets)
+        stored = self._store.datasets
+        datasets = [stored.get(job.owner, each, deleted=True, is_fmu=None) for each in job.datasets]
+        # An FMU has none.
+        samples = sum(each.preview.get("samples", 0) for each in datasets)
         if expects_cluster(job, samples, self._settings.short_search):
             self._demand_ray()
 

@@ -258,9 +258,12 @@ class Job:
 
 
 def find_datasets(spec: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the data sets that the specification of a job names."""
+    """Return the data sets that the specification of a job names, then its FMU."""
     parts = [spec, spec.get("validation"), *(spec.get("recordings") or ())]
     named = [part.get("dataset") for part in parts if isinstance(part, dict)]
+    simulation = spec.get("simulation")
+    if isinstance(simulation, dict) and simulation.get("kind") == "fmu":
+        named.append(simulation.get("file"))
     return tuple(dict.fromkeys(name for name in named if isinstance(name, str)))
 
 

@@ -23,6 +23,7 @@ from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
 from islands.io.models import MODEL_CLASSES, NARX
 from islands.simulators.specification.table import ColumnSpec, SimulationSpec, innermost
+from islands_service.domain.uploaded_fmu import UploadedFmuSpec
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -177,8 +178,8 @@ def check_single(given: Any) -> Any:
     return given
 
 
-class Discrepancy(BaseModel):
-    """Diagnose the discrepancy between a simulation and a record."""
+class SimulatedRecord(BaseModel):
+    """A simulation, and the columns and rows of a record that it is compared with."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -192,18 +193,19 @@ class Discrepancy(BaseModel):
     )
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples to analyse; all by default.")
-    recordings: Recordings = ()
-    validation: Part | None = Field(
-        default=None,
-        description="A recording that is held out as a whole, instead of the last quarter of the record.",
+    simulation: Annotated[SimulationSpec | UploadedFmuSpec, Field(discriminator="kind")] = Field(
+        description="Simulation to compare with the record."
     )
-    simulation: SimulationSpec = Field(description="Simulation to compare with the record.")
     tolerance: Annotated[dict[Name, Fraction], Field(max_length=100)] = Field(
         default_factory=dict,
         description="Relative standard deviations of the known parameters, by name.",
         examples=[{"dp": 0.01}],
     )
-    seed: Seed = 0
+
+    @property
+    def fmu(self) -> UploadedFmuSpec | None:
+        """The simulation if it is an FMU."""
+        return self.simulation if isinstance(self.simulation, UploadedFmuSpec) else None
 
     @property
     def recorded_columns(self) -> tuple[str, ...]:
@@ -219,6 +221,17 @@ class Discrepancy(BaseModel):
     def columns(self) -> tuple[tuple[str, ...], str]:
         """Inputs and output of the record to read."""
         return self.inputs, self.output
+
+
+class Discrepancy(SimulatedRecord):
+    """Diagnose the discrepancy between a simulation and a record."""
+
+    recordings: Recordings = ()
+    validation: Part | None = Field(
+        default=None,
+        description="A recording that is held out as a whole, instead of the last quarter of the record.",
+    )
+    seed: Seed = 0
 
     @property
     def estimation(self) -> tuple[Part, ...]:

@@ -6,39 +6,53 @@ import os
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from islands_service.intake.confined_process import check_status, make_message, timeout_error
-from islands_service.intake.reader_process import FORK_SERVER, ReaderProcess
+from islands_service.intake.reader_process import FORK_SERVER, ForkServer, ReaderProcess
 
 #: Largest number of bytes of an answer, which a harmful file may control, and of a part of it.
 _MAX_OUTPUT, _CHUNK = 64_000_000, 65_536
 
 
 async def ask_confined(
-    program: str, path: Path, asked: Mapping[str, Any], memory: int, seconds: float
+    program: str,
+    path: Path,
+    asked: Mapping[str, Any],
+    memory: int,
+    seconds: float,
+    server: ForkServer | None = None,
+    fmu: Path | None = None,
 ) -> Mapping[str, Any]:
     """Return the answer of a process that reads a file.
 
     Parameters
     ----------
     program : str
-        Key of `islands_service.intake.fork_server.PROGRAMS`.
+        Key of the programs of the server.
     path : Path
     asked : mapping
         What the process is asked for, as JSON.
     memory, seconds
         Limits of the process: bytes of address space, and time.
+    server : ForkServer, optional
+        By default that of the readers.
+    fmu : Path, optional
+        FMU that the process extracts and runs.
 
     Raises
     ------
-    RecordError
+    RecordError, ModelError, SettingsError
         The file cannot be read as asked, or not within the limits.
     """
     with ExitStack() as files:
         (answers, output), (complaints, errors) = _open_pipe(files), _open_pipe(files)
-        message = make_message(path, memory, seconds, asked)
-        process = files.enter_context(FORK_SERVER.start(program, message, output.fileno(), errors.fileno()))
+        folder = files.enter_context(TemporaryDirectory(prefix="islands-fmu-")) if fmu else None
+        message = make_message(path, memory, seconds, asked, fmu, folder)
+        process = files.enter_context(
+            (server or FORK_SERVER).start(program, message, output.fileno(), errors.fileno())
+        )
         output.close()
         errors.close()
         try:

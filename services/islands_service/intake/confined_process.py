@@ -4,11 +4,11 @@ import json
 import os
 import resource
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
-from islands.errors import IslandsError, RecordError
+from islands.errors import IslandsError, ModelError, RecordError, SettingsError
 from islands_service.intake.confinement import confine
 
 #: Environment of a process, without any secret.
@@ -20,6 +20,9 @@ REQUESTS = "ISLANDS_READERS"
 #: Exit status if the file is unusable and the reason is the answer.
 _REFUSED = 3
 
+#: Errors that a process may refuse with; other ones are a `RecordError`.
+_REFUSALS = {each.__name__: each for each in (ModelError, SettingsError)}
+
 #: Largest number of open files.
 _MAX_FILES = 64
 
@@ -29,19 +32,36 @@ def make_command(module: str) -> tuple[str, ...]:
     return sys.executable, "-P", "-m", f"islands_service.intake.{module}"
 
 
-def make_message(path: Path, memory: int, seconds: float, asked: Mapping[str, Any]) -> bytes:
-    """Return the standard input of a process that reads a file."""
+def make_message(
+    path: Path,
+    memory: int,
+    seconds: float,
+    asked: Mapping[str, Any],
+    fmu: Path | None = None,
+    folder: str | None = None,
+) -> bytes:
+    """Return the standard input of a process that reads a file.
+
+    Parameters
+    ----------
+    fmu : Path, optional
+        FMU that it reads as well.
+    folder : str, optional
+        Empty folder in which it may make files until it calls `end_writing`.
+    """
     message = {"path": str(path), "memory": memory, "seconds": seconds, "asked": dict(asked)}
-    return json.dumps(message).encode()
+    return json.dumps({**message, "fmu": fmu and str(fmu), "folder": folder}).encode()
 
 
-def enter(writes: bool = False) -> tuple[str, dict[str, Any], IO[bytes]]:
+def enter(writes: bool = False, readable: Iterable[Path] = ()) -> tuple[str, dict[str, Any], IO[bytes]]:
     """Read the message on standard input, and restrict this process.
 
     Parameters
     ----------
     writes : bool
         Whether standard output is a file, which may have as many bytes as the process has memory.
+    readable : iterable of Path
+        Further files and folders that can be read.
 
     Returns
     -------
@@ -53,10 +73,23 @@ def enter(writes: bool = False) -> tuple[str, dict[str, Any], IO[bytes]]:
     answer = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     message = json.load(sys.stdin)
-    memory = message["memory"]
-    limit_resources(memory, message["seconds"], memory if writes else 0)
-    confine([Path(message["path"]).resolve()])
-    return message["path"], message["asked"], answer
+    memory, folder = message["memory"], message.get("folder")
+    limit_resources(memory, message["seconds"], memory if writes or folder else 0)
+    files = [Path(each).resolve() for each in (message["path"], message.get("fmu")) if each]
+    is_confined = confine([*files, *readable], [Path(folder)] if folder else [])
+    asked = {**message["asked"], "fmu": message.get("fmu"), "folder": folder} if folder else message["asked"]
+    if folder and not is_confined:
+        refuse(
+            SettingsError("FMUs need a service on Linux 5.13 or later with Landlock: ask its operator"),
+            answer,
+        )
+    return message["path"], asked, answer
+
+
+def end_writing(readable: Iterable[Path]) -> None:
+    """End the right of this process to write; it can read the given files and folders, if it could."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+    confine(readable)
 
 
 def limit_resources(memory: int, seconds: float, output_bytes: int = 0) -> None:
@@ -74,7 +107,7 @@ def limit_resources(memory: int, seconds: float, output_bytes: int = 0) -> None:
 
 def refuse(error: IslandsError, answer: IO[bytes]) -> NoReturn:
     """End this process with the reason why the file is unusable."""
-    send_document({"error": str(error)}, answer)
+    send_document({"error": str(error), "kind": type(error).__name__}, answer)
     sys.exit(_REFUSED)
 
 
@@ -102,9 +135,12 @@ def check_status(
     ------
     RecordError
         The file is unusable, or its reader has exceeded a limit.
+    ModelError, SettingsError
+        What is to be done with the file is not possible.
     """
     if status == _REFUSED:
-        raise RecordError(json.loads(answer)["error"])
+        refusal = json.loads(answer)
+        raise _REFUSALS.get(refusal.get("kind", ""), RecordError)(refusal["error"])
     if status:
         reason = complaint.decode(errors="replace").strip().rpartition("\n")[2] or f"exit {status}"
         if "/" in reason:  # a path of this machine, which is not for the owner of the file

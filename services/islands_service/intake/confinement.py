@@ -96,13 +96,20 @@ _NUMBER, _ARCHITECTURE, _FIRST_ARGUMENT = 0, 4, 16
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
-def confine(readable: Iterable[Path]) -> None:
+def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> bool:
     """Restrict this process for the rest of its life, as far as the kernel supports it.
 
     Parameters
     ----------
     readable : iterable of Path
-        Files that can be read, in addition to the installed software.
+        Files and folders that can be read, in addition to the installed software.
+    writable : iterable of Path
+        Folders in which files can be made and read.
+
+    Returns
+    -------
+    bool
+        Whether the kernel restricts the files.
 
     Raises
     ------
@@ -110,10 +117,11 @@ def confine(readable: Iterable[Path]) -> None:
         The kernel supports a restriction but refuses it.
     """
     if sys.platform != "linux":
-        return
+        return False
     _check(_libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
-    _restrict_files((*readable, *_list_software()))
+    is_restricted = _restrict_files((*readable, *_list_software()), writable)
     _restrict_calls()
+    return is_restricted
 
 
 def _list_software() -> set[Path]:
@@ -125,23 +133,25 @@ def _list_software() -> set[Path]:
     return {path for path in map(Path, folders) if path.exists()}
 
 
-def _restrict_files(readable: Iterable[Path]) -> None:
+def _restrict_files(readable: Iterable[Path], writable: Iterable[Path]) -> bool:
     version = _libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
     if version < 1:  # not supported, or forbidden by the filter of an old container engine
-        return
+        return False
     rights = _RIGHTS[min(version, len(_RIGHTS)) - 1]
     attributes = (rights, 3 * (version >= _WITH_NETWORK), 3 * (version >= _WITH_SCOPES))
     known = attributes[: 1 + (version >= _WITH_NETWORK) + (version >= _WITH_SCOPES)]
     packed = struct.pack(f"{len(known)}Q", *known)
     ruleset = _check(_libc.syscall(_CREATE_RULESET, packed, ctypes.c_size_t(len(packed)), 0))
-    for path in readable:
+    read = _EXECUTE | _READ_FILE
+    granted = [(path, read | (_READ_DIR if path.is_dir() else 0)) for path in readable]
+    for path, allowed in (*granted, *((path, rights) for path in writable)):
         descriptor = os.open(path, os.O_PATH | os.O_CLOEXEC)
-        allowed = _EXECUTE | _READ_FILE | (_READ_DIR if path.is_dir() else 0)
         rule = struct.pack("=Qi", allowed, descriptor)
         _check(_libc.syscall(_ADD_RULE, ruleset, 1, rule, 0))
         os.close(descriptor)
     _check(_libc.syscall(_RESTRICT_SELF, ruleset, 0))
     os.close(ruleset)
+    return True
 
 
 def _restrict_calls() -> None:

@@ -11,20 +11,21 @@ import selectors
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from socket import recv_fds, socket
 from typing import NoReturn
 
 from islands.processes.settings import freeze_garbage_collector
-from islands_service.intake import file_inspection, record_reading, sample_reading
+from islands_service.intake import file_inspection, fmu_inspection, record_reading, sample_reading
 from islands_service.liveness import EVERY, send_heartbeat, set_parent_death_signal
 from islands_service.settings import service_settings
 
 #: Programs of the forked processes.
 PROGRAMS: Mapping[str, Callable[[], None]] = {
     "file_inspection": file_inspection.main,
+    "fmu_inspection": fmu_inspection.main,
     "record_reading": record_reading.main,
     "sample_reading": sample_reading.main,
 }
@@ -55,21 +56,42 @@ _MAX_NAME = 64
 
 
 def main() -> None:
-    """Fork processes until every client has ended."""
+    """Fork readers of files until every client has ended."""
+    serve(PROGRAMS, _PRELOADED)
+
+
+def serve(
+    programs: Mapping[str, Callable[[], None]],
+    preloaded: Sequence[str],
+    prepare: Callable[[], None] = lambda: None,
+) -> None:
+    """Fork processes that run one of the programs each, until every client has ended.
+
+    Parameters
+    ----------
+    preloaded : sequence of str
+        Modules that are imported before.
+    prepare : callable
+        Called after it.
+    """
     settings = service_settings()
     assert settings.readers is not None, "only a service starts this process"
     resource.setrlimit(resource.RLIMIT_NOFILE, (_MAX_FILES, _MAX_FILES))
-    for module in _PRELOADED:
+    for module in preloaded:
         import_module(module)
+    prepare()
     # A collection in a forked process would copy the pages that it shares with this one.
     freeze_garbage_collector()
-    _ForkServer(socket(fileno=settings.readers), settings.lifeline).run()
+    _ForkServer(programs, socket(fileno=settings.readers), settings.lifeline).run()
 
 
 class _ForkServer:
     """Loop that forks, ends and reaps processes."""
 
-    def __init__(self, requests: socket, lifeline: int | None) -> None:
+    def __init__(
+        self, programs: Mapping[str, Callable[[], None]], requests: socket, lifeline: int | None
+    ) -> None:
+        self._programs = programs
         self._requests, self._lifeline = requests, lifeline
         self._selector = selectors.DefaultSelector()
         #: Control sockets of the running processes.
@@ -110,7 +132,7 @@ class _ForkServer:
             os.close(control)
         else:
             if pid == 0:
-                _run_program(name.decode(), standard, own)
+                _run_program(self._programs[name.decode()], standard, own)
             self._controls[pid] = socket(fileno=control)
             self._selector.register(self._controls[pid], selectors.EVENT_READ, pid)
         for descriptor in standard:
@@ -136,7 +158,7 @@ class _ForkServer:
                         control.send(str(os.waitstatus_to_exitcode(status)).encode())
 
 
-def _run_program(name: str, standard: list[int], parent: int) -> NoReturn:
+def _run_program(program: Callable[[], None], standard: list[int], parent: int) -> NoReturn:
     """Run a program in this forked process with the given standard input, output and error, and end."""
     status = 1
     try:
@@ -147,7 +169,7 @@ def _run_program(name: str, standard: list[int], parent: int) -> NoReturn:
         os.closerange(len(standard), _MAX_FILES)
         set_parent_death_signal(signal.SIGKILL)
         if os.getppid() == parent:
-            PROGRAMS[name]()
+            program()
             status = 0
     except SystemExit as ended:
         status = int(ended.code or 0)

@@ -17,9 +17,10 @@ from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
 from islands.simulators.specification.table import SIMULATORS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_memory import DEFAULT_SHARE, estimate_memory, machine_memory
-from islands_service.domain.job_spec import Discrepancy, Identification, Part
+from islands_service.domain.job_spec import Discrepancy, Identification, Part, SimulatedRecord
 from islands_service.domain.search_limits import LIMITS, MAX_SHIFT, resolve_job_settings
 from islands_service.intake.file_inspection import InspectionRequest
+from islands_service.intake.job_fmu import check_allowed, check_fmu
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.datasets import StoredDataset
@@ -57,8 +58,8 @@ def validate_job(
     ------
     SettingsError
         A setting is unknown, out of range, or exceeds a limit of this service.
-    DatasetNotFoundError
-        The owner has no such data set.
+    DatasetNotFoundError, FmuNotFoundError
+        The owner has no such data set, or FMU.
     RecordError
         A column is missing or unusable, or the data sets have different sampling times.
     ModelError
@@ -66,6 +67,9 @@ def validate_job(
     """
     pending = []
     islands = _check_spec(spec, settings)
+    if isinstance(spec, Discrepancy) and spec.fmu is not None:
+        check_allowed(settings)
+        check_fmu(spec.fmu, store.datasets.get(owner, spec.fmu.file, is_fmu=True))
     parts = list(spec.parts)
     datasets = [store.datasets.get(owner, part.dataset) for part in parts]
     _check_disjoint(parts, datasets)
@@ -124,7 +128,7 @@ def _check_sampling(datasets: list[StoredDataset]) -> None:
             )
 
 
-def check_discrepancy(spec: Discrepancy) -> None:
+def check_discrepancy(spec: SimulatedRecord) -> None:
     """Check the simulation and the columns of a discrepancy job without its data.
 
     Raises
@@ -143,7 +147,7 @@ def check_discrepancy(spec: Discrepancy) -> None:
             )
 
 
-def _check_simulation(spec: Discrepancy) -> None:
+def _check_simulation(spec: SimulatedRecord) -> None:
     """Reject an invalid model, and a simulation that would exhaust the memory or the time of this process.
 
     Further errors are reported when the job starts, because making a simulator needs the kernels.

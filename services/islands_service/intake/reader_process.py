@@ -6,14 +6,14 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from threading import Lock
 from types import TracebackType
 from typing import IO, Self
 
 from islands_service.intake.confined_process import ENVIRONMENT, REQUESTS, make_command
-from islands_service.settings import service_settings
+from islands_service.settings import read_simulation_environment, service_settings
 
 #: Largest number of bytes of an exit status.
 _MAX_STATUS = 16
@@ -84,10 +84,19 @@ class ForkServer:
     ----------
     command : sequence of str
         Command that starts a server.
+    is_shared : bool
+        Whether the server of ``islands serve`` runs the same programs.
+    environment : callable
+        Returns environment variables that the server needs.
     """
 
-    def __init__(self, command: Sequence[str] = make_command("fork_server")) -> None:
-        self._command = command
+    def __init__(
+        self,
+        command: Sequence[str] = make_command("fork_server"),
+        is_shared: bool = True,
+        environment: Callable[[], Mapping[str, str]] = dict,
+    ) -> None:
+        self._command, self._is_shared, self._environment = command, is_shared, environment
         self._lock = Lock()
         self._requests: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -104,7 +113,7 @@ class ForkServer:
         Parameters
         ----------
         program : str
-            Key of `islands_service.intake.fork_server.PROGRAMS`.
+            Key of the programs of the server, such as `islands_service.intake.fork_server.PROGRAMS`.
         message : bytes
             Standard input.
         output, errors : int
@@ -136,14 +145,14 @@ class ForkServer:
                 socket.send_fds(self._requests, [program.encode()], descriptors)
 
     def _connect(self) -> socket.socket:
-        inherited = service_settings().readers
-        if inherited is not None:
-            return socket.socket(fileno=inherited)
+        shared = service_settings().readers if self._is_shared else None
+        if shared is not None:
+            return socket.socket(fileno=shared)
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
                 self._command,
-                env={**ENVIRONMENT, REQUESTS: str(theirs.fileno())},
+                env={**self._environment(), **ENVIRONMENT, REQUESTS: str(theirs.fileno())},
                 pass_fds=(theirs.fileno(),),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -166,6 +175,13 @@ def open_memory(name: str) -> IO[bytes]:
     return os.fdopen(os.memfd_create(name), "w+b")
 
 
-#: Fork server of this process.
+#: Fork server of this process, for readers of files.
 FORK_SERVER = ForkServer()
-atexit.register(FORK_SERVER.close)
+
+#: That for simulations, which needs the folder of the compiled kernels. It starts with the first simulation.
+SIMULATION_SERVER = ForkServer(
+    make_command("simulation_server"), is_shared=False, environment=read_simulation_environment
+)
+
+for _server in (FORK_SERVER, SIMULATION_SERVER):
+    atexit.register(_server.close)

@@ -1,4 +1,4 @@
-"""Uploaded data sets by owner. The bytes are blobs; the rows describe their content."""
+"""Uploaded data sets and FMUs by owner. The bytes are blobs; the rows describe their content."""
 
 import hashlib
 import json
@@ -10,6 +10,7 @@ from sqlalchemy import Connection, Row, bindparam, case, func, insert, select, t
 
 from islands.errors import IslandsError
 from islands_service.domain.job import ACTIVE, QuotaError, Requester
+from islands_service.domain.uploaded_fmu import FMU_SUFFIX
 from islands_service.store.audit import Action, record_change
 from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
@@ -17,9 +18,16 @@ from islands_service.store.database import Database
 from islands_service.store.job_rows.job_deletion import delete_unused_datasets
 from islands_service.store.tables import datasets, jobs, owners
 
+#: Names of what is stored, by whether it is an FMU.
+_KINDS = {False: "data set", True: "FMU"}
+
 
 class DatasetNotFoundError(IslandsError):
     """The owner has no such data set."""
+
+
+class FmuNotFoundError(IslandsError):
+    """The owner has no such FMU."""
 
 
 class DatasetInUseError(IslandsError):
@@ -28,7 +36,7 @@ class DatasetInUseError(IslandsError):
 
 @dataclass(frozen=True, slots=True)
 class StoredDataset:
-    """An uploaded record.
+    """An uploaded record or FMU.
 
     Attributes
     ----------
@@ -44,6 +52,7 @@ class StoredDataset:
     preview : mapping
         Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`. Jobs read the
         file with the options ``reading``. In a page it contains only the fields of `summarise_preview`.
+        That of an FMU has its description as ``fmu``, see `islands_service.domain.uploaded_fmu`.
     source : str or None
         URL of the download without its query; None for an upload.
     idle_since : float or None
@@ -166,29 +175,38 @@ class Datasets:
         with self._database.read() as connection:
             return sum(_sum_bytes(connection, owner))
 
-    def get(self, owner: str, dataset: str, deleted: bool = False) -> StoredDataset:
+    def get(
+        self, owner: str, dataset: str, deleted: bool = False, is_fmu: bool | None = False
+    ) -> StoredDataset:
         """Return a data set.
 
         Parameters
         ----------
         deleted : bool
             Whether to return also one that its owner has deleted but that a job still names.
+        is_fmu : bool or None
+            Whether it is an FMU; None for both.
 
         Raises
         ------
-        DatasetNotFoundError
+        DatasetNotFoundError, FmuNotFoundError
         """
         with self._database.read() as connection:
-            return _make_dataset(_find_row(connection, owner, dataset, deleted))
+            return _make_dataset(_find_row(connection, owner, dataset, deleted, is_fmu))
 
     def page(
-        self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
+        self,
+        owner: str,
+        after: tuple[float, str] | None = None,
+        limit: int = 50,
+        is_fmu: bool = False,
     ) -> tuple[tuple[StoredDataset, ...], tuple[float, str] | None]:
-        """Return a page of the data sets of an owner, newest first, and the position of the next page.
+        """Return a page of the data sets or FMUs of an owner, newest first, and the next position.
 
         The position is None on the last page. The previews are summaries.
         """
         query = _PAGE.where(datasets.c.owner == owner, datasets.c.deleted.is_(None))
+        query = query.where((datasets.c.suffix == FMU_SUFFIX) == is_fmu)
         if after is not None:
             query = query.where(tuple_(datasets.c.created, datasets.c.id) < tuple_(*after))
         query = query.order_by(datasets.c.created.desc(), datasets.c.id.desc()).limit(limit + 1)
@@ -197,28 +215,28 @@ class Datasets:
         more, found = len(found) > limit, found[:limit]
         return tuple(found), (found[-1].created, found[-1].id) if more else None
 
-    def delete(self, owner: str, dataset: str, by: Requester | None = None) -> None:
-        """Delete a data set that no unfinished job needs.
+    def delete(self, owner: str, dataset: str, by: Requester | None = None, is_fmu: bool = False) -> None:
+        """Delete a data set or an FMU that no unfinished job needs.
 
         As long as a finished job names it, the row and the bytes are kept for its figures.
 
         Raises
         ------
-        DatasetNotFoundError, DatasetInUseError
+        DatasetNotFoundError, FmuNotFoundError, DatasetInUseError
         """
 
         def operation(connection: Connection) -> None:
             dialect.lock_owner(connection, owner)
-            row = _read_row(connection, owner, dataset)
-            if row is None or row.deleted is not None:
-                raise DatasetNotFoundError(f"there is no data set {dataset!r}")
+            _find_row(connection, owner, dataset, is_fmu=is_fmu)
             user = connection.execute(
                 select(jobs.c.id)
                 .where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE), jobs.c.spec.contains(f'"{dataset}"'))
                 .limit(1)
             ).scalar()
             if user is not None:
-                raise DatasetInUseError(f"job {user} needs data set {dataset!r}: wait for it, or cancel it")
+                raise DatasetInUseError(
+                    f"job {user} needs {_KINDS[is_fmu]} {dataset!r}: wait for it, or cancel it"
+                )
             connection.execute(
                 update(datasets)
                 .where(datasets.c.owner == owner, datasets.c.id == dataset)
@@ -284,11 +302,15 @@ def _read_row(connection: Connection, owner: str, dataset: str) -> Row[Any] | No
     return connection.execute(_DATASET, {"owner": owner, "id": dataset}).one_or_none()
 
 
-def _find_row(connection: Connection, owner: str, dataset: str, deleted: bool = False) -> Row[Any]:
+def _find_row(
+    connection: Connection, owner: str, dataset: str, deleted: bool = False, is_fmu: bool | None = False
+) -> Row[Any]:
     row = _read_row(connection, owner, dataset)
-    if row is None or (row.deleted is not None and not deleted):
-        raise DatasetNotFoundError(
-            f"there is no data set {dataset!r}: upload it first, or list the existing ones"
+    is_other = row is not None and is_fmu is not None and (row.suffix == FMU_SUFFIX) != is_fmu
+    if row is None or is_other or (row.deleted is not None and not deleted):
+        error = FmuNotFoundError if is_fmu else DatasetNotFoundError
+        raise error(
+            f"there is no {_KINDS[bool(is_fmu)]} {dataset!r}: upload it first, or list the existing ones"
         )
     return row
 

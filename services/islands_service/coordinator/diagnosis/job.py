@@ -1,6 +1,7 @@
 """Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from time import sleep
 from typing import TypeVar
 
@@ -13,6 +14,7 @@ from islands.io.result_text.diagnosis_statements import describe_headline
 from islands.parallel import ParallelMap
 from islands.progress import report_part
 from islands.reports.origin import Origin
+from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints
 from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
@@ -20,10 +22,12 @@ from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.diagnosis_outputs import write_outputs
 from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, JobState
-from islands_service.domain.job_spec import parse_discrepancy
+from islands_service.domain.job_spec import Discrepancy, parse_discrepancy
+from islands_service.intake.job_fmu import open_fmu
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.parallel_map import ray_map
+from islands_service.settings import service_settings
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
 
@@ -52,15 +56,32 @@ def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobO
     IslandsError
         The record or the simulation is unusable, or any other error that ``run.check`` raises.
     """
+    spec = parse_discrepancy(run.job.spec)
+    with _open_fmus(run, spec) as fmus:
+        return _run(run, spec, fmus, map_cases)
+
+
+@contextmanager
+def _open_fmus(run: JobRun, spec: Discrepancy) -> Iterator[FmuSource]:
+    """Provide the FMU of a job in a process that can do no harm, for the duration of the job."""
+    if spec.fmu is None:
+        yield LOCAL_FMUS
+        return
+    seconds = run.job.max_run_seconds or service_settings().max_run_seconds
+    with open_fmu(run.get_dataset(spec.fmu.file), run.blobs, seconds, run.check) as source:
+        yield source
+
+
+def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap | None) -> JobOutcome:
     checkpoints = DiagnosisCheckpoints(run.job, run.blobs)
     state = checkpoints.read()
     report = DiagnosisProgress(run, checkpoints, state)
-    spec = parse_discrepancy(run.job.spec)
     datasets = {part.dataset: run.get_dataset(part.dataset) for part in spec.parts}
     report("reading the record", 0.0)
     record, columns = read_record_and_columns(spec, datasets, run.blobs)
-    simulator = make_simulator(spec.simulation, record, columns)
-    fits = state.journal.record(map_cases or _map_on_ray(run))
+    simulator = make_simulator(spec.simulation, record, columns, fmus)
+    # The process of an FMU serves this one alone.
+    fits = state.journal.record(map_cases or (_map_on_ray(run) if spec.fmu is None else map))
     interim, artefacts = InterimFindings(), dict[str, str]()
     formula, left_out = None, [FORMULA, REPORT]
 

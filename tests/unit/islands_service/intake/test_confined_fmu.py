@@ -1,0 +1,64 @@
+"""FMUs in confined processes: the same numbers as in this process, and nothing that an FMU could harm."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.preview import CalibrationPreview, preview_calibration
+from islands.errors import ModelError
+from islands.simulators.fmu.fmi_description import read_description
+from islands.simulators.fmu.instance import FmuInstance
+from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import parse_spec
+from islands_service.domain.uploaded_fmu import describe_fmu, read_fmu
+from islands_service.intake.confined_fmu import open_confined
+from support.oscillator_fmus import write_oscillator
+
+pytestmark = pytest.mark.ci
+
+LIMITS = 6_000_000_000, 600.0
+
+
+def calibrate(fmu: Path, source: FmuSource = LOCAL_FMUS) -> CalibrationPreview:
+    u = np.sin(np.arange(300) / 5.0)
+    record = Dataset(u, 0.01 * np.roll(u, 3), 0.01)
+    return preview_calibration(record, make_simulator(parse_spec(f"fmu:{fmu}"), record, None, source))
+
+
+@pytest.mark.parametrize("interface", ["ModelExchange", "CoSimulation"])
+def test_a_confined_fmu_gives_the_same_bits(tmp_path: Path, interface: str) -> None:
+    fmu = write_oscillator(tmp_path / "mass.fmu", interfaces=interface, resources=True)
+    local = calibrate(fmu)
+    document = describe_fmu(read_description(str(fmu)))
+    calls: list[int] = []
+    check = lambda: calls.append(1)  # noqa: E731
+    with open_confined(fmu, read_fmu(document, "mass.fmu"), *LIMITS, check) as source:
+        confined = calibrate(fmu, source)
+    np.testing.assert_array_equal(confined.fit.output, local.fit.output)
+    np.testing.assert_array_equal(confined.fit.values, local.fit.values)
+    assert calls, "a job can be cancelled during simulations"
+
+
+def test_a_description_survives_its_document(tmp_path: Path) -> None:
+    description = read_description(str(write_oscillator(tmp_path / "mass.fmu", events=True)))
+    assert read_fmu(describe_fmu(description), description.path) == description
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the confinement is that of Linux")
+def test_a_harmful_fmu_can_neither_read_nor_write_nor_connect_nor_fork(tmp_path: Path) -> None:
+    written = tmp_path / "written"
+    fmu = write_oscillator(tmp_path / "mass.fmu", macros=(f'ATTACK="{written}"',))
+    description = read_description(str(fmu))
+    document = describe_fmu(description)
+    with (
+        pytest.raises(ModelError, match=r"mass\.fmu cannot be loaded"),
+        open_confined(fmu, read_fmu(document, "mass.fmu"), *LIMITS, lambda: None),
+    ):
+        pass
+    assert not written.exists()
+    # Otherwise the attack of the test would be none.
+    FmuInstance(description)
