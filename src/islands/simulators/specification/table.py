@@ -227,7 +227,7 @@ _ENTRIES = (
         "fmu",
         ":FILE.fmu[?OPTIONS]",
         "Functional Mock-up Unit of FMI 2.0 or 3.0, as Simulink, Dymola, OpenModelica and other tools "
-        "export it. It is native code, so REST does not accept it",
+        "export it. It is native code, which a service runs only if its operator allows it",
         FmuSpec,
         f"{_FACTORY}:make_fmu",
         estimated="its parameters, the states at the first sample",
