@@ -48,6 +48,11 @@ GUARDED = {
     ("POST", "/v1/discrepancies"): "write",
     ("GET", "/v1/simulations"): "read",
     ("POST", "/v1/simulations/equations"): "read",
+    ("POST", "/v1/simulations/preview"): "read",
+    ("GET", "/v1/fmus"): "read",
+    ("POST", "/v1/fmus"): "write",
+    ("GET", "/v1/fmus/{fmu}"): "read",
+    ("DELETE", "/v1/fmus/{fmu}"): "write",
     ("GET", "/v1/datasets"): "read",
     ("POST", "/v1/datasets"): "write",
     ("POST", "/v1/datasets/fetch"): "write",
@@ -84,10 +89,12 @@ OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
 
 def send_request(service, method, path, headers):
     """Send a request, with a body if the route needs one."""
-    ids = dict.fromkeys(("job", "dataset", "webhook", "monitor"), "0" * 32)
+    ids = dict.fromkeys(("job", "dataset", "webhook", "monitor", "fmu"), "0" * 32)
     path = path.format(rank=1, figure="loop", key="0", owner="0", **ids)
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
+        body = {"json": held("0-csv")}
+    if path == "/v1/simulations/preview":
         body = {"json": held("0-csv")}
     if path == "/v1/simulations/equations":
         body = {"json": {"text": ""}}
@@ -103,7 +110,7 @@ def send_request(service, method, path, headers):
         body = {"json": {}}
     if (method, path) in {("POST", "/v1/webhooks"), ("POST", "/v1/datasets/fetch")}:
         body = {"json": {"url": "https://127.0.0.1"}}
-    if (method, path) == ("POST", "/v1/datasets"):
+    if (method, path) in {("POST", "/v1/datasets"), ("POST", "/v1/fmus")}:
         body = {"files": {"file": ("a.csv", b"")}}
     return service.client.request(method, path, headers=headers, **body)
 

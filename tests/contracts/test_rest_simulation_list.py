@@ -22,9 +22,11 @@ def check(service, text):
     return service.client.post("/v1/simulations/equations", json={"text": text})
 
 
-def test_the_list_has_all_simulations_that_are_no_code(service):
-    items = service.client.get("/v1/simulations").json()["items"]
+def test_the_list_has_all_simulations_that_are_no_code_and_says_why_fmus_are_refused(service):
+    *items, fmu = service.client.get("/v1/simulations").json()["items"]
     assert [each["kind"] for each in items] == [each.name for each in SIMULATORS.values() if each.is_remote]
+    assert {each["refusal"] for each in items} == {""}
+    assert (fmu["kind"], "ISLANDS_ALLOW_FMUS=true" in fmu["refusal"]) == ("fmu", True)
     for each in items:
         assert {entry["name"] for entry in each["parameters"]} == SIMULATORS[each["kind"]].parameters.keys()
 

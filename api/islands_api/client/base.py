@@ -13,6 +13,7 @@ from islands_api.client import (
     calls,
     dataset_calls,
     diagnosis_calls,
+    fmu_calls,
     monitor_calls,
     simulation_calls,
     webhook_calls,
@@ -89,7 +90,12 @@ class BaseClient(Generic[H]):
     diagnose = Endpoint(diagnosis_calls.diagnose)
     simulations = Endpoint(diagnosis_calls.simulations)
     check_equations = Endpoint(diagnosis_calls.check_equations)
+    preview = Endpoint(diagnosis_calls.preview)
     outputs = Endpoint(diagnosis_calls.outputs)
+    upload_fmu = Endpoint(fmu_calls.upload_fmu)
+    fmus = Endpoint(fmu_calls.fmus)
+    describe_fmu = Endpoint(fmu_calls.describe_fmu)
+    delete_fmu = Endpoint(fmu_calls.delete_fmu)
     job = Endpoint(calls.job)
     jobs = Endpoint(calls.jobs)
     datasets = Endpoint(calls.datasets)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
+from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import SIMULATORS, innermost, parse_spec
 from islands_api.client.calls import (
     DatasetRef,
@@ -18,7 +19,7 @@ from islands_api.client.recording_parts import make_part
 from islands_api.client.response_parsing import read_as, read_mapping
 from islands_api.result_schemas import DiagnosisOutputs
 from islands_api.schemas import JobView
-from islands_api.simulation_schemas import SimulationList, SimulationView
+from islands_api.simulation_schemas import SimulationList, SimulationPreview, SimulationView
 
 
 def diagnose(
@@ -47,7 +48,7 @@ def diagnose(
         Column that drives the simulation.
     simulation : str or mapping
         As on the command line (``"bouc-wen-piezo"``, ``"model:FILE.json"``, ``"column:NAME"`` ...), or as in
-        the request body.
+        the request body: an FMU is ``{"kind": "fmu", "file": client.upload_fmu("FILE.fmu").id}``.
     channels : str or sequence of str
         Columns that may couple in, for example a temperature.
     tolerance : mapping, optional
@@ -66,8 +67,8 @@ def diagnose(
     Raises
     ------
     SettingsError
-        The simulation is unknown or is code (Python, an FMU), a number is NaN or infinite, or the
-        idempotency key is not printable ASCII.
+        The simulation is unknown or is code (Python, or an FMU that was not uploaded), a number is NaN or
+        infinite, or the idempotency key is not printable ASCII.
     ModelError
         A model file cannot be read.
     """
@@ -125,17 +126,62 @@ def check_equations(text: str) -> RequestSpec[dict[str, Any]]:
     return RequestSpec("POST", "/v1/simulations/equations", read_mapping, json={"text": text})
 
 
+def preview(
+    dataset: DatasetRef,
+    input: str,  # noqa: A002 - the name in the request body
+    output: str,
+    simulation: str | Mapping[str, Any],
+    *,
+    channels: str | Sequence[str] = (),
+    tolerance: Mapping[str, float] | None = None,
+    dt: float | None = None,
+    rows: str | None = None,
+    points: int = 2000,
+) -> RequestSpec[SimulationPreview]:
+    """Calibrate a simulation on a part of a record, as a diagnosis does first; nothing is stored.
+
+    Parameters
+    ----------
+    input, output, simulation, channels, tolerance, dt, rows
+        As for `diagnose`.
+    points : int
+        Largest number of parts of the signals, at most 5000.
+
+    Raises
+    ------
+    SettingsError, ModelError
+        As for `diagnose`.
+    """
+    given = {
+        "dataset": get_id(dataset),
+        "input": input,
+        "output": output,
+        "channels": as_list(channels) or None,
+        "simulation": parse_simulation(simulation) if isinstance(simulation, str) else simulation,
+        "tolerance": dict(tolerance or {}) or None,
+        "dt": dt,
+        "rows": rows,
+        "points": points,
+    }
+    body = {name: value for name, value in given.items() if value is not None}
+    return RequestSpec("POST", "/v1/simulations/preview", read_as(SimulationPreview), json=body)
+
+
 def parse_simulation(text: str) -> dict[str, Any]:
     """Read the text of a simulation; return its form in the request body. A model file is read here.
 
     Raises
     ------
     SettingsError
-        The simulation is unknown, or is code (Python, an FMU), which a service does not run.
+        The simulation is unknown, or is code: a Python function, or an FMU that has to be uploaded before.
     ModelError
         A model file cannot be read.
     """
     spec = parse_spec(text)
+    if isinstance(spec, FmuSpec):
+        raise SettingsError(
+            f'{text}: upload the FMU with upload_fmu, and give {{"kind": "fmu", "file": its id}}'
+        )
     if not SIMULATORS[innermost(spec).kind].is_remote:
         raise SettingsError(
             f"{text}: a service does not run code of its clients: run 'islands diagnose' locally, or send "

@@ -30,7 +30,7 @@ from islands_service.outbound.addresses import OutboundFailedError
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
-from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
+from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, FmuNotFoundError
 from islands_service.store.tenants.keys import KeyNotFoundError
 from islands_service.store.tenants.owners import OwnerNotFoundError
 
@@ -153,6 +153,7 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
         DatasetNotFoundError: ProblemKind(
             HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"
         ),
+        FmuNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-fmu", "There is no such FMU"),
         KeyNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-key", "There is no such key"),
         OwnerNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-owner", "There is no such owner"),
         WebhookNotFoundError: ProblemKind(

@@ -16,10 +16,13 @@ from islands.data.coupled_record import join_columns
 from islands.errors import SettingsError
 from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.simulators.specification.code import FmuSpec
+from islands.simulators.specification.table import parse_spec
 from islands_api.cli.service import job_views as views
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import parse_simulation
+from islands_api.client.fmu_calls import name_uploaded
 from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
 from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, JobState
@@ -136,9 +139,12 @@ def diagnose(
         simulation_options.tolerances(tolerance or []),
     )
     channel_names = options.columns(channels or [])
-    simulation = parse_simulation(simulated)
+    spec = parse_spec(simulated)
+    simulation = {} if isinstance(spec, FmuSpec) else parse_simulation(simulated)
     read = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
     with open_client(url, key) as client:
+        if isinstance(spec, FmuSpec):
+            simulation = name_uploaded(spec, client.upload_fmu(spec.file))
         whole = output_column if rows is None else None
         dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
         held_out = validation and client.upload(validation, read, output_column, dt, reading.changes())

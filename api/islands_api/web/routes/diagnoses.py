@@ -6,7 +6,7 @@ from typing import Any
 from fastapi import APIRouter, Response
 
 from islands.export.closed_form import find_closed_form
-from islands.simulators.specification.table import ExtendedSpec
+from islands.simulators.specification.table import LocalExtendedSpec
 from islands_api.result_schemas import DiagnosisOutputs, ExtendedSimulation
 from islands_api.schemas import DiscrepancyRequest, JobView
 from islands_api.web.auth import Principal, Reader, Writer
@@ -63,7 +63,7 @@ async def exported(job: Id, caller: Reader, state: AppStateDep, form: ExportForm
     It has to be one difference equation, that of a model or of a linear simulation with effects that are maps
     of the input or lines through the output; `summary.equation` of the job has it then. 404 otherwise.
     """
-    spec = ExtendedSpec.model_validate_json(await _read_extended(state, caller, job))
+    spec = LocalExtendedSpec.model_validate_json(await _read_extended(state, caller, job))
     model = await state.run_blocking(find_closed_form, spec)
     if model is None:
         raise ResourceNotFoundError(

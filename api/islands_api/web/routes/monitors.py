@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 
+from islands.errors import SettingsError
 from islands.simulators.specification.table import ExtendedSpec
 from islands_api.monitor_schemas import (
     MonitorPage,
@@ -191,6 +192,8 @@ async def _make_spec(state: AppState, caller: Principal, request: MonitorRequest
     ------
     JobNotFoundError, ResourceNotFoundError, ResultNotReadyError
         The diagnosis does not exist, is no diagnosis, or has not succeeded.
+    SettingsError
+        It is that of an FMU.
     """
     given = request.model_dump(exclude_unset=True, exclude={"diagnosis", "name", "priority"})
     if request.diagnosis is None:
@@ -198,6 +201,11 @@ async def _make_spec(state: AppState, caller: Principal, request: MonitorRequest
     job = await get_job_of_kind(state, caller, request.diagnosis, DISCREPANCY)
     await get_result(state, job)
     asked = parse_discrepancy(job.spec)
+    if asked.fmu is not None:
+        raise SettingsError(
+            f"job {job.id} has diagnosed an FMU, which no monitor of a service simulates: run 'islands "
+            "monitor' locally"
+        )
     columns = (asked.input, *asked.channels)
     simulation = asked.simulation
     blob = await state.run_blocking(state.store.results.artefact, job.id, EXTENDED)

@@ -1,5 +1,6 @@
-"""Simulations that can be diagnosed: their list, and the check of equations that a user writes."""
+"""Simulations that can be diagnosed: their list, the check of written equations, and calibrated previews."""
 
+from contextlib import ExitStack
 from functools import cache
 from typing import Any
 
@@ -11,16 +12,31 @@ from islands.errors import SettingsError
 from islands.simulators.specification.base import SimulatorEntry
 from islands.simulators.specification.equations import OdeSpec, read_built_in, read_built_in_text
 from islands.simulators.specification.table import SIMULATORS, PhysicalSpec
-from islands_api.simulation_schemas import EquationsRequest, EquationsView, SimulationList
+from islands_api.simulation_schemas import (
+    EquationsRequest,
+    EquationsView,
+    PreviewRequest,
+    SimulationList,
+    SimulationPreview,
+)
 from islands_api.web.auth import Reader
 from islands_api.web.dependencies import AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
 from islands_api.web.responses import JSONDocument
+from islands_api.web.uploads.dataset_storage import open_stored
+from islands_service.intake.job_fmu import check_allowed, check_fmu, explain_refusal
+from islands_service.intake.job_inputs import link_blob
+from islands_service.intake.job_validation import check_discrepancy
+from islands_service.intake.reader_process import SIMULATION_SERVER
+from islands_service.intake.simulation_preview import SimulationPreviewRequest, preview_simulation
 
 router = APIRouter(
     prefix="/v1/simulations", tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute
 )
+
+#: Longest time of a preview in seconds.
+_PREVIEW_SECONDS = 30.0
 
 #: Name of equations that have none.
 _NAME = "equations"
@@ -28,8 +44,14 @@ _NAME = "equations"
 
 @router.get("", response_model=SimulationList)
 async def simulations(_caller: Reader, state: AppStateDep) -> Any:
-    """List the simulations that a diagnosis accepts, with the parameters of the physical systems."""
-    return await state.run_blocking(_list_simulations)
+    """List the simulations that a diagnosis accepts, with the parameters of the physical systems.
+
+    A simulation with a `refusal` is one that this service does not accept.
+    """
+    listed = await state.run_blocking(_list_simulations)
+    # The server of the previews starts while the user chooses.
+    await state.run_blocking(SIMULATION_SERVER.ensure_running)
+    return {"items": [*listed, _describe(SIMULATORS["fmu"], explain_refusal(state.settings))]}
 
 
 @router.post("/equations", response_model=EquationsView)
@@ -42,12 +64,41 @@ async def equations(asked: EquationsRequest, _caller: Reader, state: AppStateDep
     return JSONDocument(await state.run_blocking(_read_equations, asked.text))
 
 
+@router.post("/preview", response_model=SimulationPreview)
+async def preview(asked: PreviewRequest, caller: Reader, state: AppStateDep) -> Any:
+    """Calibrate a simulation on a part of a record, as a diagnosis does first; nothing is stored.
+
+    The part has at most 5000 samples: those in a row over which the output varies most. Parameters are fitted
+    to its first three quarters. The answer takes 0.1 to 2 s, and at most 30 s. A diagnosis uses all rows, and
+    searches for what the simulation lacks.
+    """
+    check_discrepancy(asked)
+    settings, owner, datasets = state.settings, caller.owner, state.store.datasets
+    stored = await state.run_blocking(datasets.get, owner, asked.dataset)
+    job = asked.model_dump(mode="json", exclude_unset=True, by_alias=True, exclude={"points"})
+    reading = stored.preview.get("reading", {})
+    with ExitStack() as files:
+        fmu, described = None, None
+        if asked.fmu is not None:
+            check_allowed(settings)
+            found = await state.run_blocking(datasets.get, owner, asked.fmu.file, is_fmu=True)
+            check_fmu(asked.fmu, found)
+            held = await state.run_blocking(files.enter_context, state.blobs.hold(found.blob))
+            fmu, described = files.enter_context(link_blob(held, found.name)), found.preview["fmu"]
+            described = {**described, "path": found.name}
+        request = SimulationPreviewRequest(job, reading, asked.points, described)
+        async with open_stored(state, owner, stored) as path:
+            return JSONDocument(
+                await preview_simulation(path, request, settings.inspection_memory, _PREVIEW_SECONDS, fmu)
+            )
+
+
 @cache
-def _list_simulations() -> dict[str, Any]:
-    return {"items": [_describe(entry) for entry in SIMULATORS.values() if entry.is_remote]}
+def _list_simulations() -> tuple[dict[str, Any], ...]:
+    return tuple(_describe(entry) for entry in SIMULATORS.values() if entry.is_remote)
 
 
-def _describe(entry: SimulatorEntry) -> dict[str, Any]:
+def _describe(entry: SimulatorEntry, refusal: str = "") -> dict[str, Any]:
     is_physical = entry.spec is PhysicalSpec
     system = read_built_in(entry.name) if is_physical else None
     return {
@@ -64,6 +115,7 @@ def _describe(entry: SimulatorEntry) -> dict[str, Any]:
             for each in (system.parameters if system else ())
         ],
         "equations": read_built_in_text(entry.name) if is_physical else "",
+        "refusal": refusal,
     }
 
 

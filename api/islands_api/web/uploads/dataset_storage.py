@@ -1,14 +1,16 @@
-"""Inspection and storage of a received file as a data set."""
+"""Inspection and storage of a received file as a data set, or as an FMU."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
 from islands_api.web.uploads.uploaded_file import find_stored_suffix, receive
+from islands_service.domain.uploaded_fmu import FMU_SUFFIX
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
+from islands_service.intake.fmu_inspection import inspect_fmu
 from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
 
@@ -72,7 +74,43 @@ async def store_dataset(
     ------
     RecordError, QuotaError, PayloadTooLargeError, StorageFullError, ObjectStoreError
     """
+    settings = state.settings
+
+    def inspect(path: Path) -> Awaitable[Mapping[str, Any]]:
+        return inspect_file(path, inspection, settings.inspection_memory, settings.inspection_seconds)
+
+    return await _store(state, caller, file, (name, find_stored_suffix(name)), compressed, inspect, source)
+
+
+async def store_fmu(
+    state: AppState, caller: Principal, file: IO[bytes], name: str, compressed: bool
+) -> tuple[StoredDataset, bool]:
+    """Read the description of an FMU, and store it as `store_dataset` does.
+
+    Raises
+    ------
+    ModelError, SettingsError, QuotaError, PayloadTooLargeError, StorageFullError, ObjectStoreError
+    """
+    settings = state.settings
+
+    async def inspect(path: Path) -> Mapping[str, Any]:
+        limits = settings.max_unpacked, settings.inspection_memory, settings.inspection_seconds
+        return {"fmu": await inspect_fmu(path, *limits)}
+
+    return await _store(state, caller, file, (name, FMU_SUFFIX), compressed, inspect)
+
+
+async def _store(
+    state: AppState,
+    caller: Principal,
+    file: IO[bytes],
+    named: tuple[str, str],
+    compressed: bool,
+    inspect: Callable[[Path], Awaitable[Mapping[str, Any]]],
+    source: str | None = None,
+) -> tuple[StoredDataset, bool]:
     settings, owner, by = state.settings, caller.owner, caller.requester
+    name, suffix = named
     with state.blobs.receiving() as stream:
         # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
         async with state.inspection_slots.hold(owner):
@@ -80,10 +118,7 @@ async def store_dataset(
                 receive, file, stream, name, compressed, settings.max_unpacked
             )
             with link_blob(Path(stream.name), name) as path:
-                preview = await inspect_file(
-                    path, inspection, settings.inspection_memory, settings.inspection_seconds
-                )
-            suffix = find_stored_suffix(name)
+                preview = await inspect(path)
             await state.run_blocking(
                 state.store.datasets.check_room,
                 owner,
@@ -91,7 +126,7 @@ async def store_dataset(
                 blob,
                 size,
                 settings.max_stored,
-                preview["reading"],
+                preview.get("reading"),
             )
             # An upload that was rejected before this line is deleted at the end of the block.
             await state.run_blocking(state.blobs.keep, stream)

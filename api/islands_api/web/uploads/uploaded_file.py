@@ -6,9 +6,10 @@ import zlib
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import IO
 
-from islands.errors import RecordError
+from islands.errors import ModelError, RecordError
 from islands.io.records import READERS
 from islands_api.web.problems import PayloadTooLargeError
+from islands_service.domain.uploaded_fmu import FMU_SUFFIX
 
 #: Number of bytes that are copied at once.
 CHUNK_BYTES = 1 << 20
@@ -51,6 +52,20 @@ def parse_file_name(given: str | None) -> tuple[str, bool]:
     # A file name has at most 255 bytes on Linux, and the table of data sets stores at most 255 characters.
     stem = name[: len(name) - len(suffix)].encode()[: MAX_NAME_BYTES - len(suffix)].decode(errors="ignore")
     return stem + suffix, compressed
+
+
+def parse_fmu_name(given: str | None) -> tuple[str, bool]:
+    """Return the name of an FMU, and whether it is compressed, as `parse_file_name` does.
+
+    Raises
+    ------
+    ModelError
+        It does not end in .fmu.
+    """
+    name, compressed = parse_file_name(given)
+    if PurePosixPath(name).suffix.lower() != FMU_SUFFIX:
+        raise ModelError(f"{name} is no FMU: send a file FILE{FMU_SUFFIX}")
+    return name, compressed
 
 
 def find_stored_suffix(name: str) -> str:

@@ -217,7 +217,7 @@ def test_discrepancy_job_contains_all_submitted_values(client: Any, me: Any) -> 
         ("pendulum", "unknown simulation 'pendulum'"),
         ("model:none.json", "none.json cannot be read"),
         ("python:model.py:run", "a service does not run code of its clients"),
-        ("fmu:axis.fmu", "a service does not run code of its clients"),
+        ("fmu:axis.fmu", "upload the FMU with upload_fmu"),
     ],
 )
 def test_invalid_simulation_is_rejected_before_sending(text: str, why: str) -> None:

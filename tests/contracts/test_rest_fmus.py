@@ -1,0 +1,156 @@
+"""FMUs over REST: upload, list, deletion, previews and diagnoses."""
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+
+from islands_api import Client
+from support.oscillator_fmus import write_oscillator
+from support.service import npz, problem_of, spec
+
+pytestmark = pytest.mark.ci
+
+ABSENT = f"{'0' * 32}-fmu"
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory):
+    return write_oscillator(tmp_path_factory.mktemp("fmu") / "mass.fmu", resources=True).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def shared(serve):
+    with pytest.MonkeyPatch.context() as patch:
+        # The coordinator and the server of the simulations read it.
+        patch.setenv("ISLANDS_ALLOW_FMUS", "true")
+        with serve(allow_fmus=True) as running:
+            yield running
+
+
+def make_axis(offset=0.0, samples=400):
+    """Return a record of the oscillator of the FMU with another mass, and an offset that it lacks."""
+    t = 0.01 * np.arange(samples)
+    u = 10.0 * np.sin(3.0 * t) + np.random.default_rng(1).standard_normal(samples)
+    x, v = np.zeros(samples), 0.0
+    for k in range(1, samples):
+        v += 0.01 * (u[k - 1] - 4.0 * v - 200.0 * x[k - 1]) / 0.55
+        x[k] = x[k - 1] + 0.01 * v
+    return npz(t_s=t, F_N=u, x_m=x + offset)
+
+
+@pytest.fixture(scope="module")
+def dataset(shared):
+    return shared.upload(make_axis(), "axis.npz").json()["id"]
+
+
+def send(service, content, name="mass.fmu"):
+    return service.client.post("/v1/fmus", files={"file": (name, content)}, timeout=120.0)
+
+
+@pytest.fixture
+def fmu(shared, content):
+    return send(shared, content).json()["id"]
+
+
+def of_fmu(dataset, fmu, **changes):
+    simulation = {"kind": "fmu", "file": fmu, "input": "u", "output": "x", **changes}
+    return {"dataset": dataset, "input": "F_N", "output": "x_m", "simulation": simulation}
+
+
+def test_an_fmu_is_described_and_listed_and_the_same_bytes_are_the_same_fmu(shared, content, fmu):
+    again = send(shared, content, "other.fmu")
+    assert (again.status_code, again.json()["id"]) == (200, fmu)
+    found = shared.client.get(f"/v1/fmus/{fmu}").json()
+    assert (found["name"], found["fmi"], found["interface"]) == ("mass.fmu", 3, "model-exchange")
+    assert [each["name"] for each in found["inputs"]] == ["u"]
+    described = [(each["name"], each["start"], each["unit"]) for each in found["parameters"]]
+    assert described == [("m", 0.5, "kg"), ("c", 4.0, "N.s/m"), ("k", 200.0, "N/m")]
+    assert [each["name"] for each in found["initial"]] == ["x", "v"]
+    with Client(str(shared.client.base_url)) as client:
+        assert [each.id for each in client.fmus().items] == [fmu]
+        assert client.describe_fmu(fmu).sha256 == found["sha256"]
+    assert fmu not in shared.client.get("/v1/datasets").text
+
+
+def test_an_fmu_is_no_data_set(shared, dataset, fmu):
+    problem_of(shared.client.get(f"/v1/datasets/{fmu}"), 404, "no-such-dataset")
+    problem_of(shared.client.delete(f"/v1/datasets/{fmu}"), 404, "no-such-dataset")
+    problem_of(shared.client.get(f"/v1/fmus/{dataset}"), 404, "no-such-fmu")
+    problem_of(shared.client.delete(f"/v1/fmus/{dataset}"), 404, "no-such-fmu")
+    problem_of(shared.client.post("/v1/jobs", json=spec(fmu)), 404, "no-such-dataset")
+
+
+def test_a_file_that_is_no_fmu_is_refused_with_the_reason(shared, content):
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("a.txt", "1")
+    for data in (b"no archive", stream.getvalue()):
+        detail = problem_of(send(shared, data), 422, "invalid-model")
+        assert detail.startswith("mass.fmu cannot be read as an FMU")
+        assert "/tmp" not in detail
+    assert "FILE.fmu" in problem_of(send(shared, content, "mass.zip"), 422, "invalid-model")
+
+
+def test_a_service_runs_no_fmus_unless_its_operator_allows_them(serve, content):
+    with serve(allow_fmus=False) as service:
+        assert "ISLANDS_ALLOW_FMUS=true" in problem_of(send(service, content), 422, "invalid-settings")
+        dataset = service.upload(make_axis(), "axis.npz").json()["id"]
+        for path in ("/v1/discrepancies", "/v1/simulations/preview"):
+            answer = service.client.post(path, json=of_fmu(dataset, ABSENT))
+            assert "ISLANDS_ALLOW_FMUS=true" in problem_of(answer, 422, "invalid-settings")
+
+
+def test_the_variables_of_an_fmu_are_checked_before_a_job_is_accepted(shared, dataset, fmu):
+    def submit(which, **changes):
+        return shared.client.post("/v1/discrepancies", json=of_fmu(dataset, which, **changes))
+
+    detail = problem_of(submit(fmu, parameters={"mm": 1.0}), 422, "invalid-settings")
+    assert detail.startswith("mass.fmu has no parameter 'mm'")
+    problem_of(submit(ABSENT), 404, "no-such-fmu")
+    problem_of(submit("../../etc/passwd"), 422, "invalid-request")
+
+
+def test_a_preview_calibrates_the_parameters_of_the_fmu(shared, dataset, fmu):
+    order = of_fmu(dataset, fmu, parameters={"m": 0.5})
+    answer = shared.client.post("/v1/simulations/preview", json=order, timeout=180.0)
+    assert answer.status_code == 200, answer.text
+    values = {each["name"]: each["value"] for each in answer.json()["parameters"]}
+    assert 0.5 < values["m"] < 0.6
+
+
+def test_an_fmu_is_kept_until_the_jobs_that_name_it_have_ended(shared, dataset, content, fmu):
+    job = shared.client.post("/v1/discrepancies", json=of_fmu(dataset, fmu)).json()
+    assert job["spec"]["simulation"]["file"] == fmu
+    problem_of(shared.client.delete(f"/v1/fmus/{fmu}"), 409, "dataset-in-use")
+    shared.client.post(f"/v1/jobs/{job['id']}/cancel")
+    with Client(str(shared.client.base_url)) as client:
+        client.delete_fmu(fmu)
+    problem_of(shared.client.get(f"/v1/fmus/{fmu}"), 404, "no-such-fmu")
+    problem_of(shared.client.post(f"/v1/jobs/{job['id']}/resume"), 409, "dataset-deleted")
+    assert send(shared, content).status_code == 201
+
+
+@pytest.mark.nightly
+def test_a_diagnosis_of_an_fmu_names_what_it_lacks(shared, fmu):
+    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
+    from islands_service.store.blobs import Blobs
+    from support.job_runs import make_run
+    from support.undrawn import undrawn_figures
+
+    dataset = shared.upload(make_axis(0.02), "axis.npz").json()["id"]
+    tolerance = {"tolerance": {"m": 0.2, "c": 0.05, "k": 0.05}}
+    job = shared.client.post("/v1/discrepancies", json={**of_fmu(dataset, fmu), **tolerance}).json()
+    lease = shared.store.leases.claim("test", 600.0)
+    assert lease.job.id == job["id"]
+    with undrawn_figures():
+        outcome = run_diagnosis_job(make_run(lease, shared.store, Blobs(shared.settings.blobs)))
+    shared.store.leases.finish(lease, outcome)
+    assert "offset" in outcome.summary["effects"]
+    extended = shared.client.get(f"/v1/jobs/{job['id']}/extended").json()
+    assert (extended["core"]["kind"], extended["core"]["file"]) == ("fmu", "mass.fmu")
+    export = shared.client.get(f"/v1/jobs/{job['id']}/extended/export")
+    assert "is not one difference equation" in problem_of(export, 404, "not-found")
+    monitor = shared.client.post("/v1/monitors", json={"diagnosis": job["id"]})
+    assert "FMU" in problem_of(monitor, 422, "invalid-settings")
