@@ -4,6 +4,7 @@ import { getJson } from "../../lib/api.js";
 import { el } from "../../lib/dom.js";
 import { makeField, makeJobForm, quote } from "../job_request.js";
 import { makeSimulationChoice } from "./simulation_choice.js";
+import { makeSimulationPreview } from "./simulation_preview.js";
 
 const ABSENT = "Choose the input of the simulation and the measured output in the table of columns.";
 
@@ -79,6 +80,7 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
 
   function update() {
     form.update();
+    calibrated.update();
     const { column: found = null } = (details.open && makeRequest()?.simulation) || {};
     if (found === column) return;
     column = found;
@@ -106,6 +108,7 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
     setRecord();
   }
 
+  const calibrated = makeSimulationPreview(makeRequest, signal);
   const form = makeJobForm({
     action: "Diagnose",
     path: "v1/discrepancies",
@@ -117,6 +120,7 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
       host,
       el("details", {}, el("summary", {}, "Rows"), el("div", { class: "fields" }, rows.nodes)),
       row,
+      calibrated.node,
     ],
   });
   form.node.addEventListener("input", update);

@@ -11,10 +11,11 @@ function readNumbers(fields, divisor) {
 
 /**
  * Make the table of parameters `{name, unit, default}`; null is the default of one that is estimated. Without
- * `hasValues`, the values are those of a text. `read()` returns `{parameters, tolerance}`.
+ * `hasValues`, the values are those of a text. With `chosen`, a check box selects the parameters that are
+ * calibrated, at first these names. `read()` returns `{parameters, tolerance, chosen}`.
  */
-export function makeParameterFields(parameters, { hasValues, units: [input, output] }) {
-  const [values, tolerances] = [[], []];
+export function makeParameterFields(parameters, { hasValues, units: [input, output], chosen = null }) {
+  const [values, tolerances, boxes] = [[], [], []];
   const describe = (value) => (value === null ? "estimated" : formatShort(value));
   const rows = parameters.map(({ name, unit, default: value }) => {
     const field = el("input", {
@@ -26,18 +27,26 @@ export function makeParameterFields(parameters, { hasValues, units: [input, outp
     });
     if (hasValues) values.push([name, field]);
     tolerances.push([name, tolerance]);
+    const label = `Calibrate ${name}`;
+    const checked = chosen?.includes(name);
+    if (chosen) boxes.push([name, el("input", { type: "checkbox", checked, "aria-label": label })]);
     return [
       el("code", {}, name),
       unit.replaceAll("{input}", input || "1").replaceAll("{output}", output || "1"),
       hasValues ? field : describe(value),
       tolerance,
+      ...(chosen ? [boxes.at(-1)[1]] : []),
     ];
   });
-  const headings = ["Parameter", "Unit", "Value", "Tolerance (± %)"];
+  const headings = ["Parameter", "Unit", "Value", "Tolerance (± %)", ...(chosen ? ["Calibrate"] : [])];
   const table = makeTable("Parameters of the simulation", headings, rows);
   table.classList.add("parameters");
   return {
     node: makeScrollable("Parameters of the simulation", table),
-    read: () => ({ parameters: readNumbers(values, 1), tolerance: readNumbers(tolerances, 100) }),
+    read: () => ({
+      parameters: readNumbers(values, 1),
+      tolerance: readNumbers(tolerances, 100),
+      chosen: boxes.filter(([, box]) => box.checked).map(([name]) => name),
+    }),
   };
 }

@@ -4,6 +4,7 @@ import { getJson } from "../../lib/api.js";
 import { el, setText } from "../../lib/dom.js";
 import { getServiceUrl, makeField, quote } from "../job_request.js";
 import { makeEquationsEditor } from "./equations_editor.js";
+import { makeFmuFields } from "./fmu_fields.js";
 import { makeParameterFields } from "./parameter_fields.js";
 
 const FORM = "diagnose";
@@ -13,6 +14,7 @@ const LABELS = {
   ode: "Differential equations as text",
   linear: "A linear model",
   model: "An identified model of a job",
+  fmu: "An FMU",
 };
 
 const makeSelect = (name, options) =>
@@ -123,6 +125,7 @@ export function makeSimulationChoice(simulations, onChange, signal) {
     linear: makeLinearFields,
     ode: () => makeEquationsEditor(templates, onChange, signal),
     model: () => makeModelFields(onChange, signal),
+    fmu: () => makeFmuFields(byKind.get("fmu").refusal, onChange, signal),
   };
   const made = new Map();
   const host = el("div");
@@ -157,7 +160,7 @@ export function makeSimulationChoice(simulations, onChange, signal) {
   }
 
   kind.addEventListener("change", show);
-  const hint = "A service runs no code of its users: record the output of an FMU or a function in a column.";
+  const hint = "A service runs no Python functions: record the output of one in a column.";
   const node = el(
     "div",
     { class: "simulation" },

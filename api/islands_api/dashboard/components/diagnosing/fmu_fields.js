@@ -1,0 +1,143 @@
+/** Choice of an FMU as simulation: a file, its input and output, and the calibrated parameters. */
+
+import { getJson } from "../../lib/api.js";
+import { el, setText } from "../../lib/dom.js";
+import { makeField } from "../job_request.js";
+import { makeParameterFields } from "./parameter_fields.js";
+
+const FORM = "diagnose";
+
+const makeOptions = (variables) =>
+  variables.map(({ name, unit }) => el("option", { value: name }, unit ? `${name} in ${unit}` : name));
+
+const makeChoice = (name, variables) => el("select", { name }, makeOptions(variables));
+
+/** Upload an FMU; return its description. */
+function uploadFmu(file) {
+  const body = new FormData();
+  body.append("file", file);
+  return getJson("v1/fmus", { method: "POST", body });
+}
+
+/** Make the fields of the variables of an FMU; `read()` returns its simulation and the tolerances. */
+function makeVariableFields(fmu) {
+  const [input, output] = [makeChoice("fmu-input", fmu.inputs), makeChoice("fmu-output", fmu.outputs)];
+  const isShort = fmu.parameters.length <= fmu.most_parameters;
+  const described = fmu.parameters.map(({ name, unit, start }) => ({ name, unit, default: start }));
+  const chosen = isShort ? described.map(({ name }) => name) : [];
+  const fields = makeParameterFields(described, { hasValues: true, units: ["", ""], chosen });
+  const initial = fmu.initial.map(({ name }) => name).join(", ") || "none";
+  const node = el(
+    "div",
+    {},
+    el(
+      "div",
+      { class: "fields" },
+      makeField(FORM, "Input of the FMU", input, "It is driven by the input of the record."),
+      makeField(FORM, "Output of the FMU", output, "It is compared with the measured output."),
+    ),
+    described.length > 0 && fields.node,
+    el("p", { class: "soft small" }, `Calibrated at the first sample: ${initial}.`),
+  );
+
+  /** Return the parameters that are calibrated, and those with another value, which is exact. */
+  function readParameters({ parameters: given, chosen: calibrated }) {
+    const isListed = ({ name }) => name in given || calibrated.includes(name);
+    const listed = described.filter(isListed).map(({ name }) => name);
+    const entries = listed.map((name) => {
+      const value = name in given ? { value: given[name] } : {};
+      return [name, calibrated.includes(name) ? value : { ...value, fixed: true }];
+    });
+    return Object.fromEntries(entries);
+  }
+
+  function read() {
+    const found = fields.read();
+    const names = { input: input.value, output: output.value };
+    const parameters = readParameters(found);
+    const simulation = { kind: "fmu", file: fmu.id, ...names, parameters };
+    const listed = Object.entries(parameters).map(([name, { value }]) =>
+      value === undefined ? name : `${name}=${value}`,
+    );
+    const options = new URLSearchParams({ ...names, parameters: listed.join(",") });
+    // The command line has no exact values: they are in a file.
+    const isFixed = Object.values(parameters).some(({ fixed }) => fixed);
+    const argument = isFixed ? "fmu.toml" : `${fmu.name}?${decodeURIComponent(options)}`;
+    const tolerance = Object.entries(found.tolerance).filter(([name]) => found.chosen.includes(name));
+    const request = { simulation, tolerance: Object.fromEntries(tolerance), argument };
+    if (!isFixed) return request;
+    return { ...request, before: ["cat > fmu.toml <<'END'", ...writeFile(fmu.name, names, parameters), "END"] };
+  }
+  return { node, read };
+}
+
+/** Return the lines of a TOML file of an FMU with exact parameters. */
+function writeFile(file, names, parameters) {
+  const entries = Object.entries(parameters).map(([name, each]) => {
+    const fields = Object.entries(each).map(([key, value]) => `${key} = ${value}`);
+    return `${JSON.stringify(name)} = { ${fields.join(", ")} }`;
+  });
+  const first = Object.entries({ file, ...names }).map(([key, name]) => `${key} = ${JSON.stringify(name)}`);
+  return [...first, "", "[parameters]", ...entries];
+}
+
+/**
+ * Make the choice of an FMU; `refusal` says why the service runs none, or is empty. `read()` returns the
+ * simulation, its tolerances and the parts of its command, or null. `onChange()` is called at every change.
+ */
+export function makeFmuFields(refusal, onChange, signal) {
+  if (refusal) return { node: el("p", { class: "complaint" }, refusal), read: () => null };
+  const file = el("input", { name: "fmu", type: "file", accept: ".fmu" });
+  const stored = el("select", { name: "stored-fmu" });
+  const storedFields = el(
+    "div",
+    { class: "fields", hidden: true },
+    makeField(FORM, "Uploaded FMU", stored, "One that was uploaded before."),
+  );
+  const message = el("p", { class: "check", role: "status" });
+  const host = el("div");
+  let variables = null;
+
+  function show(fmu, words = "") {
+    variables = fmu && makeVariableFields(fmu);
+    host.replaceChildren(...(fmu ? [variables.node] : []));
+    message.classList.toggle("complaint", fmu === null && words !== "");
+    setText(message, words);
+    onChange();
+  }
+
+  async function take(request, words) {
+    show(null);
+    setText(message, words);
+    try {
+      const fmu = await request();
+      show(fmu, `FMI ${fmu.fmi}, ${fmu.interface}: ${fmu.parameters.length} parameters.`);
+      return fmu;
+    } catch (error) {
+      if (!signal.aborted) show(null, error.message);
+      return null;
+    }
+  }
+
+  async function list(chosen = "") {
+    const { items } = await getJson("v1/fmus?limit=200", { signal });
+    const options = items.map(({ id, name }) => el("option", { value: id }, name));
+    stored.replaceChildren(el("option", { value: "" }, "–"), ...options);
+    stored.value = chosen;
+    storedFields.hidden = !items.length;
+  }
+
+  const listSafely = (chosen) =>
+    list(chosen).catch((error) => signal.aborted || setText(message, error.message));
+  const load = () => getJson(`v1/fmus/${encodeURIComponent(stored.value)}`, { signal });
+  file.addEventListener("change", async () => {
+    if (!file.files.length) return;
+    const fmu = await take(() => uploadFmu(file.files[0]), `Reading ${file.files[0].name}…`);
+    if (fmu) listSafely(fmu.id);
+  });
+  stored.addEventListener("change", () => (stored.value ? take(load, "Loading…") : show(null)));
+  const hint = "FMI 2.0 or 3.0. The service runs its code in a process that can read nothing else.";
+  const fields = el("div", { class: "fields" }, makeField(FORM, "File", file, hint));
+  const node = el("div", { class: "fmu" }, fields, storedFields, message, host);
+  return { node, open: () => listSafely(stored.value), read: () => variables && variables.read() };
+}
