@@ -28,11 +28,20 @@ CHANGES = {
 }
 
 
-#: Changes that `test_rest_fetch` requests, since it needs a server, and `test_rest_readings`.
-OTHERS = {("POST", "/v1/datasets/fetch"), ("POST", "/v1/datasets/{dataset}/readings")}
+#: Changes of `test_rest_fetch`, which needs a server, `test_rest_readings` and `test_rest_fmus`.
+OTHERS = {
+    ("POST", "/v1/datasets/fetch"),
+    ("POST", "/v1/datasets/{dataset}/readings"),
+    ("POST", "/v1/fmus"),
+    ("DELETE", "/v1/fmus/{fmu}"),
+}
 
 #: Routes that answer a document and change nothing.
-ANSWERS = {("POST", "/v1/jobs/{job}/models/{rank}/simulate"), ("POST", "/v1/simulations/equations")}
+ANSWERS = {
+    ("POST", "/v1/jobs/{job}/models/{rank}/simulate"),
+    ("POST", "/v1/simulations/equations"),
+    ("POST", "/v1/simulations/preview"),
+}
 
 
 def test_every_changing_route_has_an_action(service):

@@ -128,6 +128,8 @@ def test_an_fmu_is_kept_until_the_jobs_that_name_it_have_ended(shared, dataset, 
     with Client(str(shared.client.base_url)) as client:
         client.delete_fmu(fmu)
     problem_of(shared.client.get(f"/v1/fmus/{fmu}"), 404, "no-such-fmu")
+    recorded = [(str(each.action), each.subject) for each in shared.store.audit.entries()]
+    assert {("upload-dataset", fmu), ("delete-dataset", fmu)} <= set(recorded)
     problem_of(shared.client.post(f"/v1/jobs/{job['id']}/resume"), 409, "dataset-deleted")
     assert send(shared, content).status_code == 201
 

@@ -46,7 +46,7 @@ include-name = [
     "POST /v1/jobs", "POST /v1/discrepancies", "POST /v1/datasets", "GET /v1/jobs", "GET /v1/datasets",
     "POST /v1/datasets/fetch", "POST /v1/webhooks", "POST /v1/monitors", "GET /v1/monitors",
     "POST /v1/monitors/{{monitor}}/records", "POST /v1/jobs/{{job}}/models/{{rank}}/simulate",
-    "POST /v1/simulations/equations",
+    "POST /v1/simulations/equations", "POST /v1/simulations/preview", "POST /v1/fmus", "GET /v1/fmus",
 ]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "410", "422", "429"]
 
