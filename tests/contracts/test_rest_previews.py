@@ -71,7 +71,7 @@ def test_the_rows_and_the_points_of_a_preview_are_those_of_the_request(shared, d
     assert [each.name for each in found.parameters[:2]] == ["b0", "b1"]
 
 
-def test_what_cannot_be_simulated_is_a_problem(shared, dataset):
+def test_a_simulation_that_diverges_or_lacks_a_name_is_a_problem(shared, dataset):
     fast = {**ODE, "equations": "dx/dt = 1e6*(x*x + u*u) + a + tau"}
     assert "diverges" in problem_of(preview(shared, dataset, fast), 422, "invalid-record")
     wrong = preview(shared, dataset, ODE, tolerance={"tua": 0.1})

@@ -22,7 +22,7 @@ def check(service, text):
     return service.client.post("/v1/simulations/equations", json={"text": text})
 
 
-def test_the_list_has_all_simulations_that_are_no_code_and_says_why_fmus_are_refused(service):
+def test_the_list_has_all_simulations_and_why_fmus_are_refused(service):
     *items, fmu = service.client.get("/v1/simulations").json()["items"]
     assert [each["kind"] for each in items] == [each.name for each in SIMULATORS.values() if each.is_remote]
     assert {each["refusal"] for each in items} == {""}

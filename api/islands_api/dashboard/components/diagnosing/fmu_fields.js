@@ -66,7 +66,8 @@ function makeVariableFields(fmu) {
     const tolerance = Object.entries(found.tolerance).filter(([name]) => found.chosen.includes(name));
     const request = { simulation, tolerance: Object.fromEntries(tolerance), argument };
     if (!isFixed) return request;
-    return { ...request, before: ["cat > fmu.toml <<'END'", ...writeFile(fmu.name, names, parameters), "END"] };
+    const lines = writeFile(fmu.name, names, parameters);
+    return { ...request, before: ["cat > fmu.toml <<'END'", ...lines, "END"] };
   }
   return { node, read };
 }

@@ -45,8 +45,8 @@ function makePlot(answer, signal) {
 }
 
 /**
- * Make the preview. `makeRequest()` returns the request of a diagnosis, or null without one. `update()` states
- * that the form has changed: a preview that was quick is then asked for again.
+ * Make the preview. `makeRequest()` returns the request of a diagnosis, or null without one. `update()` is
+ * called at every change of the form: a preview that was quick is then asked for again.
  */
 export function makeSimulationPreview(makeRequest, signal) {
   const button = el("button", { type: "button", on: { click: run } }, "Preview");
