@@ -113,6 +113,31 @@ def test_values_of_a_short_range_are_read_with_the_keys(looked: Any, expect: Any
     expect(plot).to_have_attribute("aria-valuetext", re.compile(r"^[\d.]+ s: u_V \S+, y_um \S+$"))
 
 
+def test_a_range_is_drawn_before_its_samples_arrive(looked: Any, expect: Any) -> None:
+    """One request waits at a time, and the samples in memory are drawn meanwhile."""
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    looked.route("**/samples?*", hold)
+    plot, canvas = looked.get_by_role("slider", name="Record"), looked.locator("canvas")
+    plot.focus()
+    for key in (*"++++++", "PageDown", *"------"):
+        plot.press(key)
+        looked.wait_for_timeout(30)
+    looked.wait_for_timeout(300)
+    assert len(held) == 1
+    expect(plot).to_have_attribute("aria-valuetext", re.compile(r"^[\d.]+ s: u_V \S+.*, y_um \S+"))
+    assert canvas.evaluate(DRAWN) > 100
+    before = looked.locator(".signals + .position").text_content()
+    held.pop().continue_()
+    looked.unroute("**/samples?*")
+    looked.wait_for_timeout(300)
+    assert looked.locator(".signals + .position").text_content() == before
+    assert canvas.evaluate(DRAWN) > 100
+
+
 def test_a_column_has_one_role(looked: Any, expect: Any) -> None:
     looked.get_by_label("y_um is an input").check()
     expect(looked.get_by_label("y_um is the output")).not_to_be_checked()

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from logging import ERROR
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
 
+import numpy as np
 from fastapi import Depends, Request
+from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands_api.web.concurrency import BlockingExecutor
@@ -47,6 +49,12 @@ MAX_CONCURRENT_SIMULATIONS, MAX_SIMULATIONS_PER_OWNER = 2, 1
 #: one input are 0.8 MB.
 MAX_KEPT_MODELS, MAX_KEPT_RECORDS = 64, 8
 
+#: Largest number of bytes of the columns in memory for plots: eight of a million samples.
+MAX_COLUMN_BYTES = 64_000_000
+
+#: An owner, a data set and names of columns.
+ColumnsKey: TypeAlias = tuple[str, str, tuple[str, ...]]
+
 #: A job, its version, which changes with its result, and the rank of a model.
 ModelKey: TypeAlias = tuple[str, int, int]
 
@@ -82,6 +90,9 @@ class AppState:
     )
     simulated_records: RecentValues[ModelKey, Dataset] = field(
         default_factory=lambda: RecentValues(MAX_KEPT_RECORDS)
+    )
+    plotted_columns: RecentValues[ColumnsKey, NDArray[np.float64]] = field(
+        default_factory=lambda: RecentValues(MAX_COLUMN_BYTES, lambda values: values.nbytes)
     )
     drawings: OwnerCounts = field(default_factory=lambda: OwnerCounts("requests for figures"))
     streams: OwnerCounts = field(default_factory=lambda: OwnerCounts("event streams"))

@@ -1,7 +1,7 @@
 """Values that are kept in memory as long as they are in use."""
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from threading import Lock
 from typing import Generic, TypeVar
 
@@ -15,11 +15,14 @@ class RecentValues(Generic[K, V]):
     Parameters
     ----------
     most : int
-        Largest number of values.
+        Largest sum of the weights of the values. A value that weighs more is not kept.
+    weigh : callable
+        Returns the weight of a value; by default each has the weight 1.
     """
 
-    def __init__(self, most: int) -> None:
-        self._most = most
+    def __init__(self, most: int, weigh: Callable[[V], int] = lambda _: 1) -> None:
+        self._most, self._weigh = most, weigh
+        self._weight = 0
         self._values: OrderedDict[K, V] = OrderedDict()
         self._lock = Lock()
 
@@ -31,8 +34,14 @@ class RecentValues(Generic[K, V]):
             return self._values.get(key)
 
     def store(self, key: K, value: V) -> None:
-        """Store a value; the one that was not used for the longest time is removed if there are too many."""
+        """Store a value; those that were not used for the longest time are removed if they weigh too much."""
         with self._lock:
+            if self._weigh(value) > self._most:
+                return
+            if key in self._values:
+                self._weight -= self._weigh(self._values.pop(key))
             self._values[key] = value
-            if len(self._values) > self._most:
-                self._values.popitem(last=False)
+            self._weight += self._weigh(value)
+            while self._weight > self._most:
+                _, removed = self._values.popitem(last=False)
+                self._weight -= self._weigh(removed)

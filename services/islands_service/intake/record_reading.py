@@ -5,7 +5,6 @@ the columns and rows of the job, so that a record is read for every job, not onc
 """
 
 import json
-import signal
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,16 +14,10 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands_service.intake.confined_process import (
-    check_status,
-    enter,
-    make_message,
-    refuse,
-    timeout_error,
-)
-from islands_service.intake.reader_process import FORK_SERVER, open_memory
+from islands_service.intake.confined_file import open_answer
+from islands_service.intake.confined_process import enter, refuse
 
-#: Largest number of bytes of the description of a record, and of an error message.
+#: Largest number of bytes of the description of a record.
 _MAX_HEADER = 16_000_000
 
 #: Numbers as they are sent.
@@ -65,27 +58,8 @@ def read_confined(path: Path, request: RecordRequest, memory: int, seconds: floa
     MemoryError
         The subprocess was killed, as the kernel does if the machine has too little memory.
     """
-    message = make_message(path, memory, seconds, asdict(request))
-    with (
-        open_memory("record") as output,
-        open_memory("errors") as errors,
-        FORK_SERVER.start("record_reading", message, output.fileno(), errors.fileno()) as process,
-    ):
-        try:
-            status = process.wait(seconds)
-        except TimeoutError:
-            raise timeout_error(path.name, seconds) from None
-        finally:
-            process.kill()
-            process.wait()
-        output.seek(0)
-        errors.seek(0)
-        if status == -signal.SIGKILL:
-            raise MemoryError(f"the process that reads {path.name} was killed: check the machine's memory")
-        if status:
-            answer, complaint = output.read(_MAX_HEADER), errors.read(_MAX_HEADER)
-            check_status(status, answer, complaint, path.name, memory, seconds)
-        return receive_record(output)
+    with open_answer("record_reading", path, asdict(request), memory, seconds) as answer:
+        return receive_record(answer)
 
 
 def send_record(record: Dataset, stream: IO[bytes]) -> None:

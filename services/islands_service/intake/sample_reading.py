@@ -1,82 +1,80 @@
-"""Reading of the columns of an untrusted file for a plot, in a confined subprocess."""
+"""Reading of whole columns of an untrusted file, for plots, in a confined subprocess."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from islands.errors import RecordError, SettingsError, suggest
-from islands_service.domain.plot_envelopes import describe_envelopes
-from islands_service.intake.confined_answer import ask_confined
-from islands_service.intake.confined_process import enter, refuse, send_document
+from islands_service.intake.confined_file import open_answer
+from islands_service.intake.confined_process import enter, refuse
+
+#: Numbers as they are sent.
+_FLOAT = np.dtype("<f8")
 
 
-@dataclass(frozen=True, slots=True)
-class SampleRequest:
-    """Columns and rows of a plot.
-
-    Attributes
-    ----------
-    columns : tuple of str
-    start, stop : int, int or None
-        First row, from 0, and the row after the last one; None is the end of the file.
-    points : int
-        Largest number of values of each column.
-    reading : mapping
-        Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
-    """
-
-    columns: tuple[str, ...]
-    start: int
-    stop: int | None
-    points: int
-    reading: Mapping[str, Any] = field(default_factory=dict)
-
-
-async def read_samples(path: Path, request: SampleRequest, memory: int, seconds: float) -> Mapping[str, Any]:
-    """Return the envelopes of columns as a document with the fields of `islands_api.dataset_schemas.Samples`.
+def read_columns(
+    path: Path, names: Sequence[str], reading: Mapping[str, Any], memory: int, seconds: float
+) -> NDArray[np.float64]:
+    """Read columns of a file in a confined subprocess.
 
     Parameters
     ----------
+    names : sequence of str
+    reading : mapping
+        Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
     memory, seconds
         Limits of the subprocess: bytes of address space, and time.
+
+    Returns
+    -------
+    columns : ndarray, shape (columns, samples)
+        Missing values are NaN.
 
     Raises
     ------
     RecordError
-        There is no such column, it contains text, or the file has fewer rows than ``start``.
+        There is no such column, or it contains text.
+    MemoryError
+        The subprocess was killed, as the kernel does if the machine has too little memory.
     """
-    return await ask_confined("sample_reading", path, asdict(request), memory, seconds)
+    asked = {"names": list(names), "reading": dict(reading)}
+    with open_answer("sample_reading", path, asked, memory, seconds) as answer:
+        received = answer.read()
+    if len(received) % (len(names) * _FLOAT.itemsize):
+        raise RecordError("the process that reads columns has answered nonsense")
+    return np.frombuffer(received, _FLOAT).reshape(len(names), -1)
 
 
-def main() -> None:
-    """Read the file named on standard input, and write the envelopes to standard output."""
-    path, asked, answer = enter()
-    try:
-        document = describe_samples(Path(path), SampleRequest(**asked))
-    except (RecordError, SettingsError) as error:
-        refuse(error, answer)
-    send_document(document, answer)
-
-
-def describe_samples(path: Path, request: SampleRequest) -> dict[str, Any]:
-    """Return the envelopes of columns in this process; see `read_samples`.
+def find_columns(path: Path, names: Sequence[str], reading: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return columns of a file in this process; see `read_columns`.
 
     Raises
     ------
     RecordError, SettingsError
-        The columns or the rows do not exist, or a column contains text.
+        A column does not exist, or it contains text.
     """
     # Only the process that reads files imports its readers.
     from islands.io.records.reader import open_record  # noqa: PLC0415
     from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
 
-    table = open_record(path, ReadingOptions(**request.reading))
-    for name in request.columns:
+    table = open_record(path, ReadingOptions(**reading))
+    for name in names:
         if name not in table.names:
             known = f"it has {', '.join(table.names)}{suggest(name, table.names)}"
             raise RecordError(f"{path.name} has no column {name}; {known}")
-    read = table.read(request.columns, slice(request.start, request.stop))
-    signals = {name: read.numbers[name] for name in request.columns}
-    rows, columns = describe_envelopes(signals, read.first, request.points)
-    return {"start": read.first, "stop": read.first + len(read.rows), "rows": rows, "columns": columns}
+    numbers = table.read(names, None).numbers
+    return np.array([numbers[name] for name in names], _FLOAT)
+
+
+def main() -> None:
+    """Read the file named on standard input, and write its columns to standard output."""
+    path, asked, answer = enter(writes=True)
+    try:
+        columns = find_columns(Path(path), asked["names"], asked["reading"])
+    except (RecordError, SettingsError) as error:
+        refuse(error, answer)
+    answer.write(columns.tobytes())
+    answer.flush()

@@ -49,11 +49,23 @@ function drawTimes(pen, { range, dt, width }, height, { soft, line }) {
   pen.fillText(dt === null ? "row" : "time (s)", (LEFT + width) / 2, height - 4);
 }
 
-function drawPanel(pen, x, { answer, width }, lines, [top, bottom], colours) {
-  const columns = lines.map(({ name }) => answer?.columns.find((each) => each.name === name));
-  const values = columns
-    .flatMap((column) => (column ? [...column.minimum, ...column.maximum] : []))
-    .filter((value) => value !== null);
+/** Return the least and the greatest value of lines in visible parts; none if all are missing. */
+function findLimits(answers, lines) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const { columns, first, last } of answers)
+    for (const { name } of lines) {
+      const { minimum, maximum } = columns.get(name) ?? { minimum: [], maximum: [] };
+      // A comparison with NaN, a missing value, is false.
+      for (let part = first; part < last; part += 1) {
+        if (minimum[part] < low) low = minimum[part];
+        if (maximum[part] > high) high = maximum[part];
+      }
+    }
+  return low <= high ? [low, high] : [];
+}
+
+function drawPanel(pen, x, { answers, width }, lines, [top, bottom], colours) {
+  const values = findLimits(answers, lines);
   const y = makeScale(values, [bottom - 4, top + 20], { padding: 0.05, maxTicks: 4 });
   pen.textAlign = "right";
   pen.fillStyle = colours.soft;
@@ -66,30 +78,43 @@ function drawPanel(pen, x, { answer, width }, lines, [top, bottom], colours) {
   pen.beginPath();
   pen.rect(LEFT, top, width - LEFT, bottom - top);
   pen.clip();
-  columns.forEach((column, at) => {
-    pen.strokeStyle = colours[lines[at].colour ?? "accent"];
-    if (column) drawEnvelope(pen, x, y, column, answer.rows);
-  });
+  for (const { name, colour = "accent" } of lines) {
+    pen.strokeStyle = colours[colour];
+    drawEnvelope(pen, x, y, [LEFT, width], answers, name);
+  }
   pen.restore();
 }
 
 /** Return the scale from rows to pixels of a plot. */
 export const makeRowScale = (range, width) => makeScale(range, [LEFT, width - RIGHT], { maxTicks: 8 });
 
+/** Read the colours and the font of a plot from its style. */
+export const readColours = (style) => ({
+  ...Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`)])),
+  font: `11.5px ${style.fontFamily}`,
+});
+
+/** Return the pen of a canvas of a size, which is empty. A new size is a new memory of pixels. */
+function clearCanvas(canvas, size) {
+  const ratio = devicePixelRatio || 1;
+  const [width, height] = size.map((each) => Math.round(each * ratio));
+  const pen = canvas.getContext("2d");
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  else pen.reset();
+  pen.scale(ratio, ratio);
+  return pen;
+}
+
 /**
- * Draw a plot. `view` has its `panels`, the `range` of rows, the sampling time `dt`, the `answer` of the
- * service, the marked `ranges`, the rows `marks`, the `pointed` row and `width`.
+ * Draw a plot. `view` has its `panels`, the `range` of rows, the sampling time `dt`, the `answers` that show
+ * the range, the marked `ranges`, the rows `marks`, the `pointed` row and `width`.
  */
-export function drawSignals(canvas, view, style) {
+export function drawSignals(canvas, view, colours) {
   const { panels, range, width, pointed } = view;
   const heights = panels.map((lines) => (lines.length > 1 ? TALL_PANEL : PANEL));
   const height = heights.reduce((sum, each) => sum + each + GAP, BOTTOM);
-  const ratio = devicePixelRatio || 1;
-  [canvas.width, canvas.height] = [width * ratio, height * ratio];
-  const pen = canvas.getContext("2d");
-  pen.scale(ratio, ratio);
-  const colours = Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`)]));
-  pen.font = `11.5px ${style.fontFamily}`;
+  const pen = clearCanvas(canvas, [width, height]);
+  pen.font = colours.font;
   const x = makeRowScale(range, width);
   pen.save();
   pen.beginPath();

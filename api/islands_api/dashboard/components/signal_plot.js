@@ -2,13 +2,14 @@
  * Plot of signals in panels. After a click the wheel zooms; dragging moves the rows, or marks a range; arrow
  * keys read values.
  *
- * The service sends the extremes of as many parts of the rows as the plot has pixels. A new range is drawn at
- * once from the last answer, and again when its own answer arrives.
+ * A new range is drawn at once from the samples in memory, and again when its own samples arrive. All changes
+ * before a frame of the screen are one drawing; a drawing reads nothing that needs a new layout.
  */
 
 import { el, setText } from "../lib/dom.js";
 import { formatCount, formatNumber, formatShort } from "../lib/numbers.js";
-import { LEFT, RIGHT, drawSignals, makeRowScale } from "./signal_panels.js";
+import { LEFT, RIGHT, drawSignals, makeRowScale, readColours } from "./signal_panels.js";
+import { findPart, makeSamples } from "./signal_samples.js";
 
 /** Distance in pixels from an edge of a marked range in which a drag moves the edge. */
 const EDGE = 7;
@@ -16,14 +17,14 @@ const EDGE = 7;
 /** How a plot is read. */
 export const HINT = "Click, then wheel: zoom. Drag: move. Keys: arrows, +, −, Home.";
 
-/** Fewest rows of a range, largest number of points of a request, and panels of a plot. */
-const [LEAST_ROWS, MOST_POINTS, MOST_PANELS] = [8, 2000, 8];
+/** Fewest rows of a range, and largest number of panels of a plot. */
+const [LEAST_ROWS, MOST_PANELS] = [8, 8];
 
 /** Factor of the range for a step of the wheel or a key. */
 const ZOOM = 1.25;
 
-/** Milliseconds without a change of the range before its samples are requested. */
-const PAUSE = 120;
+/** Pixels of a step of the wheel; a touchpad sends parts of it, and for a pinch still smaller ones. */
+const [STEP, PINCH_STEP] = [100, 10];
 
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
@@ -34,16 +35,10 @@ function limitRange(start, stop, rows) {
   return [from, from + length];
 }
 
-/** Return the place of the part that contains a row; -1 if the answer does not cover it. */
-function findPart({ rows, stop }, row) {
-  if (!rows.length || row < rows[0] || row >= stop) return -1;
-  let [low, high] = [0, rows.length - 1];
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (rows[middle] <= row) low = middle;
-    else high = middle - 1;
-  }
-  return low;
+/** Return the steps of the wheel of an event, at most one; positive ones zoom out. */
+function countSteps({ deltaMode, deltaY, ctrlKey }) {
+  if (deltaMode !== WheelEvent.DOM_DELTA_PIXEL) return Math.sign(deltaY);
+  return clamp(deltaY / (ctrlKey ? PINCH_STEP : STEP), -1, 1);
 }
 
 /**
@@ -60,51 +55,57 @@ export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
   const canvas = el("canvas", { "aria-hidden": "true" });
   const plot = el("div", { class: "signals", tabindex: "0", role: "slider", "aria-label": "Record" }, canvas);
   const position = el("p", { class: "position soft small" });
-  let [panels, range, pointed, answer] = [[], [0, samples], null, null];
+  let [panels, range, pointed] = [[], [0, samples], null];
   let [marks, marking, drag] = [[], null, null];
-  let timer;
+  let [width, colours, frame, failure] = [0, null, 0, ""];
 
   const describeRow = (row) =>
     dt === null ? `row ${formatCount(row)}` : `${formatShort(Number((row * dt).toPrecision(6)))} s`;
-  const getX = () => makeRowScale(range, plot.clientWidth);
-
-  async function request() {
-    const [start, stop] = [Math.floor(range[0]), Math.ceil(range[1])];
-    const points = clamp(Math.round(plot.clientWidth), 1, MOST_POINTS);
-    const asked = panels;
-    const names = new Set(panels.flat().map(({ name }) => name));
-    const found = await ask(new URLSearchParams({ start, stop, points }), [...names]);
-    if (asked !== panels) return;
-    answer = found;
+  const getX = () => makeRowScale(range, width);
+  const fail = (error) => {
+    failure = error.message;
     draw();
-  }
+  };
+  const loaded = makeSamples(samples, ask, { changed: draw, failed: fail }, signal);
 
   function load() {
-    clearTimeout(timer);
-    timer = setTimeout(
-      () => panels.length && request().catch((error) => signal.aborted || setText(position, error.message)),
-      answer === null ? 0 : PAUSE,
-    );
+    failure = "";
+    if (width && panels.length) loaded.want(range, width);
   }
 
+  /** Draw in the next frame of the screen. */
   function draw() {
-    const width = plot.clientWidth;
-    if (!width || !panels.length) return;
-    const view = { panels, range, dt, answer, ranges: ranges.getRanges(), marks, pointed, width };
-    drawSignals(canvas, view, getComputedStyle(plot));
-    readValues();
+    frame ||= requestAnimationFrame(drawNow);
   }
 
-  /** Show the values at the pointer, and to screen readers. */
-  function readValues() {
-    const row = clamp(Math.round(pointed ?? range[1] - 1), 0, samples - 1);
-    const part = answer === null ? -1 : findPart(answer, row);
-    const texts = (answer?.columns ?? []).map(({ name, minimum, maximum }) => {
+  function drawNow() {
+    frame = 0;
+    if (!width || !panels.length) return;
+    colours ??= readColours(getComputedStyle(plot));
+    const answers = loaded.find(range);
+    const marked = ranges.getRanges();
+    drawSignals(canvas, { panels, range, dt, answers, ranges: marked, marks, pointed, width }, colours);
+    readValues(answers);
+  }
+
+  /** Return the values of the columns at a row. */
+  function describeValues(answers, row) {
+    const answer = answers.findLast(({ rows, first }) => rows[first] <= row);
+    if (!answer) return [];
+    const { rows, columns } = answer;
+    const part = findPart(rows, row);
+    return [...columns].map(([name, { minimum, maximum }]) => {
       const [low, high] = [minimum[part], maximum[part]].map((value) => formatNumber(value));
       return `${name} ${low === high ? low : `${low} to ${high}`}`;
     });
-    const text = `${describeRow(row)}: ${part < 0 ? "" : texts.join(", ")}`;
-    setText(position, pointed === null ? describeRange() : text);
+  }
+
+  /** Show the values at the pointer, and to screen readers. */
+  function readValues(answers) {
+    const row = clamp(Math.round(pointed ?? range[1] - 1), 0, samples - 1);
+    const text = `${describeRow(row)}: ${describeValues(answers, row).join(", ")}`;
+    const state = loaded.isEmpty() ? "Reading the samples…" : describeRange();
+    setText(position, failure || (pointed === null || loaded.isEmpty() ? state : text));
     const aria = { min: 0, max: samples - 1, now: row, text };
     for (const [name, value] of Object.entries(aria)) plot.setAttribute(`aria-value${name}`, value);
   }
@@ -130,7 +131,7 @@ export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
       // Otherwise the page could not be scrolled past the plot.
       if (!event.ctrlKey && document.activeElement !== plot) return;
       event.preventDefault();
-      zoom(event.deltaY > 0 ? ZOOM : 1 / ZOOM, rowAt(event));
+      zoom(ZOOM ** countSteps(event), rowAt(event));
     },
     { passive: false },
   );
@@ -158,7 +159,7 @@ export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
 
   function continueDrag(event) {
     if (drag === null) {
-      const rows = (event.movementX * (range[1] - range[0])) / (plot.clientWidth - LEFT - RIGHT);
+      const rows = (event.movementX * (range[1] - range[0])) / (width - LEFT - RIGHT);
       move(range[0] - rows, range[1] - rows);
       return;
     }
@@ -202,10 +203,17 @@ export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
     event.preventDefault();
     actions[event.key]();
   });
-  const observer = new ResizeObserver(draw);
+  const observer = new ResizeObserver(([{ contentRect }]) => {
+    width = contentRect.width;
+    draw();
+    load();
+  });
   observer.observe(plot);
   const theme = matchMedia("(prefers-color-scheme: dark)");
-  theme.addEventListener("change", draw, { signal });
+  theme.addEventListener("change", () => {
+    colours = null;
+    draw();
+  }, { signal });
   signal.addEventListener("abort", () => observer.disconnect(), { once: true });
 
   return {
@@ -213,6 +221,7 @@ export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
     show(chosen) {
       panels = chosen.slice(0, MOST_PANELS);
       canvas.hidden = !panels.length;
+      loaded.select([...new Set(panels.flat().map(({ name }) => name))]);
       draw();
       load();
     },

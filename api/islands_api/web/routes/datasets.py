@@ -14,6 +14,7 @@ from islands.errors import SettingsError
 from islands.io.records.reading_options import ReadingOptions
 from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest, ReadingRequest, Samples
 from islands_api.web.auth import Reader, Writer
+from islands_api.web.dataset_samples import describe_rows, get_columns
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import (
@@ -30,12 +31,11 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
-from islands_api.web.uploads.dataset_storage import open_stored, read_again, store_dataset
+from islands_api.web.uploads.dataset_storage import read_again, store_dataset
 from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
 from islands_api.web.uploads.uploaded_file import parse_file_name
 from islands_service.domain.job_spec import Name
 from islands_service.intake.file_inspection import InspectionRequest
-from islands_service.intake.sample_reading import SampleRequest, read_samples
 from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
@@ -190,18 +190,18 @@ async def samples(
 ) -> Response:
     """Return columns for a plot: the least and the greatest value of every part of the rows.
 
-    Every peak is in the answer, whatever the number of points. The file is read for every answer, which does
-    not change.
+    Every peak is in the answer, whatever the number of points. Columns are read whole, and kept in memory as
+    long as they are in use. An answer does not change.
     """
     stored = await state.run_blocking(state.store.datasets.get, caller.owner, dataset)
-    request = SampleRequest(tuple(column), start, stop, points, stored.preview.get("reading", {}))
-    tag = f'"{hashlib.sha256(repr((dataset, request)).encode()).hexdigest()[:32]}"'
+    asked = dataset, tuple(column), start, stop, points
+    tag = f'"{hashlib.sha256(repr(asked).encode()).hexdigest()[:32]}"'
     headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization", "ETag": tag}
     if matches_etag(if_none_match, tag):
         return Response(status_code=304, headers=headers)
-    settings = state.settings
-    async with open_stored(state, caller.owner, stored) as path:
-        found = await read_samples(path, request, settings.inspection_memory, settings.inspection_seconds)
+    columns = await get_columns(state, caller.owner, stored, column)
+    rows = slice(start, stop)
+    found = await state.run_blocking(describe_rows, columns, column, stored.name, rows, points)
     return JSONDocument(found, headers=headers)
 
 

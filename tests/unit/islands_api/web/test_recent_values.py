@@ -17,3 +17,14 @@ def test_a_value_is_replaced() -> None:
     values.store("a", 1)
     values.store("a", 2)
     assert values.get("a") == 2
+
+
+def test_values_weigh_at_most_the_limit() -> None:
+    values: RecentValues[str, str] = RecentValues(5, len)
+    for key, value in (("a", "12"), ("b", "123"), ("a", "1"), ("c", "1")):
+        values.store(key, value)
+    assert [values.get(key) for key in "abc"] == ["1", "123", "1"]
+    values.store("d", "123456")
+    assert [values.get(key) for key in "abcd"] == ["1", "123", "1", None]
+    values.store("d", "1234")
+    assert [values.get(key) for key in "abcd"] == [None, None, "1", "1234"]
