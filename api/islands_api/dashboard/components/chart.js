@@ -75,8 +75,16 @@ const maskUndrawable = (log) => ([x, y, half]) =>
 const formatPoint = ([, y, half] = []) =>
   half === undefined ? formatNumber(y) : formatInterval(y, half);
 
-/** Return the ordinates of a point and of the ends of its interval. */
-const getExtent = ([, y, half = 0]) => (half ? [y - half, y + half] : [y]);
+/** Return the least and the greatest ordinate of a series with its intervals; none if all are missing. */
+function getExtremes({ points }) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const [, y, half = 0] of points)
+    if (y !== null) {
+      if (y - half < low) low = y - half;
+      if (y + half > high) high = y + half;
+    }
+  return low <= high ? [low, high] : [];
+}
 
 const circle = (kind, r, cx, cy) => svg("circle", { class: kind, r, cx, cy });
 
@@ -106,12 +114,12 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
   const getPoints = () => getNamedSeries().find((each) => each.points.length)?.points ?? [];
 
   function updateScales(width) {
-    const points = series.flatMap((each) => each.points);
-    const values = points.filter(([, value]) => value !== null).flatMap(getExtent);
-    const y = makeScale(values, [HEIGHT - MARGIN.bottom, MARGIN.top], { log: yAxis.log, padding: 0.05 });
+    const y = makeScale(series.flatMap(getExtremes), [HEIGHT - MARGIN.bottom, MARGIN.top], { log: yAxis.log, padding: 0.05 });
     const longest = Math.max(0, ...y.ticks.map((value) => formatShort(value).length));
     const left = Math.max(LEFT.least, LEFT.space + LEFT.character * longest);
-    const x = makeScale(points.map((point) => point[0]), [left, width - MARGIN.right], {
+    // Abscissas increase.
+    const ends = series.flatMap(({ points }) => (points.length ? [points[0][0], points.at(-1)[0]] : []));
+    const x = makeScale(ends, [left, width - MARGIN.right], {
       log: xAxis.log,
       integer: xAxis.integer,
       maxTicks: width < 480 ? 5 : 8,
@@ -167,7 +175,8 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
 
   function makeLines(width) {
     let at = 0;
-    const stretches = Math.max(60, Math.min(width, 60_000 / series.length));
+    // Two points of each stretch are kept: one for each pixel.
+    const stretches = Math.max(60, Math.min(width / 2, 60_000 / series.length));
     return series.flatMap(({ points, faint, name, bare }) => {
       const shown = downsample(points, stretches);
       const isDense = marks && !bare && shown.length > width / DENSE_PIXELS;

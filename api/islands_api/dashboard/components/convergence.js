@@ -6,8 +6,8 @@ import { poll } from "../lib/polling.js";
 import { COLOURS, makeLineChart } from "./chart.js";
 import { makeIslandMap } from "./island_map.js";
 
-/** Maximum number of points kept; beyond it every other point is dropped. A screen shows no more. */
-const MAX_POINTS = 4000;
+/** Maximum number of points kept; beyond it every other point is dropped. The chart has no more pixels. */
+const MAX_POINTS = 1000;
 
 /** Seconds between two requests for the history without an event of the job. */
 const REFRESH_SECONDS = 600;
@@ -52,12 +52,16 @@ export function makeConvergencePanel(id, unit, signal) {
   let loadNow = null;
 
   async function load() {
+    let hasMore = false;
     while ((points.at(-1)?.generation ?? -1) < targetGeneration && !signal.aborted) {
       const after = points.at(-1)?.generation ?? -1;
       const { items } = await getJson(`${getJobPath(id)}/history?after=${after}`, { signal });
       if (items.length === 0) break;
       points = points.concat(items);
       while (points.length > MAX_POINTS) points = halve(points);
+      hasMore = true;
+    }
+    if (hasMore) {
       placeholder.hidden = true;
       islands.draw(makeIslandSeries(points));
     }

@@ -4,7 +4,11 @@ import { el, setText, svg } from "../lib/dom.js";
 import { formatNumber } from "../lib/numbers.js";
 import { COLOURS } from "./chart.js";
 
-const SIZE = 250;
+/** Height of the map, and the room at each side for the errors of islands. */
+const [SIZE, SIDE] = [250, 45];
+
+/** Part of the radius from the vertical axis within which the error is above or below its island. */
+const MIDDLE = 0.2;
 
 /** Radii of the circle of islands and of an island, and the room of an arrow head, in pixels. */
 const [RING, NODE, HEAD] = [88, 15, 8];
@@ -12,6 +16,18 @@ const [RING, NODE, HEAD] = [88, 15, 8];
 function place(island, islands) {
   const angle = (2 * Math.PI * island) / islands - Math.PI / 2;
   return [SIZE / 2 + RING * Math.cos(angle), SIZE / 2 + RING * Math.sin(angle)];
+}
+
+/** Make the error of an island, outside of the circle of islands, where no arrow is. */
+function makeError(error, x, y) {
+  const [right, down] = [(x - SIZE / 2) / RING, y > SIZE / 2 ? 1 : -1];
+  const text = formatNumber(error);
+  if (Math.abs(right) < MIDDLE) {
+    const below = down > 0 ? NODE + 13 : -NODE - 5;
+    return svg("text", { class: "tick middle", x, y: y + below }, text);
+  }
+  const beside = Math.sign(right) * (NODE + 5);
+  return svg("text", { class: right < 0 ? "tick end" : "tick", x: x + beside, y: y + 4 + 4 * down }, text);
 }
 
 /** Make an arrow between two islands, bent so that both directions are visible. */
@@ -55,7 +71,7 @@ const describeWays = (sources) =>
 
 /** Make the map; `show(progress, unit)` updates it. It is hidden before the first migration. */
 export function makeIslandMap(unit) {
-  const drawing = svg("svg", { viewBox: `0 0 ${SIZE} ${SIZE}`, role: "img" });
+  const drawing = svg("svg", { viewBox: `${-SIDE} 0 ${SIZE + 2 * SIDE} ${SIZE}`, role: "img" });
   const caption = el("p", { class: "soft small" });
   const node = el(
     "figure",
@@ -70,11 +86,10 @@ export function makeIslandMap(unit) {
     const ways = sources.flatMap((each, to) => each.map((from) => makeArrow(from, to, islands.length)));
     const nodes = islands.flatMap((error, island) => {
       const [x, y] = place(island, islands.length);
-      const outwards = y > SIZE / 2 + 1 ? NODE + 13 : -NODE - 5;
       return [
         svg("circle", { class: `island s${island % COLOURS}`, cx: x, cy: y, r: NODE }),
         svg("text", { class: "tick middle number", x, y: y + 4 }, String(island + 1)),
-        svg("text", { class: "tick middle", x, y: y + outwards }, formatNumber(error)),
+        makeError(error, x, y),
       ];
     });
     drawing.replaceChildren(makeMarker(), ...ways, ...nodes);

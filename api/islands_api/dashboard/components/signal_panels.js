@@ -73,7 +73,7 @@ function drawPanel(pen, x, { answers, width }, lines, [top, bottom], colours) {
   for (const tick of ticks) pen.fillText(formatShort(tick), LEFT - 6, y.at(tick) + 4);
   pen.strokeStyle = colours.line;
   strokeLine(pen, LEFT, bottom, width, bottom);
-  drawNames(pen, lines, [LEFT + 4, top + 11], colours);
+  drawNames(pen, lines, [LEFT + 4, top + 14], colours);
   pen.save();
   pen.beginPath();
   pen.rect(LEFT, top, width - LEFT, bottom - top);

@@ -89,6 +89,7 @@ export function makeLivePanel(unit) {
     show(job) {
       front = getFront(job.progress ?? {});
       node.hidden = front.length === 0 || job.state === "succeeded";
+      preliminary.hidden = job.state !== "running";
       if (node.hidden) return;
       showModel();
     },

@@ -78,12 +78,24 @@ export function poll(task, signal) {
  */
 export function followJob(id, { show, lost }, signal) {
   const path = getJobPath(id);
-  let current = null;
+  let [current, frame] = [null, 0];
 
   function update(job) {
     if (current !== null && job.version < current.version) return;
     current = { loaded: performance.now(), ...job };
     show(current);
+  }
+
+  /** Take a progress event; all before a frame of the screen are shown at once, if the page is visible. */
+  function updateProgress({ id: version, data: progress }) {
+    if (version < current.version) return;
+    current = { ...current, version, progress };
+    const showNow = () => {
+      frame = 0;
+      if (!signal.aborted) show(current);
+    };
+    if (document.hidden) showNow();
+    else frame ||= requestAnimationFrame(showNow);
   }
 
   async function check() {
@@ -97,7 +109,7 @@ export function followJob(id, { show, lost }, signal) {
     await check();
     if (isEnded(current)) return ENDED_POLL_SECONDS;
     for await (const event of streamEvents(`${path}/events`, current.version, signal)) {
-      if (event.kind === "progress") update({ ...current, version: event.id, progress: event.data });
+      if (event.kind === "progress") updateProgress(event);
       else await check();
       if (isEnded(current)) break;
     }
