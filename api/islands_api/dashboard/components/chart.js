@@ -17,6 +17,9 @@ const HEIGHT = 250;
 /** Distance of points in pixels below which they are small, and their line is thin. */
 const DENSE_PIXELS = 6;
 
+/** Stretches of all faint lines together: a running search draws its lines again after each event. */
+const FAINT_STRETCHES = 1000;
+
 /** Number of line colours in job.css; further series are dashed. */
 export const COLOURS = 8;
 
@@ -114,7 +117,8 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
   const getPoints = () => getNamedSeries().find((each) => each.points.length)?.points ?? [];
 
   function updateScales(width) {
-    const y = makeScale(series.flatMap(getExtremes), [HEIGHT - MARGIN.bottom, MARGIN.top], { log: yAxis.log, padding: 0.05 });
+    const heights = [HEIGHT - MARGIN.bottom, MARGIN.top];
+    const y = makeScale(series.flatMap(getExtremes), heights, { log: yAxis.log, padding: 0.05 });
     const longest = Math.max(0, ...y.ticks.map((value) => formatShort(value).length));
     const left = Math.max(LEFT.least, LEFT.space + LEFT.character * longest);
     // Abscissas increase.
@@ -175,10 +179,11 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
 
   function makeLines(width) {
     let at = 0;
-    // Two points of each stretch are kept: one for each pixel.
-    const stretches = Math.max(60, Math.min(width / 2, 60_000 / series.length));
+    // Two points of each stretch are kept: one for each pixel, and fewer of many faint lines.
+    const stretches = width / 2;
+    const faintStretches = Math.max(60, Math.min(stretches, FAINT_STRETCHES / series.length));
     return series.flatMap(({ points, faint, name, bare }) => {
-      const shown = downsample(points, stretches);
+      const shown = downsample(points, faint ? faintStretches : stretches);
       const isDense = marks && !bare && shown.length > width / DENSE_PIXELS;
       const style = `${at >= COLOURS ? " dashed" : ""}${isDense ? " dense" : ""}`;
       const kind = faint ? "faint" : `line s${at % COLOURS}${style}`;

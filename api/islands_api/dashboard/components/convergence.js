@@ -7,7 +7,7 @@ import { COLOURS, makeLineChart } from "./chart.js";
 import { makeIslandMap } from "./island_map.js";
 
 /** Maximum number of points kept; beyond it every other point is dropped. The chart has no more pixels. */
-const MAX_POINTS = 1000;
+const MAX_POINTS = 600;
 
 /** Seconds between two requests for the history without an event of the job. */
 const REFRESH_SECONDS = 600;

@@ -23,11 +23,11 @@ function makeError(error, x, y) {
   const [right, down] = [(x - SIZE / 2) / RING, y > SIZE / 2 ? 1 : -1];
   const text = formatNumber(error);
   if (Math.abs(right) < MIDDLE) {
-    const below = down > 0 ? NODE + 13 : -NODE - 5;
-    return svg("text", { class: "tick middle", x, y: y + below }, text);
+    const outwards = down > 0 ? NODE + 13 : -NODE - 5;
+    return svg("text", { class: "tick middle", x, y: y + outwards }, text);
   }
-  const beside = Math.sign(right) * (NODE + 5);
-  return svg("text", { class: right < 0 ? "tick end" : "tick", x: x + beside, y: y + 4 + 4 * down }, text);
+  const outwards = Math.sign(right) * (NODE + 5);
+  return svg("text", { class: right < 0 ? "tick end" : "tick", x: x + outwards, y: y + 4 + 4 * down }, text);
 }
 
 /** Make an arrow between two islands, bent so that both directions are visible. */
