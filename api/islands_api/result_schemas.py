@@ -70,6 +70,11 @@ class DiscrepancyResult(ResponseModel):
     verdict: str
     effects: tuple[FindingView, ...] = Field(description="The causes, then the properties of the noise.")
     gain: dict[str, Any] | None = Field(description="Errors before and after on held-out data.")
+    next_experiment: dict[str, Any] | None = Field(
+        default=None,
+        description="Pairs of causes that the record does not tell apart, with their separation, and the "
+        "input that separates them, with its limits.",
+    )
     candidates: tuple[dict[str, Any], ...] = Field(description="All screened effects, the best first.")
     calibrated: dict[str, float] = Field(description="Values of the parameters of the simulation.")
     record_findings: tuple[dict[str, Any], ...] = Field(default=(), description="Findings about the record.")

@@ -45,6 +45,7 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/extended"): "read",
     ("GET", "/v1/jobs/{job}/extended/export"): "read",
     ("GET", "/v1/jobs/{job}/outputs"): "read",
+    ("GET", "/v1/jobs/{job}/next-experiment"): "read",
     ("POST", "/v1/discrepancies"): "write",
     ("GET", "/v1/simulations"): "read",
     ("POST", "/v1/simulations/equations"): "read",

@@ -96,6 +96,7 @@ class BaseClient(Generic[H]):
     fmus = Endpoint(fmu_calls.fmus)
     describe_fmu = Endpoint(fmu_calls.describe_fmu)
     delete_fmu = Endpoint(fmu_calls.delete_fmu)
+    next_experiment = Endpoint(diagnosis_calls.next_experiment)
     job = Endpoint(calls.job)
     jobs = Endpoint(calls.jobs)
     datasets = Endpoint(calls.datasets)

@@ -109,6 +109,12 @@ def outputs(
     return RequestSpec("GET", path, read_as(DiagnosisOutputs), params=params)
 
 
+def next_experiment(which: JobRef) -> RequestSpec[str]:
+    """Return the input of the next experiment of a discrepancy job as CSV, with the time in seconds."""
+    path = f"/v1/jobs/{quote_id(which)}/next-experiment"
+    return RequestSpec("GET", path, lambda response: response.text)
+
+
 def simulations() -> RequestSpec[tuple[SimulationView, ...]]:
     """Return the simulations that `diagnose` accepts, with the parameters of the physical systems."""
     listed = read_as(SimulationList)

@@ -82,6 +82,9 @@ EXTENDED = "extended.json"
 #: Artefact of a discrepancy job with the measured and the simulated outputs.
 OUTPUTS = "outputs.npy"
 
+#: Artefact of a discrepancy job with the input of the next experiment.
+NEXT_EXPERIMENT = "next-experiment.csv"
+
 #: Kind of the event of a new name or new tags, the only one that is no step of the job.
 LABELLED = "labelled"
 

@@ -13,13 +13,13 @@ from islands.diagnosis.discovery.effect_shape import compare_shapes
 from islands.diagnosis.discovery.missing_terms import MISSING_TERM, MissingTerms, describe_terms
 from islands.diagnosis.findings import describe_gross_errors, describe_noise, list_record_findings
 from islands.diagnosis.gross_errors.explanation import GrossError
-from islands.diagnosis.inference.experiment_design import suggest_experiment
 from islands.diagnosis.inference.finding import Finding, describe_effects
 from islands.diagnosis.inference.holdout import HoldoutGain, bound_gain, compute_rmse, measure_gain
 from islands.diagnosis.inference.residual_structure import find_residual_structure
 from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects
 from islands.diagnosis.inference.strategies import SearchOutcome
 from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
+from islands.diagnosis.planning.next_experiment import design_next_experiment
 from islands.diagnosis.result import Candidate, Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 
@@ -43,7 +43,7 @@ def make_gross_diagnosis(
         candidates=(),
         gain=None,
         residual_structure={},
-        suggested_experiment="",
+        next_experiment=None,
         record=record,
         estimation_samples=target.fitted,
         base=base,
@@ -103,7 +103,7 @@ def extend_equations(
         effects=(*findings, *describe_noise(record.y[:fitted], residual, context)),
         gain=gain,
         residual_structure=structure,
-        suggested_experiment="",
+        next_experiment=None,
         best=fit,
         noise_floor=floor,
         discovery=terms.discovery,
@@ -163,7 +163,7 @@ def make_diagnosis(
         ),
         gain,
         outcome.residual_structure,
-        suggest_experiment(hypothesis.fit, equivalents),
+        design_next_experiment(record, hypothesis.fit, equivalents, target, run.parallel_map),
         record,
         fitted,
         base,

@@ -11,6 +11,7 @@ from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.diagnosis.inference.finding import Finding
 from islands.diagnosis.inference.holdout import HoldoutGain
 from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.effects.interface.context import Signal
 
 
@@ -48,8 +49,8 @@ class Diagnosis:
         Errors over the hold-out part; None if no effect was added to the simulation.
     residual_structure : mapping of str to float
         Maps in which the residual is not random, with their distance in standard deviations.
-    suggested_experiment : str
-        Experiment that discriminates between the named causes and their equivalents; empty if there is none.
+    next_experiment : NextExperiment or None
+        Experiment that separates the named causes from their equivalents; None if there are none.
     record : Dataset
         The record without the channels that were left out.
     estimation_samples : int
@@ -79,7 +80,7 @@ class Diagnosis:
     candidates: tuple[Candidate, ...]
     gain: HoldoutGain | None
     residual_structure: Mapping[str, float]
-    suggested_experiment: str
+    next_experiment: NextExperiment | None
     record: Dataset = field(repr=False)
     estimation_samples: int
     base: CalibrationResult = field(repr=False)

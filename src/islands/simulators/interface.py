@@ -118,6 +118,11 @@ class Simulator(ABC):
         return False
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether the output was recorded, and is known for the input of the record alone."""
+        return False
+
+    @property
     def is_batch(self) -> bool:
         """Whether several runs at once cost less than one by one."""
         return False
@@ -283,6 +288,11 @@ class SimulatorWrapper(Simulator):
     def fits_states(self) -> bool:
         """Whether the wrapped simulator fits states to the record."""
         return self.simulator.fits_states
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether the output of the wrapped simulator was recorded."""
+        return self.simulator.is_recorded
 
     @property
     def is_batch(self) -> bool:

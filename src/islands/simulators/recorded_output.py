@@ -36,6 +36,11 @@ class RecordedOutput(Simulator):
         """Name in reports."""
         return f"column {self.column}"
 
+    @property
+    def is_recorded(self) -> bool:
+        """Whether the output was recorded."""
+        return True
+
     def for_samples(self, first: int, last: int) -> "RecordedOutput":
         """Return the output of one recording."""
         return replace(self, simulated=np.asarray(self.simulated)[first:last])

@@ -22,7 +22,15 @@ from islands.reports.origin import REPORT_FILE
 from islands.simulators.specification.table import EXTENDED_FILE
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
-from islands_service.domain.job import BY_OWNER, DISCREPANCY, IDENTIFICATION, RUN_TIME, TERMINAL, JobState
+from islands_service.domain.job import (
+    BY_OWNER,
+    DISCREPANCY,
+    IDENTIFICATION,
+    NEXT_EXPERIMENT,
+    RUN_TIME,
+    TERMINAL,
+    JobState,
+)
 
 #: Largest number of islands that have a line each.
 _SHOWN_ISLANDS = 16
@@ -225,11 +233,13 @@ def download(client: Client, job: str, document: dict[str, Any], folder: Path) -
 def download_diagnosis(client: Client, job: str, document: dict[str, Any], folder: Path) -> None:
     """Write the result of a discrepancy job into a folder, as ``islands diagnose`` does."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in (EXTENDED_FILE, "discrepancy.json"):
+    for name in (EXTENDED_FILE, NEXT_EXPERIMENT, "discrepancy.json"):
         (folder / name).unlink(missing_ok=True)
     (folder / REPORT_FILE).write_bytes(client.report(job))
     if document["extended_model"] is not None:
         (folder / EXTENDED_FILE).write_bytes(client.extended(job))
+    if (document.get("next_experiment") or {}).get("input"):
+        (folder / NEXT_EXPERIMENT).write_text(client.next_experiment(job), encoding="utf-8")
     _write_document(document, folder / "discrepancy.json")
 
 
@@ -275,7 +285,8 @@ RESULTS: Mapping[str, DownloadFolder] = MappingProxyType(
         ),
         "verdict": DownloadFolder(
             "discrepancy.json",
-            "discrepancy.json, report.html, extended.json if an effect was named",
+            "discrepancy.json, report.html, extended.json if an effect was named, next-experiment.csv if an "
+            "input separates causes",
             download_diagnosis,
             lambda client, job, _: show_findings(client.job(job)),
         ),

@@ -4,6 +4,7 @@ import { getJobPath, getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
 import { showProblem } from "./banner.js";
 import { makeCauses } from "./diagnosing/causes.js";
+import { makeNextExperiment } from "./diagnosing/next_experiment.js";
 import { makeOutputsPlot } from "./diagnosing/outputs_plot.js";
 import { makeEquation, makeExportRow } from "./models.js";
 import { makeMonitorForm } from "./monitoring/monitor_form.js";
@@ -45,7 +46,9 @@ function makeExtendedEquation(job, signal) {
 async function showResult(job, figureHost, causesHost, signal) {
   const result = await getJson(`${getJobPath(job.id)}/result`, { signal });
   figureHost.replaceChildren(...[makeOutputsPlot(job, result, signal)].filter(Boolean));
-  causesHost.replaceChildren(...[makeCauses(result)].filter(Boolean));
+  causesHost.replaceChildren(
+    ...[makeNextExperiment(job, result, signal), makeCauses(result)].filter(Boolean),
+  );
 }
 
 /** Make the panels of the result: the headline and the figure, the causes, and the other sentences. */
@@ -54,7 +57,7 @@ export function makeFindingsPanels(job, signal) {
   const file = `extended-${job.id.slice(0, 8)}.json`;
   const [[verdict, ...headline], rest] = splitWords(summary);
   const isNamed = isDiagnosis(job) && summary.reduction_percent !== null;
-  const [figureHost, causesHost] = [el("div"), el("div")];
+  const [figureHost, causesHost] = [el("div"), el("div", { class: "stack" })];
   if (isDiagnosis(job))
     showResult(job, figureHost, causesHost, signal).catch((error) => signal.aborted || showProblem(error));
   const findings = el(

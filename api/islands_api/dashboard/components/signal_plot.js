@@ -42,7 +42,7 @@ function countSteps({ deltaMode, deltaY, ctrlKey }) {
 }
 
 /**
- * Make a plot of a record of `samples` rows; without `dt` its axis counts rows.
+ * Make a plot of a record of `samples` rows, named `label`; without `dt` its axis counts rows.
  *
  * `ask(query, names)` requests the rows `start` to `stop` of signals as at most `points` parts.
  * `show(panels)` selects the panels, each a list of lines `{name, unit, colour}` over one axis; a colour is a
@@ -51,9 +51,9 @@ function countSteps({ deltaMode, deltaY, ctrlKey }) {
  * `ranges.getRanges()` returns the marked ranges by name. With `ranges.set(name, rows)`, a drag moves their
  * edges, and `mark(name)` selects the range that a drag marks; null for a drag that moves the rows.
  */
-export function makeSignalPlot({ samples, dt, ask }, ranges, signal) {
+export function makeSignalPlot({ samples, dt, ask, label = "Record" }, ranges, signal) {
   const canvas = el("canvas", { "aria-hidden": "true" });
-  const plot = el("div", { class: "signals", tabindex: "0", role: "slider", "aria-label": "Record" }, canvas);
+  const plot = el("div", { class: "signals", tabindex: "0", role: "slider", "aria-label": label }, canvas);
   const position = el("p", { class: "position soft small" });
   let [panels, range, pointed] = [[], [0, samples], null];
   let [marks, marking, drag] = [[], null, null];

@@ -33,7 +33,7 @@ from islands_api.web.responses import JSONDocument
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import EXPORT_RESPONSES, ExportFormat, export_response
 from islands_service.domain.diagnosis_outputs import describe_outputs
-from islands_service.domain.job import DISCREPANCY, EXTENDED, OUTPUTS
+from islands_service.domain.job import DISCREPANCY, EXTENDED, NEXT_EXPERIMENT, OUTPUTS
 
 router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)
 
@@ -88,6 +88,38 @@ async def _read_extended(state: AppState, caller: Principal, job: str) -> bytes:
             f"job {job} has no extended simulation: its verdict is {document['verdict']}"
         )
     return await state.run_blocking(state.blobs.read, blob)
+
+
+@router.get(
+    JOBS_PATH + "/{job}/next-experiment",
+    response_class=Response,
+    responses={200: {"content": {"text/csv": {"schema": {"type": "string"}}}}},
+)
+async def next_experiment(job: Id, caller: Reader, state: AppStateDep) -> Response:
+    """Return the input of the experiment that separates causes which the record does not tell apart.
+
+    The columns are the time `t_s` in seconds, and the input under its name in the record, with the sampling
+    time of the record. `next_experiment` of the result has its limits, by how much it exceeds those of the
+    record, and the predicted separation of each pair of causes. 404 if there is no such input.
+    """
+    document = await get_result(state, await get_job_of_kind(state, caller, job, DISCREPANCY))
+    blob = await state.run_blocking(state.store.results.artefact, job, NEXT_EXPERIMENT)
+    if blob is None:
+        raise ResourceNotFoundError(
+            f"job {job} has no input of a next experiment: {_explain_absence(document)}"
+        )
+    data = await state.run_blocking(state.blobs.read, blob)
+    name = f"next-experiment-{job[:8]}.csv"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(data, media_type="text/csv; charset=utf-8", headers=headers)
+
+
+def _explain_absence(document: dict[str, Any]) -> str:
+    if "next_experiment" not in document:
+        return "an earlier version of islands has run it: submit it again"
+    if document["next_experiment"] is None:
+        return "the record tells its causes apart, or no cause was named"
+    return "see its decisive_experiment in /result"
 
 
 @router.get(

@@ -46,6 +46,7 @@ FILES = {
     "components/diagnosing/diagnosis_form.js": _SCRIPT,
     "components/diagnosing/equations_editor.js": _SCRIPT,
     "components/diagnosing/fmu_fields.js": _SCRIPT,
+    "components/diagnosing/next_experiment.js": _SCRIPT,
     "components/diagnosing/outputs_plot.js": _SCRIPT,
     "components/diagnosing/parameter_fields.js": _SCRIPT,
     "components/diagnosing/simulation_choice.js": _SCRIPT,

@@ -21,7 +21,7 @@ from islands_service.coordinator.diagnosis.progress import DiagnosisProgress
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.diagnosis_outputs import write_outputs
-from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, JobState
+from islands_service.domain.job import EXTENDED, NEXT_EXPERIMENT, OUTPUTS, REPORT, JobOutcome, JobState
 from islands_service.domain.job_spec import Discrepancy, parse_discrepancy
 from islands_service.intake.job_fmu import open_fmu
 from islands_service.intake.job_inputs import read_record_and_columns
@@ -104,9 +104,8 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         origin = Origin.from_seconds(names, run.job.created, run.job.owner, run.job.id)
         artefacts[REPORT] = _keep(found.write_report(origin), run.blobs, run.check)
         left_out.remove(REPORT)
-        artefacts[OUTPUTS] = _keep(_write_outputs(found), run.blobs, run.check)
-        if (extended := found.extended_document) is not None:
-            artefacts[EXTENDED] = _keep(extended.encode(), run.blobs, run.check)
+        for name, data in _list_artefacts(found).items():
+            artefacts[name] = _keep(data, run.blobs, run.check)
         ended = JobState.SUCCEEDED
     except JobCancelled:
         so_far = interim.make_diagnosis(spec.seed)
@@ -114,10 +113,9 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
             raise
         found = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent, left_out=left_out)
         ended = JobState.CANCELLED
-        if EXTENDED not in artefacts and (extended := found.extended_document) is not None:
-            artefacts[EXTENDED] = run.blobs.write(extended.encode())
-        if OUTPUTS not in artefacts:
-            artefacts[OUTPUTS] = run.blobs.write(_write_outputs(found))
+        for name, data in _list_artefacts(found).items():
+            if name not in artefacts:
+                artefacts[name] = run.blobs.write(data)
     summary = _make_summary(found, simulator.name, state.note)
     return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
 
@@ -148,8 +146,13 @@ def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
             return blob
 
 
-def _write_outputs(found: DiagnosisResult) -> bytes:
-    return write_outputs(found.record.y, found.simulated_outputs)
+def _list_artefacts(found: DiagnosisResult) -> dict[str, bytes]:
+    """Return the artefacts besides the report: the outputs, and what the diagnosis has of the others."""
+    texts = {EXTENDED: found.extended_document, NEXT_EXPERIMENT: found.next_input}
+    return {
+        OUTPUTS: write_outputs(found.record.y, found.simulated_outputs),
+        **{name: text.encode() for name, text in texts.items() if text is not None},
+    }
 
 
 def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[str, object]:

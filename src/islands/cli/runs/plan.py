@@ -69,7 +69,8 @@ class PlanOptions:
 _HELP = {
     "noise_std": "White noise of the output in its unit, for --plan; by default estimated, with its colour.",
     "separate": "CAUSE,CAUSE: two causes that --plan separates; by default all that it can.",
-    "excitation": "Input for --plan, if no record: multisine:LOW:HIGH, sine:FREQUENCY (Hz), steps:HOLD (s).",
+    "excitation": "Input for --plan, if no record: multisine:LOW:HIGH, sweep:LOW:HIGH, sine:FREQUENCY, "
+    "triangle:FREQUENCY (Hz), steps:HOLD (s).",
     "amplitude": "Half of the range of inputs for --plan; by default that of the given input.",
     "rate": "Largest rate of inputs for --plan, per second; by default that of the given input.",
     "duration": "Duration of the decisive experiment in seconds; by default that of the given input.",
@@ -143,7 +144,9 @@ def _make_described(
 
 
 def parse_excitation(text: str) -> PlannedInput:
-    """Read ``multisine:LOW:HIGH``, ``sine:FREQUENCY`` or ``steps:HOLD``.
+    """Read the text of an excitation, such as ``steps:HOLD``.
+
+    The others are ``multisine:LOW:HIGH``, ``sweep:LOW:HIGH``, ``sine:FREQUENCY`` and ``triangle:FREQUENCY``.
 
     Raises
     ------
@@ -157,17 +160,17 @@ def parse_excitation(text: str) -> PlannedInput:
         if min(numbers) <= 0.0:
             raise ValueError
         match form, numbers:
-            case InputForm.MULTISINE, (low, high):
+            case InputForm.MULTISINE | InputForm.SWEEP, (low, high):
                 return PlannedInput(form, 1.0, high, low)
-            case InputForm.SINE, (frequency,):
+            case InputForm.SINE | InputForm.TRIANGLE, (frequency,):
                 return PlannedInput(form, 1.0, frequency)
             case InputForm.STEPS, (hold,):
                 return PlannedInput(form, 1.0, 1.0 / hold)
     except ValueError:
         pass
     raise SettingsError(
-        f"--excitation {text}: write multisine:LOW:HIGH or sine:FREQUENCY in Hz, or steps:HOLD in s, with "
-        "positive numbers"
+        f"--excitation {text}: write multisine:LOW:HIGH, sweep:LOW:HIGH, sine:FREQUENCY or "
+        "triangle:FREQUENCY in Hz, or steps:HOLD in s, with positive numbers"
     )
 
 

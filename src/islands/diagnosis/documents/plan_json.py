@@ -73,7 +73,8 @@ def _finite(numbers: Iterable[float]) -> list[float | None]:
     return [number if isfinite(number) else None for number in numbers]
 
 
-def _describe_separation(separation: PairSeparation) -> dict[str, Any]:
+def describe_separation(separation: PairSeparation) -> dict[str, Any]:
+    """Return the separation of a pair of causes as a JSON document."""
     return {
         "distance": separation.distance,
         "required_distance": separation.required,
@@ -89,7 +90,7 @@ def _describe_alternative(each: AlternativeExperiment) -> dict[str, Any]:
         "amplitude": each.amplitude,
         "rate": each.rate,
         "duration_s": each.duration,
-        **_describe_separation(each.separation),
+        **describe_separation(each.separation),
     }
 
 
@@ -101,8 +102,8 @@ def _describe_decisive(decisive: DecisiveExperiment) -> dict[str, Any]:
         "pairs": [
             {
                 "causes": list(pair.names),
-                "given": _describe_separation(before),
-                "decisive": _describe_separation(after),
+                "given": describe_separation(before),
+                "decisive": describe_separation(after),
             }
             for pair, before, after in zip(decisive.pairs, decisive.before, decisive.after, strict=True)
         ],

@@ -8,9 +8,11 @@ import numpy as np
 
 from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
+from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.finding import Finding, list_free_forms
 from islands.diagnosis.inference.holdout import compute_rmse
+from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.diagnosis.result import Candidate, Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
 from islands.io.result_folder import record_document
@@ -44,7 +46,7 @@ def diagnosis_document(
         "effects": [_describe_finding(finding) for finding in diagnosis.effects],
         "shape": None if diagnosis.shape is None else _describe_shape(diagnosis.shape),
         "gain": None if diagnosis.gain is None else asdict(diagnosis.gain),
-        "decisive_experiment": diagnosis.suggested_experiment or None,
+        **_describe_experiment(diagnosis.next_experiment),
         "candidates": [_describe_candidate(each) for each in diagnosis.candidates],
         "remainder": dict(diagnosis.residual_structure),
         "proposal": None if proposal is None else asdict(proposal),
@@ -69,6 +71,15 @@ def diagnosis_document(
 def as_json(document: dict[str, Any]) -> str:
     """Return the text of ``discrepancy.json``."""
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def _describe_experiment(experiment: NextExperiment | None) -> dict[str, Any]:
+    if experiment is None:
+        return {"decisive_experiment": None, "next_experiment": None}
+    return {
+        "decisive_experiment": write_advice(experiment),
+        "next_experiment": describe_next_experiment(experiment),
+    }
 
 
 def _measure_output(diagnosis: Diagnosis) -> float:

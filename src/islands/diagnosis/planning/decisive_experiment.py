@@ -7,7 +7,12 @@ import numpy as np
 import scipy
 
 from islands.diagnosis.planning.experiment import Experiment
-from islands.diagnosis.planning.pair_separation import CausePair, PairSeparation, separate_pairs
+from islands.diagnosis.planning.pair_separation import (
+    CausePair,
+    PairSeparation,
+    rate_separations,
+    separate_pairs,
+)
 from islands.diagnosis.planning.planned_input import (
     MIN_REPEATS,
     MIN_SAMPLES,
@@ -117,17 +122,10 @@ def design_experiment(
     for excitation in candidates:
         u = excitation.make(limits, dt, samples)
         after = separate_pairs(experiment.with_input(u), pairs)
-        found.append((_rate_separations(after), excitation, u, after))
+        found.append((rate_separations(after), excitation, u, after))
     _, excitation, u, after = max(found, key=lambda each: each[0])
     description = excitation.describe(limits, experiment.context.input_unit)
     return DecisiveExperiment(description, u, dt, tuple(pairs), before, after)
-
-
-def _rate_separations(separations: Sequence[PairSeparation]) -> float:
-    """Return the sufficiency of a single pair, or the number of separated pairs with parts of the others."""
-    if len(separations) == 1:
-        return separations[0].sufficiency
-    return sum(min(each.sufficiency, 1.0) for each in separations)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,4 +149,4 @@ class _InputScore:
     def __call__(self, point: Signal) -> float:
         u = self.make_excitation(point).make(self.limits, self.experiment.context.dt, self.samples)
         changed = self.experiment.with_input(u)
-        return -_rate_separations(separate_pairs(changed, self.pairs, _ROUGH_EVALUATIONS))
+        return -rate_separations(separate_pairs(changed, self.pairs, _ROUGH_EVALUATIONS))

@@ -17,7 +17,6 @@ from islands.errors import RecordError, SettingsError
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
-from islands.simulators.recorded_output import RecordedOutput
 
 
 def make_experiment(
@@ -69,7 +68,7 @@ def _check(record: Dataset, simulator: Simulator, noise_std: float | None) -> No
         )
     if len(record.segments) > 1:
         raise RecordError(f"a plan is for one recording, and the record has {len(record.segments)}: give one")
-    if isinstance(simulator, RecordedOutput):
+    if simulator.is_recorded:
         raise SettingsError(
             "a recorded column cannot be simulated with other inputs: give a simulation that computes it"
         )

@@ -106,3 +106,10 @@ def separate_pairs(
     """Return how far an experiment separates each of several pairs."""
     dictionary = ResponseDictionary(experiment)
     return tuple(separate_pair(dictionary, pair, max_evaluations) for pair in pairs)
+
+
+def rate_separations(separations: Sequence[PairSeparation]) -> float:
+    """Return the sufficiency of a single pair, or the number of separated pairs with parts of the others."""
+    if len(separations) == 1:
+        return separations[0].sufficiency
+    return sum(min(each.sufficiency, 1.0) for each in separations)

@@ -1,4 +1,4 @@
-"""Inputs of experiments within limits of amplitude and rate: multisines, and steps with holds."""
+"""Inputs of experiments within limits of amplitude and rate, such as multisines and steps with holds."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,7 +8,7 @@ import numpy as np
 
 from islands.effects.interface.context import Signal
 from islands.errors import SettingsError
-from islands.systems.signals import multisine, sine
+from islands.systems.signals import multisine, sine, sweep, triangle
 
 #: Shortest period or hold, in samples.
 MIN_SAMPLES = 8
@@ -23,6 +23,8 @@ class InputForm(StrEnum):
     MULTISINE = "multisine"
     STEPS = "steps"
     SINE = "sine"
+    SWEEP = "sweep"
+    TRIANGLE = "triangle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +81,10 @@ class PlannedInput:
     share : float
         Amplitude as a fraction of that of the limits.
     frequency : float
-        In Hz: highest frequency of a multisine, frequency of a sine, or levels per second of steps.
+        In Hz: highest frequency of a multisine or a sweep, frequency of a sine or a triangle wave, or levels
+        per second of steps.
     lowest : float
-        Lowest frequency of a multisine in Hz; not used by other forms.
+        Lowest frequency of a multisine or a sweep in Hz; not used by other forms.
     seed : int
         Seed of phases or levels.
     """
@@ -102,6 +105,10 @@ class PlannedInput:
                 return f"random steps with holds of {1.0 / self.frequency:.3g} s, {size}"
             case InputForm.SINE:
                 return f"sine of {self.frequency:.3g} Hz, {size}"
+            case InputForm.SWEEP:
+                return f"sweep from {self.lowest:.3g} to {self.frequency:.3g} Hz, {size}"
+            case InputForm.TRIANGLE:
+                return f"triangle wave of {self.frequency:.3g} Hz, {size}"
 
     def make(self, limits: InputLimits, dt: float, samples: int) -> Signal:
         """Make the input; its amplitude is reduced if its rate would exceed the limit.
@@ -117,6 +124,10 @@ class PlannedInput:
                 wave = multisine(dt, duration, duration, band, self.seed, peak=amplitude)
             case InputForm.SINE:
                 wave = sine(dt, duration, amplitude, self.frequency)
+            case InputForm.SWEEP:
+                wave = sweep(dt, duration, amplitude, self.lowest, self.frequency)
+            case InputForm.TRIANGLE:
+                wave = triangle(dt, duration, amplitude, self.frequency)
             case InputForm.STEPS:
                 return limits.middle + self._make_steps(amplitude, limits.rate, dt, samples)
         reduced: Signal = limits.middle + wave * min(1.0, limits.rate / max(find_rate(wave, dt), 1e-300))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from islands.diagnosis.detectability import SelfTest
+from islands.diagnosis.documents.experiment_json import NEXT_EXPERIMENT_FILE
 from islands.diagnosis.documents.extension_json import extended_document, extended_json
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
@@ -16,6 +17,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
+from islands.io.records.writer import input_csv
 from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands.parallel import ParallelMap
 from islands.progress import Steps
@@ -79,6 +81,19 @@ class DiagnosisResult(Diagnosis):
         """Text of ``extended.json``, the extended simulation; None if no effect was added."""
         return None if self.gain is None else extended_json(self.best, self.record)
 
+    @property
+    def next_input(self) -> str | None:
+        """Text of ``next-experiment.csv``: time in seconds, and the input of the next experiment.
+
+        The column of the input has its name in the record, so that the new record is read with the same
+        options. None if there is no such input.
+        """
+        experiment = self.next_experiment
+        if experiment is None or experiment.input is None:
+            return None
+        designed = experiment.input
+        return input_csv(designed.u, designed.dt, designed.name)
+
     def write_report(self, origin: Origin, parallel_map: ParallelMap = map) -> bytes:
         """Return ``report.html``, with the name of the record: sentences, numbers and figures."""
         from islands.reports.diagnosis import diagnosis_report  # noqa: PLC0415 - many results have no report
@@ -93,7 +108,10 @@ class DiagnosisResult(Diagnosis):
         parallel_map: ParallelMap = map,
         day: date | None = None,
     ) -> Path:
-        """Write ``report.html``, ``extended.json`` if an effect was added, and, last, ``discrepancy.json``.
+        """Write ``report.html``, simulation and input that were found, and, last, ``discrepancy.json``.
+
+        ``extended.json`` is written if an effect was added, and ``next-experiment.csv`` if an input separates
+        causes that the record does not tell apart.
 
         Parameters
         ----------
@@ -111,12 +129,14 @@ class DiagnosisResult(Diagnosis):
         """
         folder, steps = Path(folder), steps or Steps()
         folder.mkdir(parents=True, exist_ok=True)
-        for file in (EXTENDED_FILE, DIAGNOSIS_FILE, REPORT_FILE):
+        for file in (EXTENDED_FILE, NEXT_EXPERIMENT_FILE, DIAGNOSIS_FILE, REPORT_FILE):
             (folder / file).unlink(missing_ok=True)
         if not steps.skip(REPORT_FILE):
             (folder / REPORT_FILE).write_bytes(self.write_report(Origin(name, day), parallel_map))
         if (extended := self.extended_document) is not None:
             (folder / EXTENDED_FILE).write_text(extended, encoding="utf-8")
+        if (next_input := self.next_input) is not None:
+            (folder / NEXT_EXPERIMENT_FILE).write_text(next_input, encoding="utf-8")
         complete = replace(self, left_out=(*self.left_out, *steps.left_out))
         (folder / DIAGNOSIS_FILE).write_text(as_json(complete.document), encoding="utf-8")
         return folder

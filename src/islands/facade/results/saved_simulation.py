@@ -141,6 +141,15 @@ class SavedDiagnosis:
         """Verdict, causes, gain and next experiment as sentences, which are those of the run."""
         return "\n".join(describe_diagnosis(self.document))
 
+    @property
+    def next_experiment(self) -> Mapping[str, Any] | None:
+        """Experiment that separates causes which the record does not tell apart; None if there are none.
+
+        Its ``input`` has limits, sampling time and name of ``file``, which is in the folder.
+        """
+        found: Mapping[str, Any] | None = self.document.get("next_experiment")
+        return found
+
     def __str__(self) -> str:
         return self.summary
 

@@ -3,6 +3,7 @@
 import csv
 import math
 from collections.abc import Iterable, Sequence
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,18 @@ def write_record(record: Dataset, path: str | Path) -> None:
 
 
 def write_input(u: NDArray[np.float64], dt: float, name: str, path: str | Path) -> None:
-    """Write an input as the columns ``t_s`` and its name, such as ``u_V``, which contains its unit.
+    """Write the text of `input_csv` to a file.
+
+    Raises
+    ------
+    RecordError
+        The file cannot be written.
+    """
+    _write_text(path, input_csv(u, dt, name))
+
+
+def input_csv(u: NDArray[np.float64], dt: float, name: str) -> str:
+    """Return an input as the columns ``t_s`` and its name, such as ``u_V``, which contains its unit.
 
     Parameters
     ----------
@@ -42,7 +54,7 @@ def write_input(u: NDArray[np.float64], dt: float, name: str, path: str | Path) 
         Sampling time in seconds.
     """
     times = _round_times(Dataset(u=u, y=np.zeros(u.size), dt=dt))
-    _write(path, ("t_s", name), zip(times, u.tolist(), strict=True))
+    return _format(("t_s", name), zip(times, u.tolist(), strict=True))
 
 
 def write_simulation(
@@ -93,10 +105,19 @@ def _round_times(record: Dataset) -> list[float]:
 
 
 def _write(path: str | Path, names: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
+    _write_text(path, _format(names, rows))
+
+
+def _format(names: Sequence[str], rows: Iterable[Sequence[float]]) -> str:
+    stream = StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def _write_text(path: str | Path, text: str) -> None:
     try:
-        with Path(path).open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(names)
-            writer.writerows(rows)
+        Path(path).write_text(text, encoding="utf-8", newline="")
     except OSError as error:
         raise RecordError(f"cannot write {path}: {error.strerror}") from error

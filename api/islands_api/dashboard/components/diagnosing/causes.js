@@ -49,12 +49,13 @@ function makeCauseTable(candidates, effects, most) {
 }
 
 /** Make the section of the causes of a result. */
-export function makeCauses({ candidates, effects, decisive_experiment: experiment }) {
+export function makeCauses({ candidates, effects, decisive_experiment: words, next_experiment: next }) {
   if (!candidates.length) return null;
   const most = Math.max(...candidates.map(({ score }) => score), 1e-9);
   const make = (part) => makeCauseTable(part, effects, most);
   const rest = candidates.slice(SHOWN);
-  const isUnsure = effects.some(({ equivalents }) => equivalents.length);
+  // Results of earlier versions have the experiment in words alone.
+  const isUnsure = next === undefined && effects.some(({ equivalents }) => equivalents.length);
   const about =
     "Each effect alone is added to the calibrated simulation. The score is the decrease of −2 log-likelihood "
     + "after a penalty on the parameters; only causes that passed all tests have a confidence.";
@@ -66,6 +67,6 @@ export function makeCauses({ candidates, effects, decisive_experiment: experimen
     make(candidates.slice(0, SHOWN)),
     rest.length > 0 &&
       el("details", { class: "rest" }, el("summary", {}, `${rest.length} further causes`), make(rest)),
-    isUnsure && makeFacts([["Experiment that separates them", experiment ?? "none was found"]]),
+    isUnsure && makeFacts([["Experiment that separates them", words ?? "none was found"]]),
   );
 }
