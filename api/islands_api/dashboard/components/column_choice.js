@@ -19,13 +19,16 @@ const findColumn = (name, names) => (names.includes(name) ? name : name.replace(
 /** Return the columns that are chosen at first: those of a request, or those that the service suggests. */
 function findChoice({ inputs = [], output = "" }, { columns, inspection }) {
   const names = columns.map(({ name }) => name);
-  const isKnown = names.includes(output) && inputs.every((each) => names.includes(findColumn(each, names)));
+  const outputs = [output].flat();
+  const isKnown = [...outputs, ...inputs.map((each) => findColumn(each, names))].every((each) =>
+    names.includes(each),
+  );
   return isKnown ? { inputs, output } : (inspection?.choice ?? { inputs: [], output: "" });
 }
 
 /**
  * Make the table of a preview. `initial` is a request whose columns are chosen; `onChange({inputs, output})`
- * is called at each change of the choice.
+ * is called at each change of the choice. A request of several outputs has several to choose from.
  */
 export function makeColumnChoice(preview, initial, onChange) {
   const { columns, time } = preview;
@@ -33,17 +36,31 @@ export function makeColumnChoice(preview, initial, onChange) {
   const names = columns.map(({ name }) => name);
   // The choice keeps the names of the request.
   const given = new Map(suggested.inputs.map((name) => [findColumn(name, names), name]));
+  const outputs = [suggested.output].flat();
+  const kind = outputs.length > 1 ? "checkbox" : "radio";
   const fields = columns
     .filter(({ name, problem }) => name !== time && !problem)
-    .map(({ name }) => ({ name, ...makeFields(name, given.has(name), suggested.output === name) }));
+    .map(({ name }) => ({ name, ...makeFields(name, given.has(name), outputs.includes(name), kind) }));
   const byName = new Map(fields.map((each) => [each.name, each]));
 
-  const listInputs = () => fields.filter(({ input }) => input.checked).map(({ name }) => name);
+  const inputOrder = suggested.inputs.map((name) => findColumn(name, names));
+  const listInputs = () => listChecked("input", inputOrder);
+  const listOutputs = () => listChecked("output", outputs);
 
-  const getChoice = () => ({
-    inputs: listInputs().map((name) => given.get(name) ?? name),
-    output: fields.find(({ output }) => output.checked)?.name ?? "",
-  });
+  /** List the chosen columns of a role: those of the request in its order, which the result depends on. */
+  function listChecked(role, order) {
+    const checked = fields.filter((each) => each[role].checked).map(({ name }) => name);
+    const rank = (name) => (order.includes(name) ? order.indexOf(name) : order.length);
+    return checked.sort((one, other) => rank(one) - rank(other));
+  }
+
+  function getChoice() {
+    const [first = "", ...others] = listOutputs();
+    return {
+      inputs: listInputs().map((name) => given.get(name) ?? name),
+      output: others.length ? [first, ...others] : first,
+    };
+  }
 
   /** A column has one role: the last one that was chosen. */
   function update({ target }) {
@@ -91,15 +108,15 @@ export function makeColumnChoice(preview, initial, onChange) {
     node: el("div", {}, [makeScrollable("Columns of the data set", table), others].filter(Boolean)),
     getChoice,
     /** Return the chosen columns as they are named in the file. */
-    listColumns: () => [...listInputs(), getChoice().output].filter(Boolean),
+    listColumns: () => [...listInputs(), ...listOutputs()],
   };
 }
 
-function makeFields(name, isInput, isOutput) {
+function makeFields(name, isInput, isOutput, kind) {
   const input = el("input", { type: "checkbox", value: name, "aria-label": `${name} is an input` });
-  const label = { "aria-label": `${name} is the output` };
-  const radio = el("input", { type: "radio", name: "output", value: name, ...label });
+  const label = { "aria-label": `${name} is ${kind === "radio" ? "the" : "an"} output` };
+  const output = el("input", { type: kind, name: "output", value: name, ...label });
   input.checked = isInput;
-  radio.checked = isOutput;
-  return { input, output: radio };
+  output.checked = isOutput;
+  return { input, output };
 }

@@ -36,8 +36,8 @@ export function makeCompareChoice(job, models) {
   );
 }
 
-/** Make the link to the form of the job's data set with its settings; nothing for other kinds of jobs. */
+/** Make the link to the form of the job's data set with its settings; nothing for the record of a monitor. */
 export const makeRunAgainLink = ({ id, kind, spec }) =>
-  kind === "identification" && typeof spec.output === "string"
+  kind === "identification" || kind === "discrepancy"
     ? el("a", { class: "button", href: `#/data/${spec.dataset}?job=${id}` }, "Run again with changes")
     : null;

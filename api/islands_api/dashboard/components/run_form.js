@@ -24,7 +24,7 @@ function listOptions(request, reading) {
   const held = typeof validation === "object" ? validation.rows : validation;
   return [
     ...inputs.flatMap((each) => ["--input", quote(each)]),
-    ...["--output", quote(output)],
+    ...[output].flat().flatMap((each) => ["--output", quote(each)]),
     ...(dt ? ["--dt", String(dt)] : []),
     ...(rows ? ["--rows", rows] : []),
     ...(held === undefined ? [] : ["--validation", String(held)]),
@@ -34,6 +34,8 @@ function listOptions(request, reading) {
     ...Object.entries({ ...reading, ...request.settings }).flatMap((each) => makeFlag(...each)),
   ];
 }
+
+const list = (names) => names.join(", ");
 
 /** Make the statement of the other recordings of the same request, each with a link. */
 const makeRecordings = (recordings) =>
@@ -94,7 +96,7 @@ export function makeRunForm({ id, name, preview }, initial, ranges, signal) {
       ...{ call: "submit", command: "submit" },
       options: listOptions(request, preview.reading),
     }),
-    explain: () => (hasColumns() ? `${choice.inputs.join(", ")} → ${choice.output}` : ABSENT),
+    explain: () => (hasColumns() ? [choice.inputs, [choice.output].flat()].map(list).join(" → ") : ABSENT),
     fields: (row) => [row, makeRecordings(initial.recordings ?? []), settings].filter(Boolean),
   });
   return {

@@ -93,7 +93,8 @@ function makeContent(dataset, initial, signal) {
   });
   plot = makeSignalPlot({ samples, dt: step, ask: askDataset(dataset.id, signal) }, ranges, signal);
   form = makeRunForm(dataset, initial, ranges, signal);
-  const diagnosis = makeDiagnosisForm(dataset, plot.getVisibleRows, showSimulated, signal);
+  const again = initial.diagnosis ?? {};
+  const diagnosis = makeDiagnosisForm(dataset, again, plot.getVisibleRows, showSimulated, signal);
   const choice = makeColumnChoice(preview, initial, update);
 
   function showSignals() {
@@ -160,8 +161,10 @@ function parseRequest(text) {
 async function loadInitial({ job, request, together }, signal) {
   if (request) return parseRequest(request);
   if (job) {
-    const { spec, name } = await getJson(getJobPath(job), { signal });
-    return { preset: "auto", ...spec, name };
+    const { kind, spec, name } = await getJson(getJobPath(job), { signal });
+    if (kind !== "discrepancy") return { preset: "auto", ...spec, name };
+    const { input, channels = [], output } = spec;
+    return { inputs: [input, ...channels], output, diagnosis: { ...spec, name } };
   }
   if (!together) return {};
   const others = together.split(",").map((each) => getJson(getDatasetPath(each), { signal }));

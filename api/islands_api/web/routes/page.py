@@ -95,6 +95,7 @@ FILES = {
     "lib/numbers.js": _SCRIPT,
     "lib/polling.js": _SCRIPT,
     "lib/scale.js": _SCRIPT,
+    "lib/toml.js": _SCRIPT,
     "pages/compare.js": _SCRIPT,
     "pages/data.js": _SCRIPT,
     "pages/dataset.js": _SCRIPT,

@@ -11,6 +11,8 @@ const ABSENT = "Choose the input of the simulation and the measured output in th
 /** Return the form of a request for other programs. */
 function describe({ input, output, channels = [], rows, tolerance = {} }, simulated) {
   const { simulation, argument, before } = simulated;
+  // No file has the simulation of an earlier job.
+  if (argument === null) return { call: "diagnose", command: "diagnose" };
   const options = [
     ...["--input", quote(input), "--output", quote(output)],
     ...channels.flatMap((each) => ["--channel", quote(each)]),
@@ -22,8 +24,9 @@ function describe({ input, output, channels = [], rows, tolerance = {} }, simula
 }
 
 /** Make the field of the rows of a diagnosis, and the button that takes those of a plot. */
-function makeRowsField(samples, getVisibleRows, onChange) {
-  const rows = el("input", { name: "rows", placeholder: "all", pattern: "\\d*:\\d*", maxlength: 40 });
+function makeRowsField(samples, initial, getVisibleRows, onChange) {
+  const rows = el("input", { name: "rows", placeholder: "all", pattern: "-?\\d*:-?\\d*", maxlength: 40 });
+  rows.value = initial ?? "";
   function takeVisible() {
     const [start, stop] = getVisibleRows();
     rows.value = start === 0 && stop === samples ? "" : `${start}:${stop}`;
@@ -37,11 +40,27 @@ function makeRowsField(samples, getVisibleRows, onChange) {
   };
 }
 
+/** Return the fields of a request that the form keeps as they are, and their description in words. */
+function keepFields({ dt, recordings = [], validation, seed }) {
+  const kept = { ...(dt && { dt }), ...(recordings.length && { recordings }) };
+  const words = [
+    dt && `a sampling time of ${dt} s`,
+    recordings.length && `${recordings.length} further recordings`,
+    validation && `the recording ${validation.dataset.slice(0, 8)} for validation`,
+    seed && `the seed ${seed}`,
+  ].filter(Boolean);
+  return [
+    { ...kept, ...(validation && { validation }), ...(seed && { seed }) },
+    words.length > 0 && el("p", { class: "soft small" }, `Kept from that diagnosis: ${words.join(", ")}.`),
+  ];
+}
+
 /**
- * Make the form of a data set; `show({inputs, output})` updates it. `getVisibleRows()` returns the rows of
- * the plot; `onSimulation` is called with the column of a recorded simulation, or null.
+ * Make the form of a data set; `initial` is the request of a job, or empty. `show({inputs, output})` updates
+ * it. `getVisibleRows()` returns the rows of the plot; `onSimulation` is called with the column of a recorded
+ * simulation, or null.
  */
-export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimulation, signal) {
+export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows, onSimulation, signal) {
   const usable = preview.columns.filter((column) => column.name !== preview.time && !column.problem);
   const units = Object.fromEntries(usable.map((column) => [column.name, column.unit]));
   const driver = el("select", { name: "input" });
@@ -50,14 +69,16 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
     { class: "fields", hidden: true },
     makeField("diagnose", "Driven by", driver, "The other inputs are channels, such as a temperature."),
   );
-  const rows = makeRowsField(preview.samples, getVisibleRows, update);
+  const rows = makeRowsField(preview.samples, initial.rows, getVisibleRows, update);
+  const [kept, keptWords] = keepFields(initial);
   const host = el("div", {}, el("p", { class: "loading" }, "Loading…"));
+  const isAgain = Boolean(initial.simulation);
   let [choice, simulated, column] = [{ inputs: [], output: "" }, null, null];
 
   function makeRequest() {
     const { inputs, output } = choice;
     const found = simulated?.read();
-    if (!inputs.length || output === "" || !found) return null;
+    if (!inputs.length || output === "" || typeof output !== "string" || !found) return null;
     const channels = inputs.filter((each) => each !== driver.value);
     const { simulation, tolerance = {} } = found;
     return {
@@ -67,13 +88,14 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
       ...(channels.length && { channels }),
       simulation,
       ...(Object.keys(tolerance).length && { tolerance }),
-      name,
+      name: initial.name ?? name,
       ...(rows.get() && { rows: rows.get() }),
+      ...kept,
     };
   }
 
   function explain(request) {
-    if (!choice.inputs.length || choice.output === "") return ABSENT;
+    if (!choice.inputs.length || typeof choice.output !== "string" || choice.output === "") return ABSENT;
     if (request === null) return "Complete the simulation.";
     return `${request.output} against the simulation of ${request.input}`;
   }
@@ -99,7 +121,7 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
     try {
       if (simulated === null) {
         const { items } = await getJson("v1/simulations", { signal });
-        simulated = makeSimulationChoice(items, update, signal);
+        simulated = makeSimulationChoice(items, initial, update, signal);
         host.replaceChildren(simulated.node);
       }
     } catch (error) {
@@ -118,24 +140,30 @@ export function makeDiagnosisForm({ id, name, preview }, getVisibleRows, onSimul
     fields: (row) => [
       driverField,
       host,
-      el("details", {}, el("summary", {}, "Rows"), el("div", { class: "fields" }, rows.nodes)),
+      keptWords,
+      el(
+        "details",
+        { open: Boolean(initial.rows) },
+        el("summary", {}, "Rows"),
+        el("div", { class: "fields" }, rows.nodes),
+      ),
       row,
       calibrated.node,
-    ],
+    ].filter(Boolean),
   });
   form.node.addEventListener("input", update);
   driver.addEventListener("change", setRecord);
   const title = el("summary", {}, el("h2", {}, "Diagnose a simulation"));
   const purpose = "What does a simulation of this output lack? Its error is split into named causes.";
-  const details = el("details", { class: "card" }, title, el("p", { class: "soft" }, purpose));
+  const details = el("details", { class: "card", open: isAgain }, title, el("p", { class: "soft" }, purpose));
   details.addEventListener("toggle", open);
   return {
     node: details,
     show(newChoice) {
       choice = newChoice;
-      const kept = driver.value;
+      const chosen = driver.value || initial.input;
       driver.replaceChildren(...choice.inputs.map((each) => el("option", { value: each }, each)));
-      if (choice.inputs.includes(kept)) driver.value = kept;
+      if (choice.inputs.includes(chosen)) driver.value = chosen;
       driverField.hidden = choice.inputs.length < 2;
       setRecord();
     },

@@ -2,6 +2,7 @@
 
 import { postJson } from "../../lib/api.js";
 import { el, setText } from "../../lib/dom.js";
+import { writeToml } from "../../lib/toml.js";
 import { makeField } from "../job_request.js";
 import { makeParameterFields } from "./parameter_fields.js";
 
@@ -35,7 +36,7 @@ export function makeEquationsEditor(templates, onChange, signal) {
   );
   const message = el("p", { class: "check", role: "status" });
   const parametersHost = el("div");
-  let [checked, fields, timer] = [null, null, null];
+  let [checked, fields, timer, given] = [null, null, null, {}];
 
   function show(simulation, words) {
     checked = simulation;
@@ -48,6 +49,7 @@ export function makeEquationsEditor(templates, onChange, signal) {
     );
     const described = parameters.map(([name, { value, unit = "" }]) => ({ name, unit, default: value }));
     fields = makeParameterFields(described, { hasValues: false, units: ["", ""] });
+    fields.fill(given);
     parametersHost.replaceChildren(...(described.length ? [fields.node] : []));
     onChange();
   }
@@ -90,6 +92,12 @@ export function makeEquationsEditor(templates, onChange, signal) {
   );
   return {
     node,
+    /** Write the simulation of a request as a text, with its tolerances. */
+    fill({ simulation: { kind: _, ...system }, tolerance }) {
+      given = { tolerance };
+      text.value = writeToml(system);
+      plan(0);
+    },
     open: () => text.value || takeTemplate(),
     read: () =>
       checked && {

@@ -9,10 +9,17 @@ function readNumbers(fields, divisor) {
   return Object.fromEntries(given.map(([name, field]) => [name, Number(field.value) / divisor]));
 }
 
+/** Set fields to given numbers, in units of `1 / factor`. */
+function writeNumbers(fields, given, factor) {
+  for (const [name, field] of fields)
+    // Without the rounding error of the factor.
+    if (given[name] !== undefined) field.value = Number((given[name] * factor).toPrecision(15));
+}
+
 /**
  * Make the table of parameters `{name, unit, default}`; null is the default of one that is estimated. Without
  * `hasValues`, the values are those of a text. With `chosen`, a check box selects the parameters that are
- * calibrated, at first these names. `read()` returns `{parameters, tolerance, chosen}`.
+ * calibrated, at first these names. `read()` returns `{parameters, tolerance, chosen}`; `fill` sets the first two.
  */
 export function makeParameterFields(parameters, { hasValues, units: [input, output], chosen = null }) {
   const [values, tolerances, boxes] = [[], [], []];
@@ -43,6 +50,10 @@ export function makeParameterFields(parameters, { hasValues, units: [input, outp
   table.classList.add("parameters");
   return {
     node: makeScrollable("Parameters of the simulation", table),
+    fill({ parameters = {}, tolerance = {} }) {
+      writeNumbers(values, parameters, 1);
+      writeNumbers(tolerances, tolerance, 100);
+    },
     read: () => ({
       parameters: readNumbers(values, 1),
       tolerance: readNumbers(tolerances, 100),

@@ -27,6 +27,9 @@ function makeColumnFields(columns) {
     : "The file has no column besides the chosen ones.";
   return {
     node: el("div", { class: "fields" }, makeField(FORM, "Column", column, hint)),
+    fill({ simulation }) {
+      if (columns.includes(simulation.column)) column.value = simulation.column;
+    },
     read: () =>
       column.value && { simulation: { kind: "column", column: column.value }, argument: column.value },
   };
@@ -37,6 +40,7 @@ function makePhysicalFields({ kind, parameters }, units) {
   const file = `${kind}.json`;
   return {
     node: fields.node,
+    fill: ({ simulation, tolerance }) => fields.fill({ ...simulation, tolerance }),
     read() {
       const { parameters: given, tolerance } = fields.read();
       if (!Object.keys(given).length) return { simulation: { kind }, tolerance };
@@ -47,6 +51,7 @@ function makePhysicalFields({ kind, parameters }, units) {
 }
 
 function makeLinearFields() {
+  let given = {};
   const makeNumber = (name, value, max) => el("input", { name, type: "number", min: 0, max, step: 1, value });
   const [order, delay] = [makeNumber("order", 2, 10), makeNumber("delay", 0, 1000)];
   return {
@@ -56,9 +61,13 @@ function makeLinearFields() {
       makeField(FORM, "Order", order, "Number of poles, and of zeros. All coefficients are estimated."),
       makeField(FORM, "Delay", delay, "Samples by which the input acts late."),
     ),
+    fill({ simulation }) {
+      given = simulation;
+      [order.value, delay.value] = [simulation.order, simulation.delay ?? 0];
+    },
     read: () =>
       order.value !== "" && {
-        simulation: { kind: "linear", order: Number(order.value), delay: Number(delay.value) },
+        simulation: { ...given, kind: "linear", order: Number(order.value), delay: Number(delay.value) },
         argument: `${order.value}:${delay.value || 0}`,
       },
   };
@@ -71,10 +80,10 @@ function makeModelFields(onChange, signal) {
   const node = el("div", { class: "fields" }, fields);
   const message = el("p", { class: "soft", role: "status" }, "Loading…");
   node.append(el("span"), message);
-  let [path, model] = ["", null];
+  let [path, model, given] = ["", null, null];
 
   async function load() {
-    [path, model] = [jobs.value, null];
+    [path, model] = [jobs.value, jobs.value ? null : given];
     onChange();
     if (!path) return;
     const found = await getJson(`${path}/export?format=json`, { signal });
@@ -91,6 +100,7 @@ function makeModelFields(onChange, signal) {
       const text = `${name || id.slice(0, 8)}: ${summary.equation}`;
       return el("option", { value: `v1/jobs/${id}/models/${summary.rank}` }, text);
     });
+    if (given) options.unshift(el("option", { value: "" }, "The model of that diagnosis"));
     jobs.replaceChildren(...options);
     setText(message, options.length ? "" : "No job has identified a model of one output yet.");
     await load();
@@ -99,25 +109,54 @@ function makeModelFields(onChange, signal) {
   return {
     node,
     open: () => open().catch((error) => signal.aborted || setText(message, error.message)),
-    read: () =>
-      model && {
+    fill({ simulation }) {
+      given = simulation;
+    },
+    read() {
+      if (model && model === given) return { simulation: given, argument: null };
+      return model && {
         simulation: { kind: "model", model, name: "model.json" },
         argument: "model.json",
         before: [`curl '${getServiceUrl()}/${path}/export?format=json' -o model.json`],
-      },
+      };
+    },
   };
 }
 
-/**
- * Make the choice from the listed simulations. `setRecord({columns, units})` states what could be a recorded
- * simulation, and the units of input and output. `read()` returns the simulation, the tolerance and the parts
- * of its command, or a false value if it is incomplete; `onChange()` is called at every change.
- */
-export function makeSimulationChoice(simulations, onChange, signal) {
+/** Make the fields of a simulation of a request that the form cannot change. */
+function makeKeptFields() {
+  let given = null;
+  return {
+    node: el("p", { class: "soft" }, "The simulation of that diagnosis, unchanged."),
+    fill({ simulation }) {
+      given = simulation;
+    },
+    read: () => ({ simulation: given, argument: null }),
+  };
+}
+
+/** Return the listed simulations by kind, with that of a request. */
+function listKinds(simulations, given) {
   const byKind = new Map(simulations.map((each) => [each.kind, each]));
+  if (given && !byKind.has(given.kind))
+    byKind.set(given.kind, { kind: given.kind, summary: "Not listed", parameters: [], estimated: "" });
+  return byKind;
+}
+
+/**
+ * Make the choice from the listed simulations; `initial` has the simulation and the tolerance of a request.
+ *
+ * `setRecord({columns, units})` states the columns that may be a recorded simulation, and the units of input
+ * and output. `read()` returns the simulation, the tolerance and the parts of its command, or a false value if
+ * the choice is incomplete; `onChange()` is called at every change.
+ */
+export function makeSimulationChoice(simulations, initial, onChange, signal) {
+  const byKind = listKinds(simulations, initial.simulation);
   // A recorded simulation is drawn over the measured output before anything runs.
   const kinds = [...byKind.keys()].sort((a, b) => (b === "column") - (a === "column"));
   const kind = makeSelect("simulation", kinds.map((each) => [each, LABELS[each] ?? each]));
+  const chosen = initial.simulation?.kind;
+  if (chosen) kind.value = chosen;
   let record = { columns: [], units: ["", ""] };
   const templates = simulations.filter(({ equations }) => equations);
   const makers = {
@@ -132,8 +171,14 @@ export function makeSimulationChoice(simulations, onChange, signal) {
   const summary = el("p", { class: "soft small" });
 
   function getFields() {
-    const make = makers[kind.value] ?? (() => makePhysicalFields(byKind.get(kind.value), record.units));
-    if (!made.has(kind.value)) made.set(kind.value, make());
+    const listed = byKind.get(kind.value);
+    // The fields of an FMU have values only after it is read.
+    const isKept = !simulations.includes(listed) || (kind.value === "fmu" && kind.value === chosen);
+    const make = makers[kind.value] ?? (() => makePhysicalFields(listed, record.units));
+    if (!made.has(kind.value)) {
+      made.set(kind.value, isKept ? makeKeptFields() : make());
+      if (kind.value === chosen) made.get(kind.value).fill(initial);
+    }
     return made.get(kind.value);
   }
 
@@ -148,12 +193,18 @@ export function makeSimulationChoice(simulations, onChange, signal) {
     onChange();
   }
 
+  /** Return the simulation; fields without tolerances keep those of the request. */
+  function read() {
+    const found = getFields().read();
+    return found && kind.value === chosen ? { tolerance: initial.tolerance, ...found } : found;
+  }
+
   /** Replace only the fields that depend on the change: a text or values may have been entered. */
   function setRecord(newRecord) {
     const hasChanged = (part) => String(record[part]) !== String(newRecord[part]);
     const [columns, units] = [hasChanged("columns"), hasChanged("units")];
     record = newRecord;
-    if (!made.size && !record.columns.length) kind.value = kinds.find((each) => each !== "column");
+    if (!made.size && !chosen && !record.columns.length) kind.value = kinds.find((each) => each !== "column");
     for (const each of kinds)
       if ((each === "column" && columns) || (byKind.get(each).parameters.length && units)) made.delete(each);
     if (!made.has(kind.value)) show();
@@ -168,5 +219,5 @@ export function makeSimulationChoice(simulations, onChange, signal) {
     summary,
     host,
   );
-  return { node, setRecord, read: () => getFields().read() };
+  return { node, setRecord, read };
 }

@@ -1,0 +1,135 @@
+"""A job is run again with changes: the form has the settings of the job, and asks for the same if none changes."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from support.command_line import write_offset
+from support.repository import ROOT
+from support.screen import Screen
+from support.service_processes import Service
+
+pytestmark = pytest.mark.ci
+
+MODEL = {
+    "schema": "islands.model/1",
+    "inputs": ["u_V"],
+    "output": "y_um",
+    "terms": [{"regressor": "y(k-1)", "parameter": 0.8}, {"regressor": "u(k-1)", "parameter": 0.15}],
+}
+
+EXTENDED = {
+    "kind": "extended",
+    "schema": "islands.extended/1",
+    "inputs": ["u_V"],
+    "output": "y_um",
+    "core": {"kind": "linear", "order": 0, "numerator": [2.0]},
+    "effects": [{"name": "dead-zone", "parameters": {"d": {"value": 0.25}}}],
+    "scales": {
+        **{"dt": 0.01, "input_peak": 2.0, "output_peak": 5.0, "fitted_s": 4.5, "duration_s": 6.0},
+        "frame": {
+            **{"unit": "V", "peak": 1, "rate": 1, "force_unit": "um"},
+            **{"force": 1, "sense": 1, "dissipates": True, "sharp": 1},
+        },
+    },
+}
+
+#: Requests besides data set, input and output.
+REQUESTS: Mapping[str, dict[str, Any]] = {
+    "column": {"simulation": {"kind": "column", "column": "theirs_um"}, "rows": "20:380"},
+    "second-order": {
+        "simulation": {"kind": "second-order", "parameters": {"m": 2.5}},
+        "tolerance": {"m": 0.07},
+        "seed": 3,
+        "dt": 0.01,
+    },
+    "linear": {"simulation": {"kind": "linear", "order": 3, "delay": 2}},
+    "model": {"simulation": {"kind": "model", "model": MODEL, "name": "mine"}},
+    "extended": {"simulation": EXTENDED},
+}
+
+
+@pytest.fixture(scope="module")
+def dataset(desk: Service, tmp_path_factory: pytest.TempPathFactory) -> str:
+    file = write_offset(tmp_path_factory.mktemp("data") / "offset.csv")
+    answer = desk.ask("POST", "/v1/datasets", files={"file": ("offset.csv", file.read_bytes())})
+    return str(answer.json()["id"])
+
+
+def start(desk: Service, path: str, request: Mapping[str, Any]) -> dict[str, Any]:
+    answer = desk.ask("POST", path, json=dict(request))
+    assert answer.status_code == 202, answer.text
+    job = answer.json()
+    desk.ask("POST", f"/v1/jobs/{job['id']}/cancel")
+    return dict(job)
+
+
+def open_again(screen: Screen, job: Mapping[str, Any]) -> Any:
+    page = screen.go(f"#/jobs/{job['id']}")
+    page.get_by_role("link", name="Run again with changes").click()
+    return page
+
+
+def submit(page: Any, desk: Service, button: str) -> dict[str, Any]:
+    """Start the job of a form; return it. It is cancelled."""
+    page.get_by_role("button", name=button, exact=True).click()
+    page.wait_for_url("**/#/jobs/*")
+    job = desk.job(page.url.rpartition("/")[2])
+    desk.ask("POST", f"/v1/jobs/{job['id']}/cancel")
+    return job
+
+
+@pytest.mark.parametrize("kind", REQUESTS)
+def test_a_diagnosis_is_run_again_with_all_of_its_settings(
+    quiet: Callable[..., Screen], desk: Service, dataset: str, kind: str
+) -> None:
+    order = {"dataset": dataset, "input": "u_V", "output": "y_um", "name": "first", **REQUESTS[kind]}
+    job = start(desk, "/v1/discrepancies", order)
+    page = open_again(quiet(desk.url), job)
+    again = submit(page, desk, "Diagnose")
+    assert (again["spec"], again["name"]) == (job["spec"], "first")
+
+
+def test_the_equations_of_a_diagnosis_are_edited_again(
+    screens: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+) -> None:
+    text = (ROOT / "examples" / "simulations" / "dc-motor.toml").read_text()
+    simulation = desk.ask("POST", "/v1/simulations/equations", json={"text": text}).json()
+    order = {"dataset": dataset, "input": "u_V", "output": "y_um", "tolerance": {"b": 0.2}}
+    job = start(desk, "/v1/discrepancies", {**order, "simulation": simulation})
+    page = open_again(screens(desk.url), job)
+    expect(page.locator(".check")).to_contain_text("Valid. States: i, omega, phi.")
+    expect(page.get_by_label("Tolerance of b in per cent")).to_have_value("20")
+    field = page.get_by_label("Equations", exact=True)
+    assert "di/dt = (u - R*i - K*omega)/L" in field.input_value()
+    assert submit(page, desk, "Diagnose")["spec"] == job["spec"]
+
+
+def test_a_changed_setting_is_the_only_difference(
+    quiet: Callable[..., Screen], desk: Service, dataset: str
+) -> None:
+    order = {"dataset": dataset, "input": "theirs_um", "channels": ["u_V"], "output": "y_um"}
+    job = start(desk, "/v1/discrepancies", {**order, **REQUESTS["second-order"]})
+    page = open_again(quiet(desk.url), job)
+    page.get_by_label("Value of m").fill("4")
+    changed = {"kind": "second-order", "parameters": {"m": 4.0}}
+    assert submit(page, desk, "Diagnose")["spec"] == {**job["spec"], "simulation": changed}
+
+
+def test_a_model_of_several_outputs_is_identified_again(
+    quiet: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+) -> None:
+    settings = {"generations": 7, "shifts": [1, 2]}
+    order = {"dataset": dataset, "inputs": ["u_V"], "output": ["y_um", "theirs_um"], "rows": "20:380"}
+    job = start(desk, "/v1/jobs", {**order, "preset": "hysteresis", "settings": settings, "seed": 5})
+    page = open_again(quiet(desk.url), job)
+    expect(page.get_by_label("theirs_um is an output")).to_be_checked()
+    expect(page.get_by_label("generations", exact=True)).to_have_value("7")
+    again = submit(page, desk, "Identify")
+    assert again["spec"] == job["spec"]
+    page.get_by_role("link", name="Run again with changes").click()
+    page.get_by_label("generations", exact=True).fill("9")
+    page.get_by_label("theirs_um is an output").uncheck()
+    changed = {**job["spec"], "output": "y_um", "settings": {**settings, "generations": 9}}
+    assert submit(page, desk, "Identify")["spec"] == changed
