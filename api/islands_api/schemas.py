@@ -212,7 +212,8 @@ class JobView(ResponseModel):
     spec: dict[str, Any]
     progress: dict[str, Any] | None = Field(
         default=None,
-        description="Phase, estimated position in the queue, and the quota that the job waits for.",
+        description="Phase, estimated position in the queue, seconds until the start (`seconds_to_start`) if "
+        "they can be estimated, and the quota that the job waits for.",
     )
     summary: dict[str, Any] | None = Field(default=None, description="Summary of the result.")
     problem: dict[str, Any] | None = Field(default=None, description="Why the job failed.")
@@ -339,3 +340,10 @@ class Health(ResponseModel):
     """State of the service."""
 
     status: str
+
+
+class CallerView(ResponseModel):
+    """Owner and scopes of a key or a token."""
+
+    owner: str = Field(description="Owner of the jobs and data sets that the caller reaches.")
+    scopes: tuple[str, ...] = Field(examples=[["read", "write"]])

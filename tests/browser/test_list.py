@@ -1,5 +1,6 @@
 """List of jobs on the dashboard."""
 
+import re
 import time
 from collections.abc import Callable
 from typing import Any
@@ -76,6 +77,24 @@ def test_a_queued_job_shows_its_place_among_all_jobs(
         urgent = desk.submit(500, priority=5)
         expect(row(page, urgent)).to_contain_text("waiting, number 1")
         expect(row(page, second)).to_contain_text("waiting, number 3")
+
+
+def test_a_queued_job_shows_when_it_starts_if_running_jobs_have_a_time_left(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    with stored(desk) as store:
+        running = desk.submit(500)
+        lease = taken(store, running)
+        # Jobs of other tests that still run are finished in an unknown time.
+        store.leases.report(lease, ProgressReport({"phase": "search", "seconds_left": 3900.0}))
+        job, later = desk.submit(500), desk.submit(500)
+        page = quiet(desk.url).go()
+        expect(row(page, job)).to_contain_text(re.compile(r"waiting, number 1, starts in about 1 h \d+ min"))
+        expect(row(page, later)).to_contain_text("waiting, number 2")
+        assert "starts in" not in row(page, later).text_content()
+        store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
+        for each in (job, later):
+            store.leases.finish(taken(store, each), JobOutcome(JobState.CANCELLED))
 
 
 def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(

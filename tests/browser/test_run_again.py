@@ -1,4 +1,4 @@
-"""A job is run again with changes: the form has the settings of the job, and asks for the same if none changes."""
+"""A job is run again with changes: the form has its settings, and asks for the same if none changes."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -27,10 +27,20 @@ EXTENDED = {
     "core": {"kind": "linear", "order": 0, "numerator": [2.0]},
     "effects": [{"name": "dead-zone", "parameters": {"d": {"value": 0.25}}}],
     "scales": {
-        **{"dt": 0.01, "input_peak": 2.0, "output_peak": 5.0, "fitted_s": 4.5, "duration_s": 6.0},
+        "dt": 0.01,
+        "input_peak": 2.0,
+        "output_peak": 5.0,
+        "fitted_s": 4.5,
+        "duration_s": 6.0,
         "frame": {
-            **{"unit": "V", "peak": 1, "rate": 1, "force_unit": "um"},
-            **{"force": 1, "sense": 1, "dissipates": True, "sharp": 1},
+            "unit": "V",
+            "peak": 1,
+            "rate": 1,
+            "force_unit": "um",
+            "force": 1,
+            "sense": 1,
+            "dissipates": True,
+            "sharp": 1,
         },
     },
 }

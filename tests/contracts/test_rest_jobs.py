@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from islands_api import Client
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import JobState, ProgressReport, Submission
+from islands_service.store.tenants.keys import SCOPES
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
 
@@ -349,3 +351,35 @@ def test_cached_figures_vary_with_the_key(service):
     headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers
     assert headers["cache-control"] == "private, max-age=86400, immutable"
     assert headers["vary"] == "Authorization, Accept-Encoding"
+
+
+def test_a_queued_job_starts_when_as_many_running_jobs_have_ended_as_its_position_says(
+    service, order, monkeypatch
+):
+    monkeypatch.setattr("islands_api.web.responses._PLACE_SECONDS", 0.0)
+
+    def read(job):
+        return service.client.get(f"/v1/jobs/{job}").json()["progress"]
+
+    running = [service.submit(**order).json()["id"] for _ in range(2)]
+    leases = [claimed(service.store) for _ in running]
+    first, second, third = (service.submit(**order).json()["id"] for _ in range(3))
+    # Nothing is known about the running jobs.
+    assert "seconds_to_start" not in read(first)
+    service.store.leases.report(leases[0], ProgressReport({"phase": "search", "seconds_left": 300.0}))
+    assert read(first)["seconds_to_start"] == pytest.approx(300.0, abs=20.0)
+    # One known end lets only one job start.
+    assert "seconds_to_start" not in read(second)
+    service.store.leases.report(leases[1], ProgressReport({"phase": "search", "seconds_left": 100.0}))
+    starts = [read(job).get("seconds_to_start") for job in (first, second, third)]
+    assert starts[:2] == [pytest.approx(100.0, abs=20.0), pytest.approx(300.0, abs=20.0)]
+    # The duration of a queued job is unknown.
+    assert starts[2] is None
+    service.store.owners.change(LOCAL_OWNER, {"max_running": 2})
+    assert read(first).keys() == {"phase", "position", "note"}
+
+
+def test_a_caller_knows_its_owner_and_its_scopes(service):
+    with Client(str(service.client.base_url)) as client:
+        found = client.caller()
+    assert (found.owner, set(found.scopes)) == (LOCAL_OWNER, set(SCOPES))

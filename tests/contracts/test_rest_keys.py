@@ -80,6 +80,7 @@ GUARDED = {
     ("GET", "/v1/monitors/{monitor}/records"): "read",
     ("POST", "/v1/monitors/{monitor}/records"): "write",
     ("DELETE", "/v1/monitors/{monitor}"): "write",
+    ("GET", "/v1/caller"): "read",
     ("GET", "/v1/admin/jobs"): "admin",
     ("POST", "/v1/admin/jobs/{job}/cancel"): "admin",
 }

@@ -1,8 +1,13 @@
-"""Calls of administrators: the jobs of all owners. The key needs the scope ``admin``."""
+"""Calls about owners: that of the caller, and, with the scope ``admin``, the jobs of all owners."""
 
 from islands_api.client.calls import JobRef, RequestSpec, quote_id
 from islands_api.client.response_parsing import read_as
-from islands_api.schemas import OwnedJobPage, OwnedJobView
+from islands_api.schemas import CallerView, OwnedJobPage, OwnedJobView
+
+
+def caller() -> RequestSpec[CallerView]:
+    """Return the owner and the scopes of the key of this client."""
+    return RequestSpec("GET", "/v1/caller", read_as(CallerView))
 
 
 def admin_jobs(

@@ -126,6 +126,7 @@ class BaseClient(Generic[H]):
     webhooks = Endpoint(webhook_calls.webhooks)
     delete_webhook = Endpoint(webhook_calls.delete_webhook)
     deliveries = Endpoint(webhook_calls.deliveries)
+    caller = Endpoint(admin_calls.caller)
     admin_jobs = Endpoint(admin_calls.admin_jobs)
     admin_cancel = Endpoint(admin_calls.admin_cancel)
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
-from islands.progress import TimeLeft
-from islands_service.domain.job import TERMINAL, WAITING_PHASE, Job, JobState
+from islands_service.domain.job import TERMINAL, WAITING_PHASE, Job, JobState, find_seconds_left
 from islands_service.domain.monitoring import Monitor
 from islands_service.domain.owner import Owner
 from islands_service.domain.webhook import Delivery, Webhook
@@ -40,7 +39,9 @@ def job_document(job: Job, max_run_seconds: int, place: QueuePlace | None = None
     """
     progress = _select_progress(job)
     if progress is not None and place is not None:
-        progress |= {"position": place.position, **({"note": place.note} if place.note else {})}
+        known = {"note": place.note or None, "seconds_to_start": place.seconds_to_start}
+        progress |= {"position": place.position}
+        progress |= {name: value for name, value in known.items() if value is not None}
     return {
         "id": job.id,
         "kind": job.kind,
@@ -86,9 +87,7 @@ def _select_progress(job: Job) -> dict[str, Any] | None:
 def _count_down(progress: dict[str, Any], reported: float) -> dict[str, Any]:
     """Subtract the time since the last report from the time left."""
     if progress.get("seconds_left") is not None:
-        left = TimeLeft(-inf)
-        left.expect(progress["seconds_left"], reported)
-        progress["seconds_left"] = left.at(max(time(), reported))
+        progress["seconds_left"] = find_seconds_left(progress, reported, time())
     return progress
 
 

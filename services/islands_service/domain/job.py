@@ -22,10 +22,12 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import inf
 from typing import Any
 
 from islands.distribution import read_version
 from islands.errors import IslandsError
+from islands.progress import TimeLeft
 from islands_service.domain.monitoring import MonitorUpdate
 
 #: Version of islands of this process.
@@ -363,3 +365,20 @@ class ProgressReport:
     points: tuple[tuple[int, int, Mapping[Any, float], tuple[float | None, ...]], ...] = ()
     checkpoint: str | None = None
     after: int = -1
+
+
+def find_seconds_left(progress: Mapping[str, Any], reported: float, at: float) -> float | None:
+    """Return the time left of a running job, less the time since its report; None if it is unknown.
+
+    Parameters
+    ----------
+    progress : mapping
+        Its last report.
+    reported, at : float
+        Time of the report, and that of the question, in seconds by the same clock.
+    """
+    if progress.get("seconds_left") is None:
+        return None
+    left = TimeLeft(-inf)
+    left.expect(progress["seconds_left"], reported)
+    return left.at(max(at, reported))

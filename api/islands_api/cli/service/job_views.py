@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 
 from islands.cli.console import output
-from islands.cli.progress_display import progress
+from islands.cli.progress_display import format_duration, progress
 from islands.io.models import any_model_from_json
 from islands.io.result_text.text_layout import LEGEND, MARK, term_table, wrap
 from islands.models.coupled_narx import CoupledModel
@@ -203,7 +203,12 @@ def _describe_phase(job: JobView) -> str:
     status = job.progress or {}
     if job.state == JobState.QUEUED:
         place = status.get("position")
-        return "waiting" if place is None else f"number {place} in the queue"
+        if place is None:
+            return "waiting"
+        start = status.get("seconds_to_start")
+        return f"number {place} in the queue" + (
+            "" if start is None else f", starts in about {format_duration(start)}"
+        )
     return str(status.get("note") or status.get("phase", "waiting"))
 
 

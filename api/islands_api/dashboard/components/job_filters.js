@@ -1,5 +1,6 @@
-/** Filters of the list of jobs, which are in the address: state, kind, tag and words. */
+/** Filters of the list of jobs, which are in the address: state, kind, tag, words, and owner. */
 
+import { getJson } from "../lib/api.js";
 import { el } from "../lib/dom.js";
 import { STATES } from "./job_state.js";
 import { KINDS } from "./job_words.js";
@@ -11,6 +12,40 @@ const TYPING_MS = 250;
 export function makeJobsAddress(filters = {}) {
   const query = new URLSearchParams(Object.entries(filters).filter(([, value]) => value));
   return query.size ? `#/jobs?${query}` : "#/jobs";
+}
+
+/** Value of the filter for the jobs of all owners. */
+export const ALL = "*";
+
+/**
+ * Make the choice of an owner; it is shown if the key may see the jobs of several owners. `onChange(owner)`
+ * is called with its name, `ALL`, or an empty text for the jobs of the key.
+ */
+function makeOwnerChoice(onChange, signal) {
+  const node = el("select", { "aria-label": "Owner", hidden: true });
+  node.addEventListener("change", () => onChange(node.value));
+  let owner = "";
+
+  async function load() {
+    const { scopes } = await getJson("v1/caller", { signal });
+    if (!scopes.includes("admin")) return;
+    const { items } = await getJson("v1/admin/owners", { signal });
+    const names = items.map(({ name }) => [name, name]);
+    const options = [["", "my jobs"], [ALL, "all owners"], ...names];
+    node.replaceChildren(...options.map(([value, text]) => el("option", { value }, text)));
+    node.value = owner;
+    node.hidden = names.length < 2;
+  }
+
+  // The list shows the problem of an unavailable service.
+  load().catch(() => null);
+  return {
+    node,
+    show(newOwner) {
+      owner = newOwner;
+      node.value = owner;
+    },
+  };
 }
 
 /** Make the filters until the signal aborts; `show(filters)` updates them to those of the address. */
@@ -27,6 +62,9 @@ export function makeJobFilters(signal) {
     title: "Words in the name, tags, data set, equation or verdict",
   });
   const tag = el("span", { class: "tags" });
+  const owners = makeOwnerChoice((owner) => {
+    location.hash = makeJobsAddress({ owner, state: current.state });
+  }, signal);
   let [current, timer] = [{}, null];
 
   /** Change the address without a further entry of the history while the user types. */
@@ -53,6 +91,9 @@ export function makeJobFilters(signal) {
     const hadFocus = states.contains(document.activeElement);
     states.replaceChildren(makeLink("all", ""), ...STATES.map((each) => makeLink(each, each)));
     if (hadFocus) states.querySelector("[aria-current]").focus();
+    owners.show(filters.owner ?? "");
+    // The list of all owners has no other filters.
+    for (const node of [kind, search]) node.hidden = Boolean(filters.owner);
     kind.value = filters.kind ?? "";
     // While the user types, the text is newer than the address.
     if (timer === null && search.value.trim() !== q) search.value = q;
@@ -63,7 +104,7 @@ export function makeJobFilters(signal) {
   }
 
   return {
-    nodes: [states, el("div", { class: "row search-jobs", role: "search" }, tag, kind, search)],
+    nodes: [states, el("div", { class: "row search-jobs", role: "search" }, tag, owners.node, kind, search)],
     show,
   };
 }

@@ -36,14 +36,18 @@ function showFigure(cell, text) {
   cell.classList.toggle("none", text === NONE);
 }
 
-/** Make the row of a job; `show(job)` updates it and announces a change of state to screen readers. */
-export function makeJobRow(job, selection) {
+/**
+ * Make the row of a job; `show(job)` updates it and announces a change of state to screen readers. With
+ * `showsOwner` it has the owner; a job of another owner than `self` is neither opened nor changed.
+ */
+export function makeJobRow(job, selection, { showsOwner = false, self = null } = {}) {
   let current = job;
   const state = makeBadge();
   const outcome = makeOutcome();
   const box = selection.makeBox(job);
   const name = el("bdi");
-  const link = el("a", { href: `#/jobs/${job.id}` }, name);
+  const isForeign = showsOwner && job.owner !== self;
+  const link = el("a", isForeign ? {} : { href: `#/jobs/${job.id}` }, name);
   const rename = makeRenameButton(link, { getJob: () => current, changed: show });
   const [about, tags] = [el("span", { class: "about-job soft small" }), makeTags()];
   const [error, terms] = ["error", "terms"].map((label) =>
@@ -52,12 +56,12 @@ export function makeJobRow(job, selection) {
   const node = el(
     "tr",
     { "data-job": job.id },
-    el("td", { class: "choice" }, el("label", {}, box)),
+    el("td", { class: "choice" }, isForeign ? null : el("label", {}, box)),
     el("td", {}, state.node),
     el(
       "th",
       { scope: "row" },
-      el("div", { class: "name" }, link, rename.node),
+      el("div", { class: "name" }, link, isForeign ? null : rename.node),
       el("div", { class: "details" }, about, tags.node),
     ),
     el("td", { class: "wide" }, outcome.nodes),
@@ -73,9 +77,9 @@ export function makeJobRow(job, selection) {
     outcome.show(newJob);
     tags.show(newJob);
     rename.show(getIsolatedName(newJob));
-    selection.show(newJob, box);
+    if (!isForeign) selection.show(newJob, box);
     setText(name, getName(newJob));
-    setText(about, describeJob(newJob));
+    setText(about, describeJob(newJob, showsOwner));
     showFigure(error, formatPercent(newJob.summary?.metrics?.mape));
     showFigure(terms, newJob.summary?.size ? String(newJob.summary.size) : NONE);
     const newState = getState(newJob);
@@ -93,7 +97,8 @@ export function followRows(host) {
   function follow(event) {
     const row = event.target.closest("tr[data-job]");
     if (!row || event.target.closest(CONTROLS) || !getSelection().isCollapsed) return;
-    const link = row.querySelector("th a");
+    const link = row.querySelector("th a[href]");
+    if (!link) return;
     if (event.button === 1 || event.ctrlKey || event.metaKey) open(link.href, "_blank", "noopener");
     else if (event.button === 0) link.click();
   }

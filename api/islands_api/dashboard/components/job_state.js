@@ -1,7 +1,7 @@
 /** State and progress of a job, for the list of jobs and the page of a job. */
 
 import { el, setText } from "../lib/dom.js";
-import { formatCount } from "../lib/numbers.js";
+import { formatCount, formatDuration } from "../lib/numbers.js";
 import { formatVerdict, isSearch } from "./diagnosis.js";
 
 export const STATES = ["queued", "running", "succeeded", "failed", "cancelled"];
@@ -36,9 +36,10 @@ function isBetweenEpochs(job) {
   return job.state === "running" && phase !== "search";
 }
 
-function formatQueue({ note, position, generation, generations }) {
+function formatQueue({ note, position, seconds_to_start: start, generation, generations }) {
   if (note) return note;
-  const place = position ? `, number ${formatCount(position)}` : "";
+  const time = Number.isFinite(start) ? `, starts in about ${formatDuration(start)}` : "";
+  const place = position ? `, number ${formatCount(position)}${time}` : "";
   if (generation === undefined) return `waiting${place}`;
   return `waiting to resume at ${formatCount(generation)} / ${formatCount(generations)}${place}`;
 }
@@ -72,7 +73,8 @@ export function makeProgressBar({ showsReason = false } = {}) {
       const reason = showsReason && job.state === "failed" ? job.problem?.detail : null;
       text.classList.toggle("reason", Boolean(reason));
       text.title = reason ?? "";
-      const isSentence = Boolean(reason) || (job.state === "queued" && Boolean(job.progress?.note));
+      const { note, seconds_to_start: start } = job.progress ?? {};
+      const isSentence = Boolean(reason) || (job.state === "queued" && Boolean(note || start));
       text.classList.toggle("long", isSentence || !isSearch(job) || isBetweenEpochs(job));
       setText(text, reason ?? formatProgress(job));
     },

@@ -36,12 +36,15 @@ function listSettings({ settings = {}, preset = "auto", model = "narx", seed = 0
   ].filter(Boolean);
 }
 
-/** Describe a job by its kind, its data set unless it is called like it, its settings and its columns. */
-export function describeJob({ kind, name, dataset_name: dataset, spec }) {
+/**
+ * Describe a job by its owner if it is shown, its kind, its data set unless it is called like it, its
+ * settings and its columns.
+ */
+export function describeJob({ owner, kind, name, dataset_name: dataset, spec }, showsOwner = false) {
   const inputs = [spec.inputs ?? spec.input ?? []].flat();
   const outputs = [spec.output ?? []].flat();
   const columns = inputs.length ? `${inputs.join(", ")} → ${outputs.join(", ")}` : null;
-  const about = [KINDS[kind] ?? kind, dataset === name ? null : dataset];
+  const about = [showsOwner && owner, KINDS[kind] ?? kind, dataset === name ? null : dataset];
   const parts = [...about, ...listSettings(spec), columns];
   return parts.filter(Boolean).join(" · ");
 }

@@ -1,7 +1,7 @@
 /** Page with the list of jobs: newest first, filtered and searched, in pages, updated continuously. */
 
 import { makeFileButton } from "../components/file_upload.js";
-import { makeJobFilters, makeJobsAddress } from "../components/job_filters.js";
+import { ALL, makeJobFilters, makeJobsAddress } from "../components/job_filters.js";
 import { followRows, makeJobRow } from "../components/job_row.js";
 import { makeJobSelection } from "../components/job_selection.js";
 import { isEnded } from "../components/job_state.js";
@@ -76,12 +76,19 @@ function makeWelcomeCard() {
 }
 
 function makeEmptyMessage(filters) {
-  const { state, cursor, kind, tag, q, sort } = filters;
+  const { state, cursor, kind, tag, q, sort, owner } = filters;
   if (!Object.values(filters).some(Boolean)) return makeWelcomeCard();
-  const isOnlyState = state && !kind && !tag && !q && !sort;
+  const isOnlyState = state && !owner && !kind && !tag && !q && !sort;
   let text = isOnlyState ? `No job is ${state}.` : "No job matches these filters.";
   if (cursor) text = "No further jobs.";
   return el("p", { class: "empty" }, text, " ", el("a", { href: "#/jobs" }, "Show all jobs"));
+}
+
+/** Return the path of the list with some filters; that of all owners is for administrators. */
+function getListPath({ owner, ...filters }) {
+  const given = owner && owner !== ALL ? { ...filters, owner } : filters;
+  const entries = Object.entries(given).filter(([, value]) => value);
+  return `v1/${owner ? "admin/" : ""}jobs?${new URLSearchParams([["limit", PAGE_SIZE], ...entries])}`;
 }
 
 /** Return whether the rows must not move: the pointer is over them, a name is edited, a job is selected. */
@@ -103,15 +110,15 @@ export function mountJobs(host, firstFilters, signal) {
   document.title = "Jobs · islands";
   const heading = el("h1", { tabindex: "-1" }, "Jobs");
   const [bars, list] = [makeJobFilters(signal), el("div")];
-  let [filters, table, selection] = [null, null, null];
+  let [filters, table, selection, self] = [null, null, null, undefined];
 
   function refresh() {
     table.release();
     wake();
   }
 
-  function showFilters({ state, kind, tag, q, sort, cursor }) {
-    filters = { state, kind, tag, q, sort, cursor };
+  function showFilters({ state, kind, tag, q, sort, cursor, owner }) {
+    filters = { state, kind, tag, q, sort, cursor, owner };
     bars.show(filters);
     selection = makeJobSelection({ refresh });
     table = makePagedTable({
@@ -119,11 +126,11 @@ export function mountJobs(host, firstFilters, signal) {
       headings: [
         [selection.all, "choice"],
         ...["State", "Job", "Result"],
-        makeSortHeading("Error", "error", "ascending", filters),
+        owner ? ["Error", "figure"] : makeSortHeading("Error", "error", "ascending", filters),
         ["Terms", "figure"],
-        makeSortHeading("Submitted", "", "descending", filters),
+        owner ? ["Submitted", "figure"] : makeSortHeading("Submitted", "", "descending", filters),
       ],
-      makeRow: (job) => makeJobRow(job, selection),
+      makeRow: (job) => makeJobRow(job, selection, { showsOwner: Boolean(owner), self }),
       makeEmptyMessage: () => makeEmptyMessage(filters),
       makeAddress: (cursor) => makeJobsAddress({ ...filters, cursor }),
       cursor: filters.cursor,
@@ -137,9 +144,8 @@ export function mountJobs(host, firstFilters, signal) {
   showFilters(firstFilters);
   const wake = poll(async () => {
     const asked = filters;
-    const given = Object.entries(asked).filter(([, value]) => value);
-    const query = new URLSearchParams([["limit", PAGE_SIZE], ...given]);
-    const page = await getJson(`v1/jobs?${query}`, { signal });
+    if (asked.owner && self === undefined) self = (await getJson("v1/caller", { signal })).owner;
+    const page = await getJson(getListPath(asked), { signal });
     // The user may have changed the filters meanwhile.
     if (asked !== filters) return 0;
     if (!signal.aborted) {

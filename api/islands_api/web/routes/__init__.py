@@ -7,6 +7,7 @@ from fastapi import APIRouter
 
 from islands_api.web.routes import (
     administered_jobs,
+    caller,
     datasets,
     diagnoses,
     events,
@@ -43,6 +44,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     administered_jobs.router,
     webhooks.router,
     presets.router,
+    caller.router,
     service.router,
     page.router,
 )

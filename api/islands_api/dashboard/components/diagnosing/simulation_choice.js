@@ -147,8 +147,8 @@ function listKinds(simulations, given) {
  * Make the choice from the listed simulations; `initial` has the simulation and the tolerance of a request.
  *
  * `setRecord({columns, units})` states the columns that may be a recorded simulation, and the units of input
- * and output. `read()` returns the simulation, the tolerance and the parts of its command, or a false value if
- * the choice is incomplete; `onChange()` is called at every change.
+ * and output. `read()` returns the simulation, the tolerance and the parts of its command, or a false value
+ * if the choice is incomplete; `onChange()` is called at every change.
  */
 export function makeSimulationChoice(simulations, initial, onChange, signal) {
   const byKind = listKinds(simulations, initial.simulation);
