@@ -15,8 +15,48 @@ T = TypeVar("T")
 _MAX_COMPARED = 200
 
 
+class AdvisedText(str):
+    """Text that names options which its reader may give.
+
+    The text is a `str` in every other respect. Operations of `str`, such as formatting, return texts without
+    the options: `join_text` keeps them.
+
+    Attributes
+    ----------
+    options : tuple of (str, object)
+        Name and value of each option, in the order of the text. The value is None if only the reader knows
+        it.
+    """
+
+    __slots__ = ("options",)
+
+    options: tuple[tuple[str, object], ...]
+
+    def __new__(cls, text: str, options: Iterable[tuple[str, object]] = ()) -> "AdvisedText":
+        """Make a text with options."""
+        found = super().__new__(cls, text)
+        found.options = tuple(dict.fromkeys(options))
+        return found
+
+
+def join_text(*parts: str) -> AdvisedText:
+    """Join texts to one that names all options of its parts."""
+    return AdvisedText("".join(parts), (option for part in parts for option in get_options(part)))
+
+
+def get_options(text: str) -> tuple[tuple[str, object], ...]:
+    """Return the options that a text names; none for a text without advice."""
+    return text.options if isinstance(text, AdvisedText) else ()
+
+
 class IslandsError(Exception):
     """Base class of all deliberate errors."""
+
+    @property
+    def message(self) -> str:
+        """The message, with the options that it names; ``str(error)`` has none."""
+        given = self.args[0] if self.args else ""
+        return given if isinstance(given, str) else str(given)
 
 
 class RecordError(IslandsError):
@@ -45,7 +85,7 @@ def command_line_names() -> Iterator[None]:
         _names.pop()
 
 
-def name_option(name: str, value: object = None) -> str:
+def name_option(name: str, value: object = None, example: object = None) -> AdvisedText:
     """Return an option as the caller gives it: ``gaps="split"``, or ``--gaps split`` on the command line.
 
     Parameters
@@ -53,9 +93,20 @@ def name_option(name: str, value: object = None) -> str:
     name : str
         Name of the argument of the library.
     value : object
-        Its value; a text in capital letters is a placeholder. Without one, only the option is named.
+        Its value. Without one, only the option is named.
+    example : object
+        Value that is written in its place if only the reader knows the value; in capital letters it is a
+        placeholder.
+
+    Returns
+    -------
+    AdvisedText
+        With the option and its value, rounded as it is written.
     """
-    return _names[-1](name, value)
+    written = _names[-1](name, value if example is None else example)
+    rounded = float(_format(value)) if isinstance(value, float) else value
+    # Lists, such as names of columns, are examples.
+    return AdvisedText(written, [(name, None if isinstance(value, list) else rounded)])
 
 
 def name_without_value(name: str) -> str:

@@ -16,6 +16,7 @@ from islands.errors import (
     RecordError,
     SettingsError,
     check_seconds,
+    join_text,
     name_flag,
     name_option,
     name_without_value,
@@ -259,15 +260,15 @@ class _FileInspection:
             )
         except RecordError:
             return {}, {}  # the reading of the record reports it
-        treatment = f"are left out ({name_option('outliers', KEEP)} uses them)"
+        treatment = join_text(" are left out (", name_option("outliers", KEEP), " uses them)")
         if self.reading.outliers == KEEP:
-            treatment = f"are used ({name_option('outliers', EXCLUDE)} leaves them out)"
+            treatment = join_text(" are used (", name_option("outliers", EXCLUDE), " leaves them out)")
         samples = {
             name: np.flatnonzero(np.isnan(found.numbers[name]) & ~np.isnan(columns.numbers[name])).tolist()
             for name in columns.numbers
         }
         return found.numbers, {
-            f"{errors} {treatment}": next(
+            join_text(errors, treatment): next(
                 (rows for name, rows in samples.items() if errors.startswith(f"gross errors of {name}: ")), []
             )
             for errors in excluded
@@ -382,7 +383,7 @@ class _FileInspection:
                 *(self.table, file, choice.inputs, choice.output, self.dt, self.rows), options=reading
             )
         except RecordError as error:
-            return None, str(error)
+            return None, error.message
         return record, ""
 
     def _find_remedy(self, choice: ColumnChoice, dt: float | None) -> ReadingOptions:

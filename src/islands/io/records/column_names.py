@@ -9,7 +9,7 @@ from reprlib import repr as abbreviate
 from types import MappingProxyType
 
 from islands.data.channel_names import AT_ONCE, is_unit, normalise_unit, parse_unit, spell_unit
-from islands.errors import RecordError, SettingsError, name_option
+from islands.errors import RecordError, SettingsError, join_text, name_option
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
 TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -256,8 +256,8 @@ def time_column(
 
 def _check_single(candidates: Sequence[str], file: str) -> str | None:
     if len(candidates) > 1:
+        listed = " and ".join(candidates[:_LISTED])
         raise RecordError(
-            f"{file}: columns {' and '.join(candidates[:_LISTED])} may all be the time: name one by "
-            f"{name_option('time')}"
+            join_text(f"{file}: columns {listed} may all be the time: name one by ", name_option("time"))
         )
     return candidates[0] if candidates else None

@@ -157,7 +157,7 @@ def _error_message(check: Callable[..., object], *arguments: Any) -> str:
     try:
         check(*arguments)
     except RecordError as error:
-        return str(error)
+        return error.message
     return ""
 
 
@@ -168,7 +168,7 @@ def _read_columns(table: Table) -> tuple[dict[str, Columns], dict[str, str]]:
         try:
             columns[name] = table.read((name,), None)
         except RecordError as error:
-            unread[name] = str(error)
+            unread[name] = error.message
     return columns, unread
 
 
@@ -225,7 +225,7 @@ def _preview_sampling(
                 return time, None, ""
         return time, find_sampling(TimeSource(table, time, None, structure, options), known)[0], ""
     except RecordError as error:
-        return time, None, str(error)
+        return time, None, error.message
 
 
 def _describe_time_unit(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from islands.data.channel_names import AT_ONCE, parse_unit
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_inputs
-from islands.errors import RecordError, name_option
+from islands.errors import RecordError, join_text, name_option
 from islands.inspection.channel import channels
 from islands.inspection.gross_errors import find_gross_errors, find_input_codes
 from islands.inspection.quantisation import find_quantisation
@@ -233,10 +233,16 @@ def exclude_gross_errors(
         for code, samples in find_input_codes(numbers[name]).items():
             if options.gaps is None:
                 raise RecordError(
-                    f"{columns.rows.place(int(samples[0]), name)}{and_others(samples.size)} {code:.12g}, a "
-                    f"code of missing values: give {name_option('gaps', 'split')} to leave the rows out or "
-                    f"{name_option('gaps', 'interpolate')} to fill them, or "
-                    f"{name_option('outliers', 'keep')} if it is a value"
+                    join_text(
+                        f"{columns.rows.place(int(samples[0]), name)}{and_others(samples.size)} "
+                        f"{code:.12g}, a code of missing values: give ",
+                        name_option("gaps", "split"),
+                        " to leave the rows out or ",
+                        name_option("gaps", "interpolate"),
+                        " to fill them, or ",
+                        name_option("outliers", "keep"),
+                        " if it is a value",
+                    )
                 )
             numbers[name] = np.where(numbers[name] == code, np.nan, numbers[name])
             excluded.append(

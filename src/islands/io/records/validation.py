@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, name_option, suggest
+from islands.errors import RecordError, join_text, name_option, suggest
 from islands.io.records.table import Columns
 
 #: Smallest number of samples. With 30 samples the 95 % band of a residual correlation, 1.96 / sqrt(30), is
@@ -140,9 +140,14 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
             "have unequal lengths; complete the column or select the rows that are complete"
         )
     raise RecordError(
-        f"{rows.place(sample, name)}{and_others(int(absent.sum()))} empty or NaN: give "
-        f"{name_option('gaps', 'interpolate')} to fill it or {name_option('gaps', 'split')} to leave the row "
-        "out, or select rows without it; only an output, of several the first, may have empty cells"
+        join_text(
+            f"{rows.place(sample, name)}{and_others(int(absent.sum()))} empty or NaN: give ",
+            name_option("gaps", "interpolate"),
+            " to fill it or ",
+            name_option("gaps", "split"),
+            " to leave the row out, or select rows without it; only an output, of several the first, may have "
+            "empty cells",
+        )
     )
 
 
@@ -161,8 +166,13 @@ def check_repaired(values: NDArray[np.float64], name: str, file: str, missing: b
     """
     if len(values) < MIN_SAMPLES:
         raise RecordError(
-            f"{file}: {len(values)} samples remain, and at least {MIN_SAMPLES} are needed: use a longer "
-            f"record, a shorter {name_option('resample', 'DT')}, or {name_option('gaps', 'interpolate')}"
+            join_text(
+                f"{file}: {len(values)} samples remain, and at least {MIN_SAMPLES} are needed: use a longer "
+                "record, a shorter ",
+                name_option("resample", example="DT"),
+                ", or ",
+                name_option("gaps", "interpolate"),
+            )
         )
     if np.isinf(values).any():
         raise RecordError(f"{file}: column {name} has an infinite value: repair it or leave the row out")

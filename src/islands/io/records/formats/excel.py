@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from islands.distribution import describe_missing_extra
-from islands.errors import RecordError, name_option, suggest
+from islands.errors import RecordError, join_text, name_option, suggest
 from islands.io.records.formats.text.table import DelimitedText, split_table
 from islands.io.records.formats.text.table_start import has_samples
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -81,14 +81,19 @@ def read_workbook(path: Path, options: ReadingOptions = DEFAULT_READING) -> Deli
         raise RecordError(f"{file} is damaged or not a workbook ({error}): save it again") from error
     if not lines:
         raise RecordError(
-            f"{file} has no sheet with a table of numbers; its sheets are {', '.join(names)}: name "
-            f"the sheet by {name_option('sheet')}"
+            join_text(
+                f"{file} has no sheet with a table of numbers; its sheets are {', '.join(names)}: name the "
+                "sheet by ",
+                name_option("sheet"),
+            )
         )
     others = [other for other in names if other != name]
     table = split_table(lines, f"{file}, sheet {name}", "row", options)
     if not others:
         return table
-    listed = f"the sheet {name} of {file} is read; other sheets ({name_option('sheet')}): {', '.join(others)}"
+    listed = join_text(
+        f"the sheet {name} of {file} is read; other sheets (", name_option("sheet"), f"): {', '.join(others)}"
+    )
     return replace(table, notes=(listed, *table.notes), others=listed)
 
 

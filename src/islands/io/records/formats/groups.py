@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from islands.errors import RecordError, name_option, suggest
+from islands.errors import RecordError, join_text, name_option, suggest
 
 #: Most groups that are listed in a message.
 _LISTED = 12
@@ -36,7 +36,11 @@ def choose_group(tables: Mapping[str, bool], group: str | None, file: str) -> tu
     others = [name for name in names if name != chosen]
     return (
         chosen,
-        f"the group {chosen} of {file} is read; other groups ({name_option('sheet')}): {_list(others)}"
+        join_text(
+            f"the group {chosen} of {file} is read; other groups (",
+            name_option("sheet"),
+            f"): {_list(others)}",
+        )
         if others
         else "",
     )

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, name_option
+from islands.errors import RecordError, join_text, name_option
 from islands.io.records.sampling.missing_values import drop_repeated, repair_missing
 from islands.io.records.sampling.recording import Recording, UniformRecording, count_text
 from islands.io.records.sampling.resampling import resample
@@ -85,8 +85,11 @@ def join_recordings(parts: Sequence[UniformRecording], file: str) -> UniformReco
     for number, part in enumerate(parts, 1):
         if abs(part.dt - first.dt) > AGREEMENT * first.dt:
             raise RecordError(
-                f"{file}: the sampling time of recording 1 is {first.dt:.6g} s, that of recording {number} "
-                f"{part.dt:.6g} s: give {name_option('resample', max(part.dt, first.dt))}"
+                join_text(
+                    f"{file}: the sampling time of recording 1 is {first.dt:.6g} s, that of recording "
+                    f"{number} {part.dt:.6g} s: give ",
+                    name_option("resample", max(part.dt, first.dt)),
+                )
             )
     segments = (length for part in parts for length in part.segments or (len(part.values),))
     steps = (f"recording {number}: {step}" for number, part in enumerate(parts, 1) for step in part.steps)
@@ -104,8 +107,11 @@ def _usual_step(recording: Recording) -> float:
     steps = steps[steps > 0]
     if not len(steps):
         raise RecordError(
-            f"{recording.rows.file}: column {recording.time} never increases: name another time "
-            f"column by {name_option('time')}"
+            join_text(
+                f"{recording.rows.file}: column {recording.time} never increases: name another time column "
+                "by ",
+                name_option("time"),
+            )
         )
     return float(np.median(steps))
 
@@ -120,8 +126,13 @@ def _find_gaps(stamps: NDArray[np.float64], usual: float, new: float | None) -> 
 def _gap_error(recording: Recording, found: NDArray[np.bool_]) -> RecordError:
     described = describe_gaps(recording.stamps, recording.rows, found)
     return RecordError(
-        f"{recording.rows.file}, column {recording.time}: {described}: give {name_option('gaps', 'split')} "
-        f"for segments or {name_option('gaps', 'interpolate')} to fill them"
+        join_text(
+            f"{recording.rows.file}, column {recording.time}: {described}: give ",
+            name_option("gaps", "split"),
+            " for segments or ",
+            name_option("gaps", "interpolate"),
+            " to fill them",
+        )
     )
 
 
@@ -162,10 +173,11 @@ def _common_step(parts: list[Recording]) -> float:
         # A part of two samples has a step below the length of a gap.
         if len(places) > 2 and (deviation > allowed_deviation(part.stamps, step)).any():
             raise RecordError(
-                f"{part.rows.file}, {part.rows.row(0)} to {part.rows.row(-1)}: the step of this part "
-                "differs from "
-                f"the usual step {step:.6g}: give "
-                f"{name_option('resample', step * part.seconds)}"
+                join_text(
+                    f"{part.rows.file}, {part.rows.row(0)} to {part.rows.row(-1)}: the step of this part "
+                    f"differs from the usual step {step:.6g}: give ",
+                    name_option("resample", step * part.seconds),
+                )
             )
     return step
 
@@ -188,9 +200,12 @@ def _fill(
     if (deviation > allowed_deviation(stamps, step)).any():
         sample = max(1, int(np.argmax(deviation)))
         raise RecordError(
-            f"{recording.rows.place(sample, recording.time)} is off the uniform grid of the other "
-            "rows, whose step is "
-            f"{slope:.6g}: give {name_option('resample', slope * recording.seconds)} as well"
+            join_text(
+                f"{recording.rows.place(sample, recording.time)} is off the uniform grid of the other rows, "
+                f"whose step is {slope:.6g}: give ",
+                name_option("resample", slope * recording.seconds),
+                " as well",
+            )
         )
     samples = count_text(int(places[-1]) + 1 - len(stamps), "sample")
     steps.append(f"interpolated: {samples} in {describe_gaps(stamps, recording.rows, found)}")
@@ -214,6 +229,9 @@ def _resample_parts(parts: list[Recording], usual: float, dt: float, steps: list
 def _check_count(samples: int, recording: Recording) -> None:
     if samples > MOST_SAMPLES:
         raise RecordError(
-            f"{recording.rows.file}: a uniform grid would have {samples} samples, and {MOST_SAMPLES} "
-            f"is the most: take a longer sampling time, or {name_option('gaps', 'split')}"
+            join_text(
+                f"{recording.rows.file}: a uniform grid would have {samples} samples, and {MOST_SAMPLES} is "
+                "the most: take a longer sampling time, or ",
+                name_option("gaps", "split"),
+            )
         )

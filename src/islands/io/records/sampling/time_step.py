@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, check_seconds, name_option
+from islands.errors import RecordError, check_seconds, join_text, name_option
 from islands.io.records.column_names import (
     TIME_UNITS,
     has_unit_of_time,
@@ -94,8 +94,13 @@ def find_sampling(source: TimeSource, columns: Columns) -> tuple[float, float | 
     start = None
     if time is None and source.options.time_unit is not None:
         raise RecordError(
-            f"{file} has no time column that {name_option('time_unit')} could describe: name the column by "
-            f"{name_option('time')}, or leave the unit out"
+            join_text(
+                f"{file} has no time column that ",
+                name_option("time_unit"),
+                " could describe: name the column by ",
+                name_option("time"),
+                ", or leave the unit out",
+            )
         )
     if dt is not None:
         dt = check_seconds(dt, "the sampling time dt", RecordError)
@@ -170,8 +175,11 @@ def find_time_scale(source: TimeSource, columns: Columns) -> TimeScale:
     if time in columns.clocks:
         if options.time_unit is not None:
             raise RecordError(
-                f"{columns.rows.file}: column {time} holds time stamps, which have no unit: leave "
-                f"{name_option('time_unit')} out"
+                join_text(
+                    f"{columns.rows.file}: column {time} holds time stamps, which have no unit: leave ",
+                    name_option("time_unit"),
+                    " out",
+                )
             )
         return TimeScale(columns.numbers[time], 1.0, elapsed=True)
     field = time.removeprefix(source.structure)
@@ -182,9 +190,11 @@ def find_time_scale(source: TimeSource, columns: Columns) -> TimeScale:
 
 
 def _unknown_sampling_message(source: TimeSource, file: str) -> str:
-    message = (
-        f"{file} has no time column (t, t_s, time_ms ...): give the sampling time by "
-        f"{name_option('dt')}, or name the column by {name_option('time')}"
+    message = join_text(
+        f"{file} has no time column (t, t_s, time_ms ...): give the sampling time by ",
+        name_option("dt"),
+        ", or name the column by ",
+        name_option("time"),
     )
     fields = {name: name.removeprefix(source.structure) for name in source.table.names}
     unknown_unit = [
@@ -192,9 +202,12 @@ def _unknown_sampling_message(source: TimeSource, file: str) -> str:
     ]
     if unknown_unit:
         units = ", ".join(unit for unit in TIME_UNITS if unit)
-        message += (
-            f"; if {unknown_unit[0]} is the time, end its name in one of the units {units}, or give "
-            f"{name_option('time')} and {name_option('time_unit')}"
+        message = join_text(
+            message,
+            f"; if {unknown_unit[0]} is the time, end its name in one of the units {units}, or give ",
+            name_option("time"),
+            " and ",
+            name_option("time_unit"),
         )
     return message
 
@@ -205,7 +218,9 @@ def _reconcile(known: Mapping[str, float], file: str) -> float:
     for other, seconds in others:
         if abs(seconds - first) > AGREEMENT * first:
             raise RecordError(
-                f"{file}: the sampling time is {first:.6g} s by {source} and {seconds:.6g} s by {other}: "
-                "correct one of them"
+                join_text(
+                    *(f"{file}: the sampling time is {first:.6g} s by ", source),
+                    *(f" and {seconds:.6g} s by ", other, ": correct one of them"),
+                )
             )
     return first

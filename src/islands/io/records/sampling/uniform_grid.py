@@ -6,7 +6,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, name_option
+from islands.errors import RecordError, join_text, name_option
 from islands.io.records.table import RowRange
 
 #: Tolerance relative to a step: deviation of time stamps from the grid, and difference of two sampling times.
@@ -125,18 +125,21 @@ def _raise_not_increasing(stamps: NDArray[np.float64], name: str, rows: RowRange
     others = f" ({int(wrong.sum())} of {len(stamps)} rows do)" if wrong.sum() > 1 else ""
     if current == previous:
         problem = f"repeats the time stamp {previous:.10g}{others}"
-        advice = (
-            f"give {name_option('resample', 'DT')}, which averages rows of equal time, or, if only the "
-            f"printed time is too coarse, {name_option('dt', 'DT')}"
+        advice = join_text(
+            "give ",
+            name_option("resample", example="DT"),
+            ", which averages rows of equal time, or, if only the printed time is too coarse, ",
+            name_option("dt", example="DT"),
         )
     else:
         problem = f"jumps back to {current:.10g} from {previous:.10g}{others}"
-        advice = f"if several recordings follow one another, give {name_option('gaps', 'split')} for segments"
+        split = name_option("gaps", "split")
+        advice = join_text("if several recordings follow one another, give ", split, " for segments")
         usual = float(np.median(steps))
         if abs(previous - current + usual - _SUMMER) <= max(usual, 1.0):
-            zone = name_option("timezone", "Europe/Berlin")
-            advice = f"if it is the end of summer time, give the time zone, as {zone}"
-    raise RecordError(f"{rows.place(sample, name)} {problem}: {advice}")
+            zone = name_option("timezone", example="Europe/Berlin")
+            advice = join_text("if it is the end of summer time, give the time zone, as ", zone)
+    raise RecordError(join_text(f"{rows.place(sample, name)} {problem}: ", advice))
 
 
 def _raise_not_uniform(
@@ -148,13 +151,18 @@ def _raise_not_uniform(
     if 0 < gaps.mean() < 0.1:
         sample = int(np.argmax(gaps)) + 1
         problem = "follows a gap: the time changes"
-        advice = (
-            f"{describe_gaps(stamps, rows, gaps)}; give {name_option('gaps', 'split')} for "
-            f"segments or {name_option('gaps', 'interpolate')} to fill them"
+        advice = join_text(
+            f"{describe_gaps(stamps, rows, gaps)}; give ",
+            name_option("gaps", "split"),
+            " for segments or ",
+            name_option("gaps", "interpolate"),
+            " to fill them",
         )
         if abs(steps[sample - 1] - usual - _SUMMER) <= max(usual, 1.0):
-            zone = name_option("timezone", "Europe/Berlin")
-            advice += f"; if it is the beginning of summer time, give the time zone, as {zone}"
+            zone = name_option("timezone", example="Europe/Berlin")
+            advice = join_text(
+                advice, "; if it is the beginning of summer time, give the time zone, as ", zone
+            )
     else:
         # The stamp that is farthest from the grid may be far behind the steps that moved it.
         rounding = rounding_error(stamps)
@@ -163,12 +171,17 @@ def _raise_not_uniform(
         sample = int(np.argmax(off >= (1.0 - _EQUAL) * off.max())) + 1 if count else max(sample, 1)
         others = f" ({count} of {len(steps)} steps differ)" if count > 1 else ""
         problem = "is off the uniform grid: the time changes"
-        advice = (
-            f"give {name_option('resample', usual * seconds)} to interpolate onto a uniform grid, or, "
-            "if the samples are uniform and only their time stamps are not, "
-            f"{name_option('dt', usual * seconds)}"
+        advice = join_text(
+            "give ",
+            name_option("resample", usual * seconds),
+            " to interpolate onto a uniform grid, or, if the samples are uniform and only their time stamps "
+            "are not, ",
+            name_option("dt", usual * seconds),
         )
     raise RecordError(
-        f"{rows.place(sample, name)} {problem} from {stamps[sample - 1]:.10g} to {stamps[sample]:.10g}, but "
-        f"the usual step is {usual:.6g}{others}: {advice}"
+        join_text(
+            f"{rows.place(sample, name)} {problem} from {stamps[sample - 1]:.10g} to "
+            f"{stamps[sample]:.10g}, but the usual step is {usual:.6g}{others}: ",
+            advice,
+        )
     )

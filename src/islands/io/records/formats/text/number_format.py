@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from islands.errors import RecordError, name_option
+from islands.errors import RecordError, join_text, name_option
 from islands.io.records.table import RowRange
 
 #: Characters that only separate thousands: blanks, also those that do not break a line, and apostrophes.
@@ -137,8 +137,11 @@ def _choose_mark(
         _, _, text = ambiguous[","]
         digits = text.strip().replace(",", "")
         raise RecordError(
-            f"{_place(ambiguous[','], rows)} may be {digits} or {text.strip().replace(',', '.')}, and no "
-            f"other number tells: {_make_remedy()}"
+            join_text(
+                f"{_place(ambiguous[','], rows)} may be {digits} or {text.strip().replace(',', '.')}, and no "
+                "other number tells: ",
+                _make_remedy(),
+            )
         )
     return ","
 
@@ -146,17 +149,22 @@ def _choose_mark(
 def _raise_mixed(cell: _Cell | None, other: _Cell, mark: str, rows: RowRange) -> None:
     if cell is None:
         raise RecordError(
-            f"{_place(other, rows)} is not a number with the decimal mark '{mark}': {_make_remedy()}"
+            join_text(
+                f"{_place(other, rows)} is not a number with the decimal mark '{mark}': ", _make_remedy()
+            )
         )
     comma, point = (cell, other) if mark == "," else (other, cell)
     raise RecordError(
-        f"a decimal comma in {_place(comma, rows)}, a decimal point in {_place(point, rows)}: write all "
-        f"numbers with the same mark, or, if one of the two separates thousands, {_make_remedy()}"
+        join_text(
+            f"a decimal comma in {_place(comma, rows)}, a decimal point in {_place(point, rows)}: write all "
+            "numbers with the same mark, or, if one of the two separates thousands, ",
+            _make_remedy(),
+        )
     )
 
 
 def _make_remedy() -> str:
-    return f"give {name_option('decimal', 'point')} or {name_option('decimal', 'comma')}"
+    return join_text("give ", name_option("decimal", "point"), " or ", name_option("decimal", "comma"))
 
 
 def _place(cell: _Cell, rows: RowRange) -> str:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, name_option
+from islands.errors import RecordError, join_text, name_option
 from islands.io.records.column_names import looks_like_time
 from islands.io.records.formats.text.missing_words import (
     EMPTY,
@@ -232,16 +232,18 @@ def _convert_written(
     text = texts[sample].strip()
     advice = "correct the cell or leave its row out"
     if text[:1].isalpha():
-        advice = f"{advice}, or, if it means a missing value, {_give_missing(text)}"
+        advice = join_text(f"{advice}, or, if it means a missing value, ", _give_missing(text))
     if looks_like_time(name):
         advice = (
             "write the time as a number or as 2026-11-22 14:05:03.250, or rename the column if it is not to "
             "be read as time"
         )
-    raise RecordError(f"{rows.place(sample, name)}: {reprlib.repr(text)} is not a number: {advice}")
+    place = rows.place(sample, name)
+    raise RecordError(join_text(f"{place}: {reprlib.repr(text)} is not a number: ", advice))
 
 
 def _give_missing(text: str) -> str:
     """Return how to declare a text as missing; a comma separates words on the command line."""
-    word = text if len(text) <= _SHOWN and "," not in text else "WORD"
-    return f"give {name_option('missing', word)}"
+    is_short = len(text) <= _SHOWN and "," not in text
+    named = name_option("missing", text) if is_short else name_option("missing", example="WORD")
+    return join_text("give ", named)

@@ -150,7 +150,7 @@ class DelimitedText:
                 self.units,
             )
         except RecordError as error:
-            return (*notes, str(error))
+            return (*notes, error.message)
         return (*notes, *([note] if note else []))
 
     @property

@@ -13,7 +13,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, name_option
+from islands.errors import RecordError, join_text, name_option
 from islands.io.records.formats.text.missing_words import is_missing
 from islands.io.records.table import RowRange
 
@@ -172,10 +172,13 @@ def _is_day_first(
             return continuous[0]
         one, two, year = next(iter(dates))
         raise RecordError(
-            f"{rows.place(next(iter(dates.values())), name)}: {one}/{two}/{year} may be the day {one} "
-            "of the month "
-            f"{two} or the reverse, and no other date tells: give {name_option('dates', 'day-first')} "
-            f"or {name_option('dates', 'month-first')}"
+            join_text(
+                f"{rows.place(next(iter(dates.values())), name)}: {one}/{two}/{year} may be the day {one} "
+                f"of the month {two} or the reverse, and no other date tells: give ",
+                name_option("dates", "day-first"),
+                " or ",
+                name_option("dates", "month-first"),
+            )
         )
     return month_first is None
 
