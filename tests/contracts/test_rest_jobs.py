@@ -353,9 +353,7 @@ def test_cached_figures_vary_with_the_key(service):
     assert headers["vary"] == "Authorization, Accept-Encoding"
 
 
-def test_a_queued_job_starts_when_as_many_running_jobs_have_ended_as_its_position_says(
-    service, order, monkeypatch
-):
+def test_a_queued_job_states_the_time_until_enough_running_jobs_have_ended(service, order, monkeypatch):
     monkeypatch.setattr("islands_api.web.responses._PLACE_SECONDS", 0.0)
 
     def read(job):

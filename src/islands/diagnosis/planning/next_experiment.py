@@ -24,8 +24,8 @@ from islands.diagnosis.planning.planned_input import InputLimits, find_rate
 from islands.effects.interface.context import Signal
 from islands.parallel import ParallelMap
 
-#: Maximum number of samples of the input.
-MAX_SAMPLES = 10_000
+#: Maximum number of samples of the input, and of the record with which it is compared.
+MAX_SAMPLES, MAX_RECORDED_SAMPLES = 5_000, 20_000
 
 #: Maximum number of pairs that the input is designed for; those with the best alternatives come first.
 MAX_PAIRS = 4
@@ -173,7 +173,8 @@ def design_next_experiment(
     rate = float(np.max(np.abs(context.take_differences(context.u)))) / record.dt
     limits = InputLimits(float(np.min(context.u)), float(np.max(context.u)), rate)
     chosen, after = _choose_input(pairs, u, record.dt, limits, context.input_unit, parallel_map)
-    before = [pair.separate(u) for pair in pairs]
+    recorded = take_longest_input(context.u, context.segments, MAX_RECORDED_SAMPLES)
+    before = [pair.separate(recorded) for pair in pairs]
     separated = tuple(map(SeparatedPair, names, before, after))
     if all(each.repeats is None for each in separated):
         return NextExperiment(separated, None)
