@@ -6,7 +6,6 @@ output are for the owner of the job, those on standard error for the operator.
 
 import argparse
 import io
-import json
 import resource
 import sys
 from collections.abc import Mapping
@@ -14,9 +13,7 @@ from dataclasses import replace
 from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC, EROFS
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from islands.data.averaging import average_samples
 from islands.data.coupled_record import couple, match_coupled, split_coupled
@@ -40,10 +37,8 @@ from islands.models.coupled_narx import CoupledModel
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from islands.reports.origin import Origin
-from islands.simulation.initial_outputs import simulate_freely
-from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
-from islands.validation.prediction_bands import PredictionBand
+from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import FMU, REPORT, Job
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
@@ -54,9 +49,6 @@ from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, Blobs, DataFolderUnavailableError
 from islands_service.store.database import StorageFullError, StoreError
 from islands_service.store.results import StoredModel
-
-#: Largest number of samples of a simulation that is returned as numbers: a screen shows no more.
-MAX_POINTS = 4000
 
 #: Bytes of address space for the libraries and the figures, in addition to the records.
 _MEMORY = 8_000_000_000
@@ -89,7 +81,8 @@ def main() -> int:
             elif rank is None:
                 made = render_figures(job, read_search_result(job, store, blobs, rank))
             elif arguments.numbers:
-                made = render_simulation(read_search_result(job, store, blobs, rank), rank)
+                found = read_search_result(job, store, blobs, rank)
+                made = write_free_run(found.models[0], found.split.validation, rank)
             else:
                 made = render_model_figures(read_search_result(job, store, blobs, rank), rank)
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
@@ -207,16 +200,7 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
     drawn = {f"{rank}/{name}": FIGURES[name](entry, found.split) for name in model_figures(found)}
-    return _save_all(drawn) | render_simulation(found, rank)
-
-
-def render_simulation(found: SearchResult, rank: int) -> dict[str, bytes]:
-    """Return the free run of a model on the validation data as numbers, by artefact name."""
-    entry, data = found.models[0], found.split.validation
-    bands = entry.bands
-    band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
-    run = simulate_freely(entry.model, data, entry.warm_up)
-    return {f"{rank}/free-run.json": _free_run_document(data, run.y, run.outcome, band)}
+    return _save_all(drawn) | write_free_run(entry, found.split.validation, rank)
 
 
 def compile_fmu(job: Job, store: Store, rank: int) -> dict[str, bytes]:
@@ -249,14 +233,12 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
         couple(record, outputs), couple(held_out, outputs) if isinstance(held_out, Dataset) else held_out
     )
     data = match_coupled(model, parts.validation.map(lambda each: average_samples(each, model.average)))
-    run = fitted.simulate(data)
-    bands = fitted.bands(data) if fitted.prediction_bands else (None,) * outputs
-    made, figures = dict[str, bytes](), dict[str, bytes]()
+    run, bands = simulate_outputs(fitted, data)
+    made, figures = write_free_runs(data, run, bands), dict[str, bytes]()
     for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
         name = f"1/free-run-{number}"
         made |= _save_all({name: draw_free_run(each, y, band=band)})
         figures[each.output_name] = made[f"{name}.svg"]
-        made[f"1/free-run-{number}.json"] = _free_run_document(each, y, run.outcome, band)
     words = str((job.summary or {}).get("words", "")).splitlines()
     sentences = [*words[:1], *words[2:]]  # the second one is the equations
     terms = stored.document["terms"]
@@ -272,34 +254,6 @@ def _save_all(figures: Mapping[str, Figure]) -> dict[str, bytes]:
         save(figure, stream)
         made |= {f"{name}.svg": stream.getvalue(), f"{name}.csv": tabulate_lines(figure).encode()}
     return made
-
-
-def _free_run_document(
-    data: Dataset, simulated: NDArray[np.float64], outcome: EvaluationOutcome, band: PredictionBand | None
-) -> bytes:
-    """Return the validation data and a free run of one output as JSON, downsampled to `MAX_POINTS`."""
-    every = max(1, -(-data.samples // MAX_POINTS))
-    kept = slice(None, None, every)
-    time = data.start + data.dt * np.arange(data.samples)
-    document = {
-        "outcome": str(outcome),
-        "every": every,
-        "time_s": time[kept].tolist(),
-        "inputs": {name: data.u[kept, index].tolist() for index, name in enumerate(data.input_names)},
-        "measured": data.y[kept].tolist(),
-        "free_run": _finite_values(simulated[kept]),
-    }
-    if band is not None:
-        document["band"] = {
-            "level": band.level,
-            "lower": _finite_values(band.lower[kept]),
-            "upper": _finite_values(band.upper[kept]),
-        }
-    return json.dumps(document).encode()
-
-
-def _finite_values(values: NDArray[np.float64]) -> list[float | None]:
-    return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ import islands
 from islands.data.signal_map import match_rate
 from islands.validation.metrics import metrics
 from islands_api.client import Client
+from islands_api.web.routes import figures
+from islands_api.web.routes.figures import FigureError
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import JobState
 from islands_service.store.blobs import Blobs
@@ -59,6 +61,20 @@ def search(service, client, dataset, **settings) -> str:
     outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
     service.store.leases.finish(lease, outcome)
     return job.id
+
+
+def test_free_run_of_the_recommended_model_needs_no_other_process(service, client, path, monkeypatch):
+    job = search(service, client, client.upload(path))
+
+    async def refuse(*_arguments):
+        raise FigureError("no process may start")
+
+    monkeypatch.setattr(figures, "_run_figure_worker", refuse)
+    summary = client.job(job).summary
+    shown = service.client.get(f"/v1/jobs/{job}/models/{summary['rank']}/simulation")
+    assert shown.status_code == 200, shown.text
+    measured, simulated = (np.array(shown.json()[name], dtype=float) for name in ("measured", "free_run"))
+    assert metrics(measured, simulated).rmse == pytest.approx(summary["metrics"]["rmse"])
 
 
 def test_a_job_that_averages_samples_has_the_same_figures_everywhere(service, client, path, tmp_path):

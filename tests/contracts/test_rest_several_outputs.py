@@ -11,7 +11,7 @@ from islands_api.client import Client
 from islands_service.coordinator import identification_job
 from islands_service.coordinator.heartbeat import CoordinatorStopping
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.domain.job import JobState
+from islands_service.domain.job import JobState, name_free_run
 from islands_service.store.blobs import Blobs
 from support.command_line import succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
@@ -65,7 +65,11 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         assert generations == sorted(set(generations))
         succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
         assert "y1(k) =" in succeed("jobs", "watch", job.id, "--url", service.url)
+        names = [name_free_run(1, number) for number in (1, 2)]
+        stored = [service.store.results.artefact(job.id, name) for name in names]
         assert client.report(job).count(b"<img") == 2
+        # The report draws the free runs that were stored with the result.
+        assert stored == [service.store.results.artefact(job.id, name) for name in names]
         path = f"{service.url}/v1/jobs/{job.id}/models/1/simulation"
         first, second = (httpx.get(path, params={"output": number}, timeout=60).json() for number in (1, 2))
         assert first["measured"] != second["measured"]

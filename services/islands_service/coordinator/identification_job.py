@@ -8,7 +8,9 @@ from sys import maxsize
 from time import monotonic, sleep
 from typing import Any
 
-from islands.data.coupled_record import couple, split_coupled
+import structlog
+
+from islands.data.coupled_record import couple, match_coupled, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import describe_search_extrapolation
 from islands.evolution.engine import Engine
@@ -36,6 +38,7 @@ from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.search_view import SearchFront, describe_migration
 from islands_service.coordinator.stoppable_engine import StoppableEngine
+from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import BY_OWNER, RUN_TIME, JobOutcome, JobState, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.domain.search_limits import resolve_job_settings
@@ -43,6 +46,8 @@ from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
 from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
 
 #: Phase after the last step of the search.
 STORING = "storing the result"
@@ -84,11 +89,13 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     try:
         if len(spec.outputs) > 1:
             coupled = _identify_outputs(record, validation, spec, start, engine, reporter, stop)
-            return _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
+            outcome = _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
+            return _with_free_runs(outcome, partial(_write_coupled, coupled), run)
         found = _identify(record, validation, spec, start, engine, reporter, stop)
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
-    return _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
+    outcome = _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
+    return _with_free_runs(outcome, partial(_write_recommended, found), run)
 
 
 def _end_job(
@@ -107,6 +114,29 @@ def _end_job(
         "best models so far; the operator can raise the limit"
     )
     return make("; ".join(filter(None, [note, limit])), RUN_TIME)
+
+
+def _with_free_runs(outcome: JobOutcome, write: Callable[[], dict[str, bytes]], run: JobRun) -> JobOutcome:
+    """Return an outcome with the free run that its page shows first, unless it was cancelled.
+
+    Without it, for example because the disk is full, the first request for it makes it in another process.
+    """
+    if outcome.state != JobState.SUCCEEDED:
+        return outcome
+    try:
+        return replace(outcome, artefacts={name: run.blobs.write(data) for name, data in write().items()})
+    except StoreError as error:
+        log.warning("free run not stored", job=run.job.id, reason=str(error))
+        return outcome
+
+
+def _write_recommended(found: SearchResult) -> dict[str, bytes]:
+    return write_free_run(found.recommended, found.split.validation, found.recommendation.rank)
+
+
+def _write_coupled(found: CoupledResult) -> dict[str, bytes]:
+    data = match_coupled(found.model, found.split.validation)
+    return write_free_runs(data, *simulate_outputs(found, data))
 
 
 class SearchStop:

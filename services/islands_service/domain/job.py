@@ -78,6 +78,9 @@ REPORT = "report.html"
 #: Artefact of a model: the model as FMU, below its rank.
 FMU = "model.fmu"
 
+#: Artefact of a model with its free run over the validation data as numbers, below its rank.
+FREE_RUN = "free-run.json"
+
 #: Artefact of a discrepancy job with the simulation extended by the effects found.
 EXTENDED = "extended.json"
 
@@ -270,6 +273,11 @@ def find_datasets(spec: Mapping[str, Any]) -> tuple[str, ...]:
     if isinstance(simulation, dict) and simulation.get("kind") == "fmu":
         named.append(simulation.get("file"))
     return tuple(dict.fromkeys(name for name in named if isinstance(name, str)))
+
+
+def name_free_run(rank: int, output: int | None = None) -> str:
+    """Return the name of the artefact with a free run; the outputs of several are numbered from 1."""
+    return f"{rank}/{FREE_RUN}" if output is None else f"{rank}/free-run-{output}.json"
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,15 @@ from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.requests import StrictRoute
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
-from islands_service.domain.job import DISCREPANCY, FMU, IDENTIFICATION, MONITORING, REPORT
+from islands_service.domain.job import (
+    DISCREPANCY,
+    FMU,
+    FREE_RUN,
+    IDENTIFICATION,
+    MONITORING,
+    REPORT,
+    name_free_run,
+)
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.confined_process import REQUESTS
 from islands_service.store.backends.object_store import ObjectStoreError
@@ -47,11 +55,8 @@ _FAILURE_SECONDS = 300.0
 #: Maximum number of failures that are stored.
 _MAX_FAILURES = 1000
 
-#: Artefact with the simulation of a model as numbers.
-SIMULATION_ARTEFACT = "free-run.json"
-
 #: Options of the process that makes an artefact without all figures, by the end of its name.
-_PARTS = {SIMULATION_ARTEFACT: "--numbers", FMU: "--fmu"}
+_PARTS = {FREE_RUN: "--numbers", FMU: "--fmu"}
 
 _SVG_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}
@@ -189,7 +194,7 @@ async def simulation(
         raise ResourceNotFoundError(
             f"the model has {outputs} output{'s' * (outputs > 1)}, there is no {output}"
         )
-    name = f"{rank}/free-run-{output}.json" if outputs > 1 else f"{rank}/{SIMULATION_ARTEFACT}"
+    name = name_free_run(rank, output if outputs > 1 else None)
     return await _figure_response(state, caller, job, name, rank, "application/json")
 
 

@@ -18,11 +18,12 @@ from islands.io.result_text.statements import describe
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
+from islands_service.domain.free_runs import write_free_run
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, Submission
 from islands_service.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import StoreUnavailableError
+from islands_service.store.database import StorageFullError, StoreUnavailableError
 from support.job_runs import Interruption, make_run
 from support.stores import ALICE
 
@@ -35,8 +36,10 @@ def claim(store: Store, name: str = "me") -> Lease:
     return lease
 
 
-def run_job(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> JobOutcome:
-    return run_identification_job(make_run(lease, store, blobs, check, 1e-9))
+def run_job(
+    lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None, every: float = 1e-9
+) -> JobOutcome:
+    return run_identification_job(make_run(lease, store, blobs, check, every))
 
 
 def get_models(outcome: JobOutcome) -> list[Any]:
@@ -65,6 +68,46 @@ def test_job_finds_the_models_of_a_single_process(
     words = ended.summary["words"].splitlines()
     assert len(words) > 5
     assert describe(result_document(drawn)) == words
+
+
+@pytest.mark.ci
+def test_free_run_stored_with_the_result_is_that_of_the_figures(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found
+) -> None:
+    lease = claim(store)
+    outcome = run_job(lease, store, blobs)
+    store.leases.finish(lease, outcome)
+    ended = store.jobs.get(ALICE, job.id)
+    assert ended.summary is not None
+    rank = ended.summary["rank"]
+    (name,) = outcome.artefacts
+    blob = store.results.artefact(job.id, name)
+    assert blob is not None
+    found = read_search_result(ended, store, blobs, rank)
+    assert {name: blobs.read(blob)} == write_free_run(found.models[0], found.split.validation, rank)
+    assert json.loads(blobs.read(blob))["band"]["level"] == 0.9
+
+
+class FullDisk:
+    """Blobs of which none can be written."""
+
+    def __init__(self, blobs: Blobs) -> None:
+        self._blobs = blobs
+
+    def write(self, _data: bytes) -> str:
+        raise StorageFullError("full")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._blobs, name)
+
+
+@pytest.mark.ci
+def test_job_succeeds_without_space_for_its_free_run(store: Store, blobs: Blobs, job: Job) -> None:
+    lease = claim(store)
+    with structlog.testing.capture_logs() as logged:
+        outcome = run_job(lease, store, FullDisk(blobs), every=600.0)
+    assert (outcome.state, dict(outcome.artefacts)) == (JobState.SUCCEEDED, {})
+    assert "free run not stored" in [each["event"] for each in logged]
 
 
 @pytest.mark.ci
@@ -438,6 +481,6 @@ def test_unavailable_store_does_not_cause_repeated_checkpoints(
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
     before = set(dict(blobs.all()))
     flaky = Flaky(store, lambda number: number < 20)
-    run_identification_job(make_run(claim(store), flaky, blobs, lambda: None, 3600.0))  # type: ignore[arg-type]
+    outcome = run_job(claim(store), flaky, blobs, every=3600.0)
     assert flaky.reports >= 20
-    assert len(set(dict(blobs.all())) - before) == 1
+    assert len(set(dict(blobs.all())) - before - set(outcome.artefacts.values())) == 1

@@ -1,0 +1,83 @@
+"""Free runs of models over the validation data, as numbers for a screen: artefacts of a job."""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.coupled_record import CoupledRecord
+from islands.data.dataset import Dataset
+from islands.facade.coupled.result import FittedCoupledModel
+from islands.simulation.initial_outputs import simulate_freely
+from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import Simulation
+from islands.validation.assessment import Assessment
+from islands.validation.prediction_bands import PredictionBand
+from islands_service.domain.job import name_free_run
+
+#: Largest number of samples of a free run that is returned as numbers: a screen shows no more.
+MAX_POINTS = 4000
+
+
+def write_free_run(entry: Assessment, data: Dataset, rank: int) -> dict[str, bytes]:
+    """Simulate a model of one output with its band; return the document by artefact name.
+
+    Parameters
+    ----------
+    entry : Assessment
+    data : Dataset
+        Validation data with the sampling time of the model.
+    rank : int
+        Rank of the model.
+    """
+    bands = entry.bands
+    band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
+    run = simulate_freely(entry.model, data, entry.warm_up)
+    return {name_free_run(rank): _write_document(data, run.y, run.outcome, band)}
+
+
+def simulate_outputs(
+    fitted: FittedCoupledModel, data: CoupledRecord
+) -> tuple[Simulation, tuple[PredictionBand | None, ...]]:
+    """Return the free run of a model of several outputs, and the band of each, None without bands."""
+    bands = fitted.bands(data) if fitted.prediction_bands else (None,) * len(data.records)
+    return fitted.simulate(data), bands
+
+
+def write_free_runs(
+    data: CoupledRecord, run: Simulation, bands: Sequence[PredictionBand | None]
+) -> dict[str, bytes]:
+    """Return the documents of a free run of several outputs by artefact name; see `simulate_outputs`."""
+    return {
+        name_free_run(1, number): _write_document(each, y, run.outcome, band)
+        for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1)
+    }
+
+
+def _write_document(
+    data: Dataset, simulated: NDArray[np.float64], outcome: EvaluationOutcome, band: PredictionBand | None
+) -> bytes:
+    """Return the validation data and a free run of one output as JSON, downsampled to `MAX_POINTS`."""
+    every = max(1, -(-data.samples // MAX_POINTS))
+    kept = slice(None, None, every)
+    time = data.start + data.dt * np.arange(data.samples)
+    document = {
+        "outcome": str(outcome),
+        "every": every,
+        "time_s": time[kept].tolist(),
+        "inputs": {name: data.u[kept, index].tolist() for index, name in enumerate(data.input_names)},
+        "measured": data.y[kept].tolist(),
+        "free_run": _finite_values(simulated[kept]),
+    }
+    if band is not None:
+        document["band"] = {
+            "level": band.level,
+            "lower": _finite_values(band.lower[kept]),
+            "upper": _finite_values(band.upper[kept]),
+        }
+    return json.dumps(document).encode()
+
+
+def _finite_values(values: NDArray[np.float64]) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in values.tolist()]
