@@ -130,6 +130,25 @@ class FreeRun(ResponseModel):
     band: Band | None = None
 
 
+class SearchFreeRun(ResponseModel):
+    """Free run of the best model so far of a running search over its estimation data, for a plot."""
+
+    job: str
+    output: str
+    generation: int = Field(description="Generation of the search, as in `progress.free_run`.")
+    size: int = Field(description="Number of terms of the smallest model whose error is near the least one.")
+    error: float = Field(description="RMS error of the model in the search.")
+    outcome: str = Field(description="`ok`, or where the free run diverged.")
+    dt: float = Field(description="Sampling time in seconds.")
+    start: float = Field(description="Time of the first sample in seconds.")
+    samples: int
+    rows: tuple[int, ...] = Field(description="First sample, from 0, of each of at most 500 parts.")
+    outputs: tuple[Envelope, ...] = Field(
+        description="`measured` and `free_run`, which starts from the first measured outputs: the least and "
+        "the greatest value of every part, with six digits; null after a divergence."
+    )
+
+
 class DiagnosisOutputs(ResponseModel):
     """Measured and simulated outputs of a diagnosis, for a plot."""
 

@@ -1,5 +1,6 @@
 """Page of a running search: its phase in words, the front with equations, and a stop that keeps models."""
 
+import re
 from collections.abc import Callable, Iterator
 from threading import Thread
 from typing import Any
@@ -104,6 +105,14 @@ def test_stop_and_keep_the_best_ends_a_search_with_models(
     job = service.submit(1_000_000, name="endless")
     page = opened(f"#/jobs/{job}")
     expect(page.locator(".live .equation")).to_contain_text("y_um(k) = ", timeout=60_000)
+    run = page.locator(".search-run")
+    expect(run.locator(".legend li")).to_contain_text(["measured", "free run"])
+    expect(run).to_contain_text(re.compile(r"\d+ terms?, generation [\d ]+, over the estimation data\."))
+    drawn = run.locator(".plot path.line").evaluate_all("(lines) => lines.map((each) => each.getAttribute('d'))")
+    assert [len(each) > 500 for each in drawn] == [True, True]
+    # Its equation is shown, and the search still improves it.
+    terms = run.locator("p.small").inner_text().split(",")[0]
+    expect(page.locator(".live-model")).to_contain_text(f": {terms}, error")
     page.get_by_role("button", name="Stop and keep the best").click()
     expect(page.get_by_role("button", name="Stop and keep the best")).to_be_hidden()
     expect(page.locator(".title .state")).to_have_text("succeeded", timeout=60_000)

@@ -28,6 +28,7 @@ GUARDED = {
     ("POST", "/v1/jobs/{job}/resume"): "write",
     ("GET", "/v1/jobs/{job}/history"): "read",
     ("GET", "/v1/jobs/{job}/events"): "read",
+    ("GET", "/v1/jobs/{job}/free-run"): "read",
     ("GET", "/v1/jobs/{job}/models"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}/export"): "read",

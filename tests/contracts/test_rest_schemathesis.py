@@ -61,6 +61,7 @@ include-name = [
     "GET /v1/jobs/{{job}}/extended", "GET /v1/jobs/{{job}}/figures", "GET /v1/jobs/{{job}}/history",
     "GET /v1/jobs/{{job}}/models", "GET /v1/jobs/{{job}}/report", "GET /v1/monitors/{{monitor}}/state",
     "GET /v1/jobs/{{job}}/extended/export", "GET /v1/jobs/{{job}}/outputs",
+    "GET /v1/jobs/{{job}}/free-run",
 ]
 checks.ensure_resource_availability.enabled = false
 """

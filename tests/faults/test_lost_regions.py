@@ -71,6 +71,7 @@ def test_a_killed_coordinator_of_a_region_changes_neither_result_nor_checkpoint(
             kill(victim := min(eventually(coordinators)))
             eventually(lambda: not alive([victim]))
             texts.append(checkpoint(epoch))
+            assert exactly(epoch.archipelago.find_front()) == exactly(whole[2].archipelago.find_front())
             assert not epoch.archipelago.islands._regions  # they are rendered where they are
     assert [epoch.steps for epoch in found] == [epoch.steps for epoch in whole]
     # The actors have ended, and the islands of the last epoch are still here.
@@ -90,7 +91,7 @@ def test_lost_islands_are_a_loss_of_the_cluster(posed, whole, messages):
     gone = ray.remote(max_retries=0)(lambda: os._exit(1)).remote()
     islands = RegionIslands([0, 3], 6, [ray.put(()), gone], posed, ray.put(posed))
     lost = replace(whole[0], archipelago=Archipelago(islands))
-    for access in (lambda: checkpoint(lost), lambda: islands[4]):
+    for access in (lambda: checkpoint(lost), lambda: islands[4], lost.archipelago.find_front):
         with pytest.raises(ClusterError, match="islands were lost"):
             access()
 

@@ -114,6 +114,7 @@ class BaseClient(Generic[H]):
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)
     simulate = Endpoint(simulation_calls.simulate)
+    free_run = Endpoint(simulation_calls.free_run)
     fmu = Endpoint(calls.fmu)
     create_monitor = Endpoint(monitor_calls.create_monitor)
     monitors = Endpoint(monitor_calls.monitors)

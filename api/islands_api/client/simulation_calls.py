@@ -8,6 +8,7 @@ import numpy as np
 from islands_api.client.calls import JobRef, RequestSpec, quote_id
 from islands_api.client.response_parsing import read_as
 from islands_api.model_simulation_schemas import SimulatedOutput
+from islands_api.result_schemas import SearchFreeRun
 
 
 def simulate(
@@ -47,3 +48,8 @@ def simulate(
     body = {name: value for name, value in given.items() if value is not None}
     path = f"/v1/jobs/{quote_id(which)}/models/{rank}/simulate"
     return RequestSpec("POST", path, read_as(SimulatedOutput), json=body)
+
+
+def free_run(which: JobRef) -> RequestSpec[SearchFreeRun]:
+    """Return the free run of the best model so far of a running search, with the measured output."""
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/free-run", read_as(SearchFreeRun))

@@ -18,7 +18,7 @@ from islands_service.store.job_rows.queue_places import QueuePlace
 from islands_service.store.tenants.keys import Key
 
 #: Parts of the progress that are valid only while a job runs.
-_OF_ATTEMPTS = ("phase", "note", "seconds_left", "evaluations_per_second")
+_OF_ATTEMPTS = ("phase", "note", "seconds_left", "evaluations_per_second", "free_run")
 
 #: Seconds for which the place of a queued job is kept.
 _PLACE_SECONDS = 1.0

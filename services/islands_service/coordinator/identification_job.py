@@ -8,9 +8,7 @@ from sys import maxsize
 from time import monotonic, sleep
 from typing import Any
 
-import structlog
-
-from islands.data.coupled_record import couple, match_coupled, split_coupled
+from islands.data.coupled_record import couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import describe_search_extrapolation
 from islands.evolution.engine import Engine
@@ -27,18 +25,22 @@ from islands.facade.identification_progress import CLASS_PHASES, SEARCH, Identif
 from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
-from islands.io.models import NARX, model_json
-from islands.io.result_folder import result_document
-from islands.io.result_text.coupled_statements import describe_coupled
-from islands.io.result_text.statements import describe
+from islands.io.models import NARX
 from islands.progress import PhasedProgress, ProgressCallback, StoppedError, TimeLeft
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
+from islands_service.coordinator.identification_outcome import (
+    keep_free_runs,
+    make_coupled_outcome,
+    make_outcome,
+    write_coupled,
+    write_recommended,
+)
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.search_view import SearchFront, describe_migration
 from islands_service.coordinator.stoppable_engine import StoppableEngine
-from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
+from islands_service.coordinator.stored_free_run import StoredFreeRun
 from islands_service.domain.job import BY_OWNER, RUN_TIME, JobOutcome, JobState, ProgressReport
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.domain.search_limits import resolve_job_settings
@@ -46,8 +48,6 @@ from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
 from islands_service.store.database import StoreError
-
-log = structlog.get_logger()
 
 #: Phase after the last step of the search.
 STORING = "storing the result"
@@ -90,12 +90,12 @@ def run_identification_job(run: JobRun) -> JobOutcome:
         if len(spec.outputs) > 1:
             coupled = _identify_outputs(record, validation, spec, start, engine, reporter, stop)
             outcome = _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
-            return _with_free_runs(outcome, partial(_write_coupled, coupled), run)
+            return keep_free_runs(outcome, partial(write_coupled, coupled), run)
         found = _identify(record, validation, spec, start, engine, reporter, stop)
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
     outcome = _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
-    return _with_free_runs(outcome, partial(_write_recommended, found), run)
+    return keep_free_runs(outcome, partial(write_recommended, found), run)
 
 
 def _end_job(
@@ -114,29 +114,6 @@ def _end_job(
         "best models so far; the operator can raise the limit"
     )
     return make("; ".join(filter(None, [note, limit])), RUN_TIME)
-
-
-def _with_free_runs(outcome: JobOutcome, write: Callable[[], dict[str, bytes]], run: JobRun) -> JobOutcome:
-    """Return an outcome with the free run that its page shows first, unless it was cancelled.
-
-    Without it, for example because the disk is full, the first request for it makes it in another process.
-    """
-    if outcome.state != JobState.SUCCEEDED:
-        return outcome
-    try:
-        return replace(outcome, artefacts={name: run.blobs.write(data) for name, data in write().items()})
-    except StoreError as error:
-        log.warning("free run not stored", job=run.job.id, reason=str(error))
-        return outcome
-
-
-def _write_recommended(found: SearchResult) -> dict[str, bytes]:
-    return write_free_run(found.recommended, found.split.validation, found.recommendation.rank)
-
-
-def _write_coupled(found: CoupledResult) -> dict[str, bytes]:
-    data = match_coupled(found.model, found.split.validation)
-    return write_free_runs(data, *simulate_outputs(found, data))
 
 
 class SearchStop:
@@ -240,65 +217,6 @@ def _identify_outputs(
     return result.with_wall_time(reporter.spent)
 
 
-def make_coupled_outcome(found: CoupledResult, note: str = "", ended_by: str = "") -> JobOutcome:
-    """Return the part of a result of several outputs that the store keeps; see `make_outcome`."""
-    document = found.document()
-    words = describe_coupled(document)
-    (model,) = models = document.pop("models")
-    searches = [result.search_result.search for result in found.results]
-    summary = {
-        "models": 1,
-        "rank": 1,
-        "reasons": [],
-        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
-        "equation": "; ".join(found.equation.splitlines()),
-        "size": model["size"],
-        "metrics": model["metrics"]["validation"]["free_run"],
-        "property_1": False,
-        "evaluations": sum(search.evaluations for search in searches),
-        "wall_s": found.wall_s,
-        "ended_by": ended_by or searches[-1].ended_by,
-        **({"note": note} if note else {}),
-    }
-    return JobOutcome(JobState.SUCCEEDED, document, ((models[0], model_json(found.model)),), summary)
-
-
-def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> JobOutcome:
-    """Return the part of a search result that the store keeps.
-
-    Parameters
-    ----------
-    found : SearchResult
-    note : str
-        For the owner, in the summary.
-    ended_by : str
-        What ended the search, if it is not known to the search.
-    """
-    if ended_by:
-        found = replace(found, search=replace(found.search, ended_by=ended_by))
-    document = result_document(found)
-    words = describe(document)
-    models = document.pop("models")
-    recommended = document["recommended"]
-    best = models[recommended["rank"] - 1]
-    summary = {
-        "models": len(models),
-        "rank": recommended["rank"],
-        "reasons": recommended["reasons"],
-        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
-        "equation": found.recommended.model.equation().line,
-        "size": best["size"],
-        "metrics": best["metrics"]["validation"]["free_run"],
-        "property_1": best["physics"]["property_1"],
-        "evaluations": document["search"]["evaluations"],
-        "wall_s": document["search"]["wall_s"],
-        "ended_by": document["search"]["ended_by"],
-        **({"note": note} if note else {}),
-    }
-    files = [model_json(entry.model) for entry in found.models]
-    return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
-
-
 def _make_progress(progress: ProgressCallback, spec: Identification, samples: int) -> PhasedProgress:
     if spec.model != NARX:
         return PhasedProgress(progress, CLASS_PHASES)
@@ -323,6 +241,7 @@ class ProgressReporter:
     ) -> None:
         self._warnings = {"warnings": list(warnings)} if warnings else {}
         self._outputs, self._seed, self._front = len(spec.outputs), spec.seed, front
+        self._free_run = StoredFreeRun(run.job, run.blobs)
         self._phases = _make_progress(self._keep_stage, spec, samples)
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
         self._started_at = monotonic() - start.spent
@@ -359,8 +278,8 @@ class ProgressReporter:
         self._phases(message, fraction)
         reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
-            progress = self._run.notes.complete({**reached, **self._stage})
-            self._run.store.leases.report(self._run.lease, ProgressReport(progress))
+            self._run.store.leases.report(self._run.lease, self._make_report(reached))
+            self._free_run.confirm()
         except StoreError as error:
             # Continue the search. The next report has the progress.
             self._outage.fail(error, job=self._run.job.id)
@@ -378,6 +297,12 @@ class ProgressReporter:
             "seconds_left": self._left.at(now),
             **self._warnings,
         }
+
+    def _make_report(self, reached: dict[str, Any]) -> ProgressReport:
+        """Return the report of a progress, with the free run of the best model."""
+        artefacts = self._free_run.write(self._front.free_run)
+        progress = self._run.notes.complete({**reached, **self._stage, **self._free_run.describe()})
+        return ProgressReport(progress, artefacts=artefacts)
 
     def _reached_before(self) -> dict[str, Any]:
         """Return the progress of earlier attempts, without their note."""
@@ -399,8 +324,7 @@ class ProgressReporter:
         reached = self._progress(state, settings)
         if searching:
             self._keep_search(state, settings, reached["evaluations_per_second"])
-        progress = self._run.notes.complete({**reached, **self._stage})
-        report = ProgressReport(progress, points, after=after)
+        report = replace(self._make_report(reached), points=points, after=after)
         try:
             if started >= self._checkpoint_at:
                 blob = self._checkpoints.write(state, self.spent, self.choice)
@@ -414,6 +338,7 @@ class ProgressReporter:
             self._schedule(started)
             return False
         self._outage.succeed(job=self._run.job.id)
+        self._free_run.confirm()
         self._stored_points = len(summed.history) - 1
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)

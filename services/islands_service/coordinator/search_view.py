@@ -1,6 +1,7 @@
 """View of a running search for its owner: the front of size against error, and the last migration.
 
-A search never reads it. Its size is bounded, because every report of progress contains it.
+A search never reads it. Its size is bounded, because every report of progress contains it. The free run of
+the best model is larger, and is stored once.
 """
 
 from collections.abc import Iterable, Mapping
@@ -8,16 +9,20 @@ from math import sqrt
 from time import monotonic
 from typing import Any
 
+import structlog
+
 from islands.data.channel_names import parse_channel_name
-from islands.evolution.archipelago import RemoteIslands
-from islands.evolution.hall_of_fame import pareto_front
-from islands.evolution.individual import Individual
+from islands.evolution.individual import Individual, Population
 from islands.evolution.migration.topology import parse_topology
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation
 from islands.models.narx import Model
+from islands_service.domain.free_runs import SearchFreeRun, simulate_searched
+from islands_service.runtime.errors import ClusterError
+
+log = structlog.get_logger()
 
 #: Largest number of models of a front, and of characters of an equation: together less than 7 kB.
 MAX_MODELS, MAX_CHARACTERS = 16, 300
@@ -25,43 +30,71 @@ MAX_MODELS, MAX_CHARACTERS = 16, 300
 #: Significant digits of the parameters, which the final estimation changes.
 _DIGITS = 4
 
-#: Largest part of the time of a job that the front may take: islands of actors have to be unpacked for it.
-_FRONT_SHARE = 0.02
+#: Largest part of the time of a job that the front and the free run may take: islands of actors have to be
+#: unpacked for it, and long records simulated.
+_SHARE = 0.01
+
+#: Error of the model that is simulated, relative to the least error, at most.
+_SHOWN_RATIO = 1.1
 
 #: Largest number of islands whose migrations are shown.
 MAX_ISLANDS = 16
 
 
 class SearchFront:
-    """Front of size against error of the present search of a job."""
+    """Front of size against error of the present search of a job, and the free run of its best model.
+
+    Attributes
+    ----------
+    free_run : SearchFreeRun or None
+        Free run of the smallest model whose error is near the least one; None before the first front.
+    """
 
     def __init__(self) -> None:
         self._problem: Problem | None = None
         self._best: Mapping[int, float] = {}
         self._front: list[dict[str, Any]] = []
         self._due = 0.0
+        self.free_run: SearchFreeRun | None = None
 
     def begin(self, problem: Problem) -> None:
         """Begin with the front of another search."""
         self._problem, self._best, self._front, self._due = problem, {}, [], 0.0
+        self.free_run = None
 
     def update(self, state: SearchState) -> list[dict[str, Any]]:
         """Return the models of the front, smallest first: ``size``, ``error`` (RMS) and ``equation``.
 
-        It is computed again only if an error has changed, and rarely if that takes long. It is empty if the
-        islands are in other processes, from which they are not fetched.
+        It is computed again only if an error has changed, and rarely if that takes long, together with the
+        free run. If islands of a cluster are lost, it remains: the search itself handles the loss.
         """
         best, began = state.history[-1].best, monotonic()
-        is_remote = isinstance(state.archipelago.islands, RemoteIslands)
-        if self._problem is None or is_remote or best == self._best or began < self._due:
+        if self._problem is None or best == self._best or began < self._due:
             return self._front
-        found = (
-            entry for island in state.archipelago.islands for entry in island.hall_of_fame.best().values()
-        )
-        self._front = [_describe(each, self._problem) for each in _thin_out(pareto_front(found))]
-        self._best, ended = best, monotonic()
-        self._due = ended + (ended - began) / _FRONT_SHARE
+        try:
+            front = state.archipelago.find_front()
+        except ClusterError as error:
+            log.warning("front not updated", reason=str(error))
+        else:
+            self._best, self._front = best, [_describe(each, self._problem) for each in _thin_out(front)]
+            if front:
+                generation = state.history[-1].generation
+                self.free_run = _simulate(_find_small(front), self._problem, generation)
+        ended = monotonic()
+        self._due = ended + (ended - began) / _SHARE
         return self._front
+
+
+def _find_small(front: Population) -> Individual:
+    """Return the smallest model whose error is near the least one."""
+    most = _SHOWN_RATIO**2 * min(each.fitness for each in front)
+    return next(each for each in front if each.fitness <= most)
+
+
+def _simulate(individual: Individual, problem: Problem, generation: int) -> SearchFreeRun:
+    offset = problem.offsets[0] if problem.offsets else 0.0
+    model = _make_model(individual, problem)
+    return simulate_searched(model, problem.record, offset, generation, sqrt(individual.fitness))
 
 
 def describe_migration(state: SearchState, settings: Settings, seed: int) -> dict[str, Any] | None:
@@ -100,16 +133,20 @@ def _describe(individual: Individual, problem: Problem) -> dict[str, Any]:
 
 def _write_equation(individual: Individual, problem: Problem) -> str:
     """Write the equation of a model with the names of the columns."""
-    record = problem.record
-    model = Model(
-        individual.regressors,
-        individual.theta,
-        input_names=record.input_names,
-        output_name=record.output_name,
-    )
+    record, model = problem.record, _make_model(individual, problem)
     names = (record.output_name, *(parse_channel_name(name).base for name in record.input_names))
     statement = ", ".join(
         f"{name} minus {offset:g}" for name, offset in zip(names, problem.offsets, strict=False) if offset
     )
     line = named_equation(model, _DIGITS)
     return f"{line}, with {statement}" if statement else line
+
+
+def _make_model(individual: Individual, problem: Problem) -> Model:
+    record = problem.record
+    return Model(
+        individual.regressors,
+        individual.theta,
+        input_names=record.input_names,
+        output_name=record.output_name,
+    )

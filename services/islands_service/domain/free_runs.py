@@ -1,7 +1,9 @@
-"""Free runs of models over the validation data, as numbers for a screen: artefacts of a job."""
+"""Free runs of the models of a job, as numbers for a screen."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,15 +11,88 @@ from numpy.typing import NDArray
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.facade.coupled.result import FittedCoupledModel
+from islands.models.narx import Model
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import Simulation
+from islands.simulation.predictors import Simulation, free_run
 from islands.validation.assessment import Assessment
 from islands.validation.prediction_bands import PredictionBand
 from islands_service.domain.job import name_free_run
+from islands_service.domain.plot_envelopes import describe_envelopes
 
 #: Largest number of samples of a free run that is returned as numbers: a screen shows no more.
 MAX_POINTS = 4000
+
+#: Largest number of parts of the free run of a running search, which is sent often.
+SEARCH_POINTS = 500
+
+#: Significant digits of such a free run.
+_DIGITS = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchFreeRun:
+    """Free run of the best model so far of a search.
+
+    Attributes
+    ----------
+    generation : int
+        Generation of the search.
+    size : int
+        Number of terms of the model.
+    document : mapping
+        Fields of `islands_api.result_schemas.SearchFreeRun`, without the job.
+    """
+
+    generation: int
+    size: int
+    document: Mapping[str, Any]
+
+    @property
+    def mark(self) -> dict[str, int]:
+        """What the progress of the job states about it."""
+        return {"size": self.size, "generation": self.generation}
+
+
+def simulate_searched(
+    model: Model, data: Dataset, offset: float, generation: int, error: float
+) -> SearchFreeRun:
+    """Simulate a model of a running search over its estimation data, from the measured first outputs.
+
+    Parameters
+    ----------
+    model : Model
+    data : Dataset
+    offset : float
+        Constant that was subtracted from the output of ``data``.
+    generation : int
+        Generation of the search.
+    error : float
+        Error of the model in the search.
+    """
+    run = free_run(model, data)
+    signals = {"measured": data.y + offset, "free_run": run.y + offset}
+    rows, columns = describe_envelopes(signals, 0, SEARCH_POINTS)
+    document = {
+        "output": data.output_name,
+        "generation": generation,
+        "size": model.size,
+        "error": error,
+        "outcome": str(run.outcome),
+        "dt": data.dt,
+        "start": data.start,
+        "samples": data.samples,
+        "rows": rows,
+        "outputs": [
+            {name: value if name == "name" else _round(value) for name, value in column.items()}
+            for column in columns
+        ],
+    }
+    return SearchFreeRun(generation, model.size, document)
+
+
+def _round(values: Sequence[float | None]) -> list[float | None]:
+    return [None if value is None else float(f"{value:.{_DIGITS}g}") for value in values]
 
 
 def write_free_run(entry: Assessment, data: Dataset, rank: int) -> dict[str, bytes]:

@@ -81,6 +81,9 @@ FMU = "model.fmu"
 #: Artefact of a model with its free run over the validation data as numbers, below its rank.
 FREE_RUN = "free-run.json"
 
+#: Artefact of a running search with the free run of its best model so far.
+SEARCH_FREE_RUN = "search-free-run.json"
+
 #: Artefact of a discrepancy job with the simulation extended by the effects found.
 EXTENDED = "extended.json"
 
@@ -367,12 +370,15 @@ class ProgressReport:
         New blob from which the job can continue; None keeps the previous one.
     after : int
         The points replace all stored points after this generation.
+    artefacts : mapping of str to str
+        Files for clients until the job has a result, as in `JobOutcome`; they replace those of equal names.
     """
 
     progress: Mapping[str, Any]
     points: tuple[tuple[int, int, Mapping[Any, float], tuple[float | None, ...]], ...] = ()
     checkpoint: str | None = None
     after: int = -1
+    artefacts: Mapping[str, str] = field(default_factory=dict)
 
 
 def find_seconds_left(progress: Mapping[str, Any], reported: float, at: float) -> float | None:

@@ -15,7 +15,7 @@ from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.facade.warm_up import warm_up
 from islands.processes.settings import freeze_garbage_collector
-from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_emigrants, unpack_island
+from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_individuals, unpack_island
 
 
 class IslandActor:
@@ -60,7 +60,7 @@ class IslandActor:
     def advance(self, before: PackedEpoch, *arriving: bytes) -> tuple[PackedEpoch, bytes]:
         """Run an island from its last stop to the next one; return the packed epoch and its emigrants."""
         began = monotonic()
-        immigrants = [unpack_emigrants(packed, self._primitives) for packed in arriving]
+        immigrants = [unpack_individuals(packed, self._primitives) for packed in arriving]
         # A search that ends kills its actors, so no stop function is needed.
         epoch = run_epoch(self._island(before), immigrants, self._evaluator, self._problem, lambda: False)
         assert epoch is not None

@@ -12,11 +12,12 @@ import pickle
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, overload
 
 from islands.evolution.engine import Caches
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.individual import Population
+from islands.evolution.individual import Individual, Population
 from islands.evolution.island import Island, StepInfo
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
@@ -80,10 +81,15 @@ def unpack_island(packed: bytes, primitives: Mapping[str, Primitive]) -> Island:
     return island
 
 
-def unpack_emigrants(packed: bytes, primitives: Mapping[str, Primitive]) -> Population:
-    """Unpickle emigrants with the primitives of their problem."""
-    emigrants: Population = _Unpickler(packed, primitives).load()
-    return emigrants
+def unpack_individuals(packed: bytes, primitives: Mapping[str, Primitive]) -> Population:
+    """Unpickle emigrants, or the best individuals, with the primitives of their problem."""
+    individuals: Population = _Unpickler(packed, primitives).load()
+    return individuals
+
+
+def pack_best(reports: Sequence[PackedEpoch], primitives: Mapping[str, Primitive]) -> bytes:
+    """Return the best individual of every size of islands, pickled."""
+    return _pack(tuple(PackedIslands(reports, primitives).find_best()))
 
 
 def _pack(value: object) -> bytes:
@@ -167,6 +173,22 @@ class PackedIslands(LazyIslands):
     def __init__(self, reports: Sequence[PackedEpoch], primitives: Mapping[str, Primitive]) -> None:
         super().__init__(len(reports))
         self._reports, self._primitives = tuple(reports), primitives
+
+    def find_best(self) -> Iterator[Individual]:
+        """Yield the best individual of every size; see `islands.evolution.archipelago.StoredIslands`.
+
+        Only the islands that have one by their statistics are unpacked, or all if there are no statistics.
+        """
+        least: dict[int, tuple[float, int]] = {}
+        unknown = set[int]()
+        for place, report in enumerate(self._reports):
+            if not report.steps:
+                unknown.add(place)
+                continue
+            for size, fitness in report.steps[-1].best.items():
+                least[size] = min(least.get(size, (inf, place)), (fitness, place))
+        for place in sorted(unknown | {place for _, place in least.values()}):
+            yield from (self._islands.get(place) or self._read(place)).hall_of_fame.best().values()
 
     def _read(self, place: int) -> Island:
         return unpack_island(self._reports[place].packed, self._primitives)

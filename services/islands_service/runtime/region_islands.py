@@ -7,10 +7,17 @@ from typing import Any
 import ray
 from ray.exceptions import RayError, RayTaskError
 
+from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands_service.runtime.errors import ClusterError
-from islands_service.runtime.packed_epoch import LazyIslands, PackedEpoch, PackedIslands
+from islands_service.runtime.packed_epoch import (
+    LazyIslands,
+    PackedEpoch,
+    PackedIslands,
+    pack_best,
+    unpack_individuals,
+)
 
 
 def _render(
@@ -19,8 +26,13 @@ def _render(
     return [*map(function, PackedIslands(state, problem.settings.primitive_table))]
 
 
+def _pack_best(problem: Problem, state: tuple[PackedEpoch, ...]) -> bytes:
+    return pack_best(state, problem.settings.primitive_table)
+
+
 #: Ray prefers the machine that has the islands. Its CPUs are busy with islands, so that no CPU is requested.
 _TASK = ray.remote(num_cpus=0, max_retries=3)(_render)
+_BEST_TASK = ray.remote(num_cpus=0, max_retries=3)(_pack_best)
 
 
 class RegionIslands(LazyIslands):
@@ -87,6 +99,24 @@ class RegionIslands(LazyIslands):
         finally:
             for reference in tasks.values():
                 ray.cancel(reference, force=True)
+
+    def find_best(self) -> Iterator[Individual]:
+        """Yield the best individual of every size of every region.
+
+        Tasks of Ray find them, all at the same time.
+
+        Raises
+        ------
+        ClusterError
+            The islands of a region were lost with their machine.
+        """
+        tasks = [_BEST_TASK.remote(self._shared, state) for state in self._states]
+        try:
+            for task in tasks:
+                yield from unpack_individuals(_get(task), self._primitives)
+        finally:
+            for task in tasks:
+                ray.cancel(task, force=True)
 
     def _read(self, place: int) -> Island:
         region = bisect_right(self._starts, place) - 1

@@ -26,7 +26,7 @@ from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
 from islands_service.store.job_rows.job_claims import claim_job
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
-from islands_service.store.job_rows.job_results import store_result, to_text
+from islands_service.store.job_rows.job_results import replace_artefacts, store_result, to_text
 from islands_service.store.job_rows.job_search import describe_result, find_error
 from islands_service.store.job_rows.queue_places import QueuePlace, find_places
 from islands_service.store.tables import events, jobs, points
@@ -286,6 +286,7 @@ def _report(connection: Connection, lease: Lease, report: ProgressReport) -> Job
                 for generation, evaluations, best, least in report.points
             ],
         )
+    replace_artefacts(connection, row.id, report.artefacts)
     connection.execute(
         delete(events).where(
             events.c.job_id == row.id, events.c.kind == "progress", events.c.number <= row.version - KEPT

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, delete, insert, select
+from sqlalchemy import Connection, select
 
 from islands_service.domain.job import JobNotFoundError
 from islands_service.store.database import Database
+from islands_service.store.job_rows.job_results import replace_artefacts
 from islands_service.store.tables import artefacts, jobs, models, points, results
 
 
@@ -83,10 +84,6 @@ class Results:
             locked = connection.execute(select(jobs.c.id).where(jobs.c.id == job).with_for_update())
             if locked.one_or_none() is None:
                 raise JobNotFoundError(f"there is no job {job!r} any more")
-            connection.execute(
-                delete(artefacts).where(artefacts.c.job_id == job, artefacts.c.name.in_(blobs))
-            )
-            for name, blob in blobs.items():
-                connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
+            replace_artefacts(connection, job, blobs)
 
         self._database.write(operation)

@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from islands.evolution.hall_of_fame import HallOfFame, merge
+from islands.evolution.hall_of_fame import HallOfFame, merge, pareto_front
+from islands.evolution.individual import Individual, Population
 from islands.evolution.island import Island
 
 
@@ -14,6 +15,15 @@ class RemoteIslands(Protocol):
 
     def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
         """Yield the bytes that a function returns for each island, and call it where the islands are."""
+        ...
+
+
+@runtime_checkable
+class StoredIslands(Protocol):
+    """Interface of sequences of islands that are expensive to read, and know where their best models are."""
+
+    def find_best(self) -> Iterator[Individual]:
+        """Yield, among others, the best individual of every size; of equal ones that of the first island."""
         ...
 
 
@@ -38,6 +48,15 @@ class Archipelago:
     def hall_of_fame(self) -> HallOfFame:
         """Merged halls of fame of all islands."""
         return merge(island.hall_of_fame for island in self.islands)
+
+    def find_front(self) -> Population:
+        """Return the Pareto front of error and size, smallest first.
+
+        Islands in other processes are not fetched.
+        """
+        if isinstance(self.islands, StoredIslands):
+            return pareto_front(self.islands.find_best())
+        return pareto_front(entry for island in self.islands for entry in island.hall_of_fame.best().values())
 
     def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
         """Yield the bytes that a function returns for each island, in order.

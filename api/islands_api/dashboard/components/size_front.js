@@ -4,6 +4,7 @@ import { el, makeScrollable, setText } from "../lib/dom.js";
 import { formatNumber, formatTerms } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeLine } from "./equation.js";
+import { makeSearchRun } from "./search_run.js";
 
 /** Make a chart of errors by size. */
 const makeChart = (title, error, unit) =>
@@ -30,29 +31,21 @@ function letChoose(chart, chooses, choose) {
   });
 }
 
-/** Return the models of the front, smallest first; a search in many processes reports errors only. */
+/** Return the models of the front, smallest first; before the first front there are errors only. */
 function getFront({ front, best_by_size: best = {} } = {}) {
   if (front?.length) return front;
   const errors = Object.entries(best).map(([size, error]) => ({ size: Number(size), error }));
   return errors.filter(({ error }) => Number.isFinite(error)).sort((a, b) => a.size - b.size);
 }
 
-/** Error of the model that is shown unless another is chosen, relative to the least error, at most. */
-const SHOWN_RATIO = 1.1;
-
-/** Return the smallest model whose error is near the least one. */
-function findSmall(front) {
-  const least = Math.min(...front.map((each) => each.error));
-  return front.find((each) => each.error <= SHOWN_RATIO * least);
-}
-
 /** Make the panel; `show(job)` updates it. It is hidden before the first models, and with a result. */
-export function makeLivePanel(unit) {
+export function makeLivePanel(job, unit, signal) {
   const equation = el("code", { class: "plain" });
   const host = makeScrollable("Equation of the best model so far", equation);
   host.classList.add("equation");
   const statement = el("p", { class: "soft small" });
-  let [front, size] = [[], null];
+  let [front, size, simulated] = [[], null, null];
+  const run = makeSearchRun(job, unit, signal);
   const chart = makeChart("Front of size against error", "RMS error", unit);
   letChoose(chart, "shows the equation of a point", (at) => {
     size = at;
@@ -70,14 +63,18 @@ export function makeLivePanel(unit) {
     el("h2", {}, "Best models so far"),
     el("div", { class: "live-model" }, host, statement, preliminary),
     chart.node,
+    run.node,
   );
 
+  const findModel = (terms) => front.find((each) => each.size === terms);
+
   function showModel() {
-    const model = front.find((each) => each.size === size) ?? findSmall(front);
+    const model = findModel(size) ?? findModel(simulated) ?? front.at(-1);
     const text = model.equation ?? "";
     host.hidden = !text;
     if (equation.textContent !== text) equation.replaceChildren(...makeLine(text));
-    const which = model.size === size ? "Chosen point" : "Smallest model within 10 % of the least error";
+    let which = model === front.at(-1) ? "Model of the least error" : "Smallest model near the least error";
+    if (model.size === size) which = "Chosen point";
     const error = `${formatNumber(model.error)} ${unit}`.trim();
     setText(statement, `${which}: ${formatTerms(model.size)}, error ${error}`);
     const points = front.map((each) => [each.size, each.error]);
@@ -86,12 +83,14 @@ export function makeLivePanel(unit) {
 
   return {
     node,
-    show(job) {
-      front = getFront(job.progress ?? {});
-      node.hidden = front.length === 0 || job.state === "succeeded";
-      preliminary.hidden = job.state !== "running";
+    show({ progress, state }) {
+      front = getFront(progress ?? {});
+      simulated = progress?.free_run?.size;
+      node.hidden = front.length === 0 || state === "succeeded";
+      preliminary.hidden = state !== "running";
       if (node.hidden) return;
       showModel();
+      run.show(progress.free_run);
     },
   };
 }

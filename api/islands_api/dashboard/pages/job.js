@@ -175,7 +175,7 @@ export function mountJob(host, { id, rank }, signal) {
       // The errors of several outputs have no common scale.
       if (!isSearch(job) || hasSeveralOutputs(job)) return;
       convergence = makeConvergencePanel(id, unit, signal);
-      live = makeLivePanel(unit);
+      live = makeLivePanel(job, unit, signal);
       convergenceHost.replaceChildren(live.node, convergence.node);
       if (current) show(current);
     };

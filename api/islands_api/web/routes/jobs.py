@@ -1,4 +1,4 @@
-"""Jobs: submit, list, get, wait, label, cancel, stop, resume, delete, history."""
+"""Jobs: submit, list, get, wait, label, cancel, stop, resume, delete, history, free run of the search."""
 
 from functools import partial
 from typing import Annotated, Any
@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import SettingsError
+from islands_api.result_schemas import SearchFreeRun
 from islands_api.schemas import (
     LINE,
     TAG_PATTERN,
@@ -27,7 +28,7 @@ from islands_api.web.job_submission import (
     get_job_of_kind,
     submit_job,
 )
-from islands_api.web.problems import RESPONSES
+from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.requests import (
     REVALIDATE,
     Cursor,
@@ -39,7 +40,15 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, JSONItems, job_document
-from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_TAG_LENGTH, TERMINAL, Job, JobState
+from islands_service.domain.job import (
+    IDENTIFICATION,
+    KINDS,
+    MAX_TAG_LENGTH,
+    SEARCH_FREE_RUN,
+    TERMINAL,
+    Job,
+    JobState,
+)
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 
@@ -212,6 +221,24 @@ async def history(
     """
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     return await state.run_blocking(_read_history, state, found, after)
+
+
+@router.get("/{job}/free-run", response_model=SearchFreeRun)
+async def free_run(job: Id, caller: Reader, state: AppStateDep) -> Response:
+    """Return the free run of the best model so far of a running search, with the measured output.
+
+    `progress.free_run` of the job changes with it. A finished job has the free runs of its models.
+    """
+    found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
+    blob = await state.run_blocking(state.store.results.artefact, job, SEARCH_FREE_RUN)
+    if blob is None:
+        hint = "wait until its progress has free_run"
+        if found.state == JobState.SUCCEEDED:
+            hint = "see the /simulation of its /models"
+        elif not found.has_search:
+            hint = "its models are fitted without a search"
+        raise ResourceNotFoundError(f"job {job} is {found.state} and has no free run of a search: {hint}")
+    return Response(await state.run_blocking(state.blobs.read, blob), media_type="application/json")
 
 
 def _read_history(state: AppState, job: Job, after: int) -> JSONItems:

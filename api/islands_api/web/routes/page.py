@@ -82,6 +82,7 @@ FILES = {
     "components/result_card.js": _SCRIPT,
     "components/row_ranges.js": _SCRIPT,
     "components/run_form.js": _SCRIPT,
+    "components/search_run.js": _SCRIPT,
     "components/search_settings.js": _SCRIPT,
     "components/signal_lines.js": _SCRIPT,
     "components/signal_panels.js": _SCRIPT,

@@ -1,6 +1,7 @@
 """Results of jobs: the rows that the outcome of a job adds, in the transaction that ends it."""
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import Connection, delete, insert
@@ -34,10 +35,18 @@ def store_result(connection: Connection, job: str, outcome: JobOutcome) -> None:
         for rank, (document, file) in enumerate(outcome.models, start=1):
             values = {"job_id": job, "rank": rank, "document": to_text(document), "file": file}
             connection.execute(insert(models).values(values))
-        for name, blob in outcome.artefacts.items():
-            connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
+        replace_artefacts(connection, job, outcome.artefacts)
     if outcome.monitor is not None:
         update_monitor(connection, job, outcome.monitor)
+
+
+def replace_artefacts(connection: Connection, job: str, blobs: Mapping[str, str]) -> None:
+    """Store artefacts of a job, given as blobs by name, in place of those of equal names."""
+    if blobs:
+        named = artefacts.c.name.in_(blobs)
+        connection.execute(delete(artefacts).where(artefacts.c.job_id == job, named))
+        rows = [{"job_id": job, "name": name, "blob": blob} for name, blob in blobs.items()]
+        connection.execute(insert(artefacts), rows)
 
 
 def to_text(document: Any) -> str | None:

@@ -19,7 +19,15 @@ from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.free_runs import write_free_run
-from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, Submission
+from islands_service.domain.job import (
+    SEARCH_FREE_RUN,
+    Job,
+    JobOutcome,
+    JobState,
+    Lease,
+    LeaseLostError,
+    Submission,
+)
 from islands_service.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -86,6 +94,36 @@ def test_free_run_stored_with_the_result_is_that_of_the_figures(
     found = read_search_result(ended, store, blobs, rank)
     assert {name: blobs.read(blob)} == write_free_run(found.models[0], found.split.validation, rank)
     assert json.loads(blobs.read(blob))["band"]["level"] == 0.9
+
+
+@pytest.mark.ci
+def test_free_run_of_the_best_model_is_stored_while_the_job_searches(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr("islands_service.coordinator.stored_free_run._EVERY", 0.0)
+    monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e9)
+    seen = dict[int, int]()
+
+    def look() -> None:
+        progress = store.jobs.get(ALICE, job.id).progress or {}
+        if "free_run" in progress:
+            blob = store.results.artefact(job.id, SEARCH_FREE_RUN)
+            assert blob is not None
+            document = json.loads(blobs.read(blob))
+            stated = {name: document[name] for name in ("size", "generation")}
+            assert (document["job"], stated) == (job.id, progress["free_run"])
+            errors = {each["size"]: each["error"] for each in progress["front"]}
+            assert document["error"] == errors[document["size"]]
+            seen[document["generation"]] = len(set(dict(blobs.all())))
+
+    lease = claim(store)
+    outcome = run_job(lease, store, blobs, look, every=600.0)
+    assert len(seen) > 3
+    # Replaced free runs are deleted.
+    assert max(seen.values()) <= 5
+    store.leases.finish(lease, outcome)
+    assert store.results.artefact(job.id, SEARCH_FREE_RUN) is None
 
 
 class FullDisk:
@@ -483,4 +521,5 @@ def test_unavailable_store_does_not_cause_repeated_checkpoints(
     flaky = Flaky(store, lambda number: number < 20)
     outcome = run_job(claim(store), flaky, blobs, every=3600.0)
     assert flaky.reports >= 20
-    assert len(set(dict(blobs.all())) - before - set(outcome.artefacts.values())) == 1
+    written = set(dict(blobs.all())) - before - set(outcome.artefacts.values())
+    assert len(written - {store.results.artefact(job.id, SEARCH_FREE_RUN)}) == 1

@@ -1,7 +1,9 @@
 """View of a running search: the front has at most one bounded entry per size, and migrations are named."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,8 +19,9 @@ from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
-from islands.models.narx import canonical_order
+from islands.models.narx import Model, canonical_order
 from islands.models.regressor import regressor
+from islands.simulation.predictors import free_run
 from islands_service.coordinator.search_view import (
     MAX_CHARACTERS,
     MAX_ISLANDS,
@@ -26,8 +29,10 @@ from islands_service.coordinator.search_view import (
     SearchFront,
     describe_migration,
 )
+from islands_service.domain.free_runs import SEARCH_POINTS
+from islands_service.runtime.errors import ClusterError
 
-RECORD = Dataset(u=np.zeros((9, 1)), y=np.zeros(9), dt=0.1, input_names=("u_V",), output_name="y_um")
+RECORD = Dataset(u=np.zeros((99, 1)), y=np.zeros(99), dt=0.1, input_names=("u_V",), output_name="y_um")
 PROBLEM = Problem(RECORD, Settings())
 
 
@@ -74,13 +79,60 @@ def test_equation_in_deviations_names_the_offsets() -> None:
 
 
 def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("islands_service.coordinator.search_view._FRONT_SHARE", 1e9)
+    monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e9)
     front = SearchFront()
     assert front.update(searched([individual(1, 1.0)])) == []
     front.begin(PROBLEM)
     first = front.update(searched([individual(1, 1.0)]))
     assert front.update(searched([individual(1, 1.0)])) is first
     assert front.update(searched([individual(1, 0.25)]))[0]["error"] == 0.5
+
+
+def test_smallest_model_near_the_least_error_is_simulated_over_the_measured_output() -> None:
+    rng = np.random.default_rng(1)
+    signals = {"u": rng.normal(size=(900, 1)), "y": rng.normal(size=900)}
+    record = replace(RECORD, **signals, segments=(900,), start=2.0)
+    front = SearchFront()
+    front.begin(Problem(record, Settings(), offsets=(40.0, 0.0)))
+    assert front.free_run is None
+    # An error of 1.1 times the least one is near it, one of 1.2 times is not.
+    state = searched([individual(1, 1.2**2), individual(2, 1.09**2), individual(3, 1.0)])
+    front.update(state)
+    found = front.free_run
+    assert found is not None
+    assert found.mark == {"size": 2, "generation": 7}
+    model = Model(individual(2, 1.0).regressors, (0.5, 0.5), input_names=("u_V",), output_name="y_um")
+    document = found.document
+    assert (document["output"], document["start"], document["dt"]) == ("y_um", 2.0, 0.1)
+    measured, simulated = document["outputs"]
+    assert (measured["name"], simulated["name"]) == ("measured", "free_run")
+    assert len(document["rows"]) == len(simulated["minimum"]) <= SEARCH_POINTS
+    expected = 40.0 + free_run(model, record).y
+    # The first part is of the warm-up, which has no prediction.
+    assert (simulated["minimum"][0], simulated["maximum"][0]) == (None, None)
+    for part, (first, stop) in [*enumerate(pairwise([*document["rows"], 900]))][1:]:
+        for found_values, values in ((measured, 40.0 + record.y), (simulated, expected)):
+            least, greatest = np.fmin.reduce(values[first:stop]), np.fmax.reduce(values[first:stop])
+            assert found_values["minimum"][part] == pytest.approx(least, rel=1e-5)
+            assert found_values["maximum"][part] == pytest.approx(greatest, rel=1e-5)
+    # The next search of a job begins without it.
+    front.begin(PROBLEM)
+    assert front.free_run is None
+
+
+def test_lost_islands_leave_the_front_as_it_is() -> None:
+    class Lost(tuple[Island, ...]):
+        def find_best(self) -> Iterator[Individual]:
+            raise ClusterError("islands were lost")
+
+    front = SearchFront()
+    front.begin(PROBLEM)
+    first = front.update(searched([individual(1, 1.0)]))
+    front._due = 0.0
+    state = searched([individual(1, 0.25)])
+    assert front.update(replace(state, archipelago=Archipelago(Lost(state.archipelago.islands)))) is first
+    front._due = 0.0
+    assert front.update(state)[0]["error"] == 0.5
 
 
 def migration(generation: int, islands: int = 3, **changes: Any) -> dict[str, Any] | None:

@@ -9,10 +9,11 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, make_regressor
+from islands.evolution.island import StepInfo
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Apply, Lagged
 from islands_service.runtime import packed_epoch
-from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_emigrants, unpack_island
+from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_individuals, unpack_island
 from support.own_primitive import DEAD_ZONE
 from support.searches import SMALL, exactly, islands_of, record
 
@@ -40,7 +41,7 @@ def test_packed_island_is_unpacked_unchanged(islands):
 def test_packed_epoch_contains_emigrants_steps_and_caches(islands):
     epoch = IslandEpoch(islands[-1], islands[-1].elite[:2], ())
     found = pack_epoch(epoch, "me", {"pairs": (1, 2)})
-    assert unpack_emigrants(found.emigrants, PRIMITIVES) == epoch.emigrants
+    assert unpack_individuals(found.emigrants, PRIMITIVES) == epoch.emigrants
     assert found.steps == epoch.steps
     assert (found.actor, found.caches) == ("me", {"pairs": (1, 2)})
     assert pickle.loads(pickle.dumps(found)) == found
@@ -51,7 +52,7 @@ def test_unpacked_trees_contain_the_primitives_of_the_table():
     gene = Apply(DEAD_ZONE, (Lagged(1),))
     emigrants = (Individual((gene,), (make_regressor(gene),)),)
     packed = pack_epoch(IslandEpoch(empty_archipelago(1, 0).islands[0], emigrants, ())).emigrants
-    ((found,),) = (each.genes for each in unpack_emigrants(packed, {"dead_zone": DEAD_ZONE}))
+    ((found,),) = (each.genes for each in unpack_individuals(packed, {"dead_zone": DEAD_ZONE}))
     assert found.primitive is DEAD_ZONE
 
 
@@ -97,3 +98,24 @@ def test_iteration_keeps_no_island(packed):
     kept = packed[2]
     assert all(one is not other for one, other in zip(packed, packed, strict=True) if one is not kept)
     assert [*packed][2] is kept
+
+
+def test_front_of_packed_islands_is_that_of_the_islands_and_unpacks_few(islands, packed, monkeypatch):
+    expected = Archipelago(tuple(islands)).find_front()
+    assert exactly(Archipelago(packed).find_front()) == exactly(expected)
+    stated = [
+        StepInfo(0, 0, 0, {}, {size: each.fitness for size, each in island.hall_of_fame.best().items()})
+        for island in islands
+    ]
+    # The second one of two equal islands has no model that the first one lacks.
+    reports = [
+        pack_epoch(IslandEpoch(island, (), (step,))) for island, step in zip(islands, stated, strict=True)
+    ]
+    unpacked = []
+    unpack = packed_epoch.unpack_island
+    monkeypatch.setattr(
+        packed_epoch, "unpack_island", lambda *given: unpacked.append(given) or unpack(*given)
+    )
+    twice = PackedIslands([*reports, *reports], PRIMITIVES)
+    assert exactly(Archipelago(twice).find_front()) == exactly(expected)
+    assert len(unpacked) <= len(islands)

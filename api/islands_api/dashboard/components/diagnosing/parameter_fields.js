@@ -19,7 +19,8 @@ function writeNumbers(fields, given, factor) {
 /**
  * Make the table of parameters `{name, unit, default}`; null is the default of one that is estimated. Without
  * `hasValues`, the values are those of a text. With `chosen`, a check box selects the parameters that are
- * calibrated, at first these names. `read()` returns `{parameters, tolerance, chosen}`; `fill` sets the first two.
+ * calibrated, at first these names. `read()` returns `{parameters, tolerance, chosen}`; `fill` sets the first
+ * two.
  */
 export function makeParameterFields(parameters, { hasValues, units: [input, output], chosen = null }) {
   const [values, tolerances, boxes] = [[], [], []];

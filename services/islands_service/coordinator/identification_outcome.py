@@ -1,0 +1,104 @@
+"""Outcome of an identification job: what the store keeps of its result."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import structlog
+
+from islands.data.coupled_record import match_coupled
+from islands.evolution.search_result import SearchResult
+from islands.facade.coupled.result import CoupledResult
+from islands.io.models import model_json
+from islands.io.result_folder import result_document
+from islands.io.result_text.coupled_statements import describe_coupled
+from islands.io.result_text.statements import describe
+from islands_service.coordinator.job_run import JobRun
+from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
+from islands_service.domain.job import JobOutcome, JobState
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+
+def make_coupled_outcome(found: CoupledResult, note: str = "", ended_by: str = "") -> JobOutcome:
+    """Return the part of a result of several outputs that the store keeps; see `make_outcome`."""
+    document = found.document()
+    words = describe_coupled(document)
+    (model,) = models = document.pop("models")
+    searches = [result.search_result.search for result in found.results]
+    summary = {
+        "models": 1,
+        "rank": 1,
+        "reasons": [],
+        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
+        "equation": "; ".join(found.equation.splitlines()),
+        "size": model["size"],
+        "metrics": model["metrics"]["validation"]["free_run"],
+        "property_1": False,
+        "evaluations": sum(search.evaluations for search in searches),
+        "wall_s": found.wall_s,
+        "ended_by": ended_by or searches[-1].ended_by,
+        **({"note": note} if note else {}),
+    }
+    return JobOutcome(JobState.SUCCEEDED, document, ((models[0], model_json(found.model)),), summary)
+
+
+def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> JobOutcome:
+    """Return the part of a search result that the store keeps.
+
+    Parameters
+    ----------
+    found : SearchResult
+    note : str
+        For the owner, in the summary.
+    ended_by : str
+        What ended the search, if it is not known to the search.
+    """
+    if ended_by:
+        found = replace(found, search=replace(found.search, ended_by=ended_by))
+    document = result_document(found)
+    words = describe(document)
+    models = document.pop("models")
+    recommended = document["recommended"]
+    best = models[recommended["rank"] - 1]
+    summary = {
+        "models": len(models),
+        "rank": recommended["rank"],
+        "reasons": recommended["reasons"],
+        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
+        "equation": found.recommended.model.equation().line,
+        "size": best["size"],
+        "metrics": best["metrics"]["validation"]["free_run"],
+        "property_1": best["physics"]["property_1"],
+        "evaluations": document["search"]["evaluations"],
+        "wall_s": document["search"]["wall_s"],
+        "ended_by": document["search"]["ended_by"],
+        **({"note": note} if note else {}),
+    }
+    files = [model_json(entry.model) for entry in found.models]
+    return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
+
+
+def keep_free_runs(outcome: JobOutcome, write: Callable[[], dict[str, bytes]], run: JobRun) -> JobOutcome:
+    """Return an outcome with the free run that a client shows first, unless the job was cancelled.
+
+    Without it, for example because the disk is full, the first request for it makes it in another process.
+    """
+    if outcome.state != JobState.SUCCEEDED:
+        return outcome
+    try:
+        return replace(outcome, artefacts={name: run.blobs.write(data) for name, data in write().items()})
+    except StoreError as error:
+        log.warning("free run not stored", job=run.job.id, reason=str(error))
+        return outcome
+
+
+def write_recommended(found: SearchResult) -> dict[str, bytes]:
+    """Return the free run of the recommended model by artefact name."""
+    return write_free_run(found.recommended, found.split.validation, found.recommendation.rank)
+
+
+def write_coupled(found: CoupledResult) -> dict[str, bytes]:
+    """Return the free run of every output by artefact name."""
+    data = match_coupled(found.model, found.split.validation)
+    return write_free_runs(data, *simulate_outputs(found, data))
