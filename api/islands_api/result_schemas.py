@@ -130,7 +130,7 @@ class FreeRun(ResponseModel):
     band: Band | None = None
 
 
-class SearchFreeRun(ResponseModel):
+class SearchFreeRunView(ResponseModel):
     """Free run of the best model so far of a running search over its estimation data, for a plot."""
 
     job: str

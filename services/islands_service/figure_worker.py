@@ -6,9 +6,11 @@ output are for the owner of the job, those on standard error for the operator.
 
 import argparse
 import io
+import json
 import resource
 import sys
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC, EROFS
 from typing import Any
@@ -34,12 +36,13 @@ from islands.io.models import any_model_from_json, model_from_json
 from islands.io.result_folder import result_document
 from islands.io.result_models import read_criterion, read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
+from islands.reports.comparison import ComparedModel, comparison_report
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from islands.reports.origin import Origin
 from islands.validation.assessment import assess
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
-from islands_service.domain.job import FMU, REPORT, Job
+from islands_service.domain.job import FMU, REPORT, Job, name_free_run
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.settings import ServiceSettings, service_settings
@@ -66,25 +69,22 @@ def main() -> int:
     parser.add_argument("--rank", type=int, help="rank of a model; without it, the figures of the search")
     parser.add_argument("--numbers", action="store_true", help="only the free run of the model as numbers")
     parser.add_argument("--fmu", action="store_true", help="only the model as FMU, which has to be compiled")
+    parser.add_argument(
+        "--compare",
+        nargs="+",
+        metavar="JOB:RANK",
+        help="write the report of a comparison of the model with these to the standard output",
+    )
     arguments = parser.parse_args()
     settings = service_settings()
     _limit(settings)
     blobs = open_blobs(settings)
     try:
         with Store(settings.url) as store:
-            job = store.jobs.get(arguments.owner, arguments.job)
-            rank = arguments.rank
-            if arguments.fmu:
-                made = compile_fmu(job, store, rank)
-            elif len(parse_identification(job.spec).outputs) > 1:
-                made = render_outputs(job, store, blobs)
-            elif rank is None:
-                made = render_figures(job, read_search_result(job, store, blobs, rank))
-            elif arguments.numbers:
-                found = read_search_result(job, store, blobs, rank)
-                made = write_free_run(found.models[0], found.split.validation, rank)
-            else:
-                made = render_model_figures(read_search_result(job, store, blobs, rank), rank)
+            if arguments.compare:
+                sys.stdout.buffer.write(compare_models(arguments, store, blobs))
+                return 0
+            made = _make(arguments, store, blobs)
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
     except StorageFullError as error:
         return _report_failure(error, ENOSPC)
@@ -100,6 +100,66 @@ def main() -> int:
         print(error)
         return EINVAL
     return 0
+
+
+def _make(arguments: argparse.Namespace, store: Store, blobs: Blobs) -> dict[str, bytes]:
+    """Return what the arguments ask for, by artefact name."""
+    job, rank = store.jobs.get(arguments.owner, arguments.job), arguments.rank
+    if arguments.fmu:
+        return compile_fmu(job, store, rank)
+    if len(parse_identification(job.spec).outputs) > 1:
+        return render_outputs(job, store, blobs)
+    found = read_search_result(job, store, blobs, rank)
+    if rank is None:
+        return render_figures(job, found)
+    if arguments.numbers:
+        return write_free_run(found.models[0], found.split.validation, rank)
+    return render_model_figures(found, rank)
+
+
+def compare_models(arguments: argparse.Namespace, store: Store, blobs: Blobs) -> bytes:
+    """Return the report of a comparison of models of the jobs of an owner.
+
+    Raises
+    ------
+    IslandsError
+        A job, its data or its model no longer exists.
+    """
+    pairs = [(arguments.job, arguments.rank), *map(_parse_model, arguments.compare)]
+    jobs = {job: store.jobs.get(arguments.owner, job) for job, _ in pairs}
+    names = _name_jobs(jobs.values())
+    models = [_read_compared(jobs[job], names[job], rank, store, blobs) for job, rank in pairs]
+    created = max(job.created for job in jobs.values())
+    return comparison_report(Origin.from_seconds(", ".join(names.values()), created, arguments.owner), models)
+
+
+def _name_jobs(jobs: Collection[Job]) -> dict[str, str]:
+    """Return the names of jobs, with the beginning of the id of those without a unique one."""
+    counts = Counter(job.name for job in jobs)
+    return {
+        job.id: job.name if job.name and counts[job.name] == 1 else f"{job.name} {job.id[:8]}".lstrip()
+        for job in jobs
+    }
+
+
+def _parse_model(text: str) -> tuple[str, int]:
+    job, _, rank = text.partition(":")
+    return job, int(rank)
+
+
+def _read_compared(job: Job, job_name: str, rank: int, store: Store, blobs: Blobs) -> ComparedModel:
+    """Read a model with its free run, which is made and kept if it is not stored yet."""
+    spec, document, (stored,) = _read_result(job, store, rank)
+    free_run = None
+    if len(spec.outputs) == 1:
+        blob = store.results.artefact(job.id, name_free_run(rank))
+        if blob is None:
+            found = read_search_result(job, store, blobs, rank)
+            made = write_free_run(found.models[0], found.split.validation, rank)
+            blob = blobs.write(made[name_free_run(rank)])
+            store.results.keep(job.id, {name_free_run(rank): blob})
+        free_run = json.loads(blobs.read(blob))
+    return ComparedModel(f"{job_name}, model {rank}", document, stored.document, free_run, job.spec)
 
 
 def _limit(settings: ServiceSettings) -> None:

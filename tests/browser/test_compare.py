@@ -3,12 +3,14 @@
 import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from support.played import run_submitted
 from support.reading import unreadable
+from support.screen import Screen
 from support.service_processes import Service
 
 pytestmark = pytest.mark.ci
@@ -53,6 +55,24 @@ def test_two_jobs_are_compared(compared: Any, service: Service, jobs: tuple[str,
     expect(differing).to_have_count(1)
     expect(differing).to_contain_text("max_terms")
     assert unreadable(compared) == []
+
+
+def test_the_report_of_the_comparison_is_one_file_of_four_pages(
+    compared: Any, quiet: Callable[..., Screen], tmp_path: Path, expect: Any
+) -> None:
+    # A link cannot send the key.
+    expect(compared.get_by_role("link", name="Read the report")).to_have_count(0)
+    with compared.expect_download(timeout=SIMULATED) as saved:
+        compared.get_by_role("button", name="Save the report").click()
+    assert saved.value.suggested_filename == "comparison.html"
+    path = tmp_path / "comparison.html"
+    saved.value.save_as(path)
+    page = quiet(tmp_path.as_uri(), width=390).go(path.name)
+    expect(page.locator("h1")).to_contain_text("Of 2 models, ")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert page.evaluate("document.images[0].naturalWidth") > 0
+    printed = page.pdf(format="A4", print_background=True)
+    assert 1 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 4
 
 
 def test_models_of_a_job_are_chosen_on_its_page(

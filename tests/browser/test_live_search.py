@@ -108,7 +108,7 @@ def test_stop_and_keep_the_best_ends_a_search_with_models(
     run = page.locator(".search-run")
     expect(run.locator(".legend li")).to_contain_text(["measured", "free run"])
     expect(run).to_contain_text(re.compile(r"\d+ terms?, generation [\d ]+, over the estimation data\."))
-    drawn = run.locator(".plot path.line").evaluate_all("(lines) => lines.map((each) => each.getAttribute('d'))")
+    drawn = run.locator(".plot path.line").evaluate_all("(all) => all.map((each) => each.getAttribute('d'))")
     assert [len(each) > 500 for each in drawn] == [True, True]
     # Its equation is shown, and the search still improves it.
     terms = run.locator("p.small").inner_text().split(",")[0]

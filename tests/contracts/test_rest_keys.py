@@ -43,6 +43,7 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/figures/{figure}.svg"): "read",
     ("GET", "/v1/jobs/{job}/figures/{figure}.csv"): "read",
     ("GET", "/v1/jobs/{job}/report"): "read",
+    ("GET", "/v1/comparisons/report"): "read",
     ("GET", "/v1/jobs/{job}/extended"): "read",
     ("GET", "/v1/jobs/{job}/extended/export"): "read",
     ("GET", "/v1/jobs/{job}/outputs"): "read",

@@ -69,7 +69,7 @@ def test_free_run_of_the_recommended_model_needs_no_other_process(service, clien
     async def refuse(*_arguments):
         raise FigureError("no process may start")
 
-    monkeypatch.setattr(figures, "_run_figure_worker", refuse)
+    monkeypatch.setattr(figures, "run_figure_worker", refuse)
     summary = client.job(job).summary
     shown = service.client.get(f"/v1/jobs/{job}/models/{summary['rank']}/simulation")
     assert shown.status_code == 200, shown.text

@@ -108,6 +108,7 @@ class BaseClient(Generic[H]):
     models = Endpoint(calls.models)
     result = Endpoint(calls.result)
     report = Endpoint(calls.report)
+    comparison_report = Endpoint(calls.comparison_report)
     extended = Endpoint(calls.extended)
     export_extended = Endpoint(calls.export_extended)
     history = Endpoint(calls.history)

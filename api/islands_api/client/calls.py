@@ -231,6 +231,20 @@ def report(which: JobRef) -> RequestSpec[bytes]:
     return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/report", lambda response: response.content)
 
 
+def comparison_report(models: Sequence[JobRef | tuple[JobRef, int]]) -> RequestSpec[bytes]:
+    """Return the report of a comparison of models as one HTML file.
+
+    Parameters
+    ----------
+    models : sequence
+        Two to six models: jobs, of which the recommended model counts, or pairs of a job and a rank.
+    """
+    names = [f"{get_id(each[0])}:{each[1]}" if isinstance(each, tuple) else get_id(each) for each in models]
+    return RequestSpec(
+        "GET", "/v1/comparisons/report", lambda response: response.content, params={"model": names}
+    )
+
+
 def extended(which: JobRef) -> RequestSpec[bytes]:
     """Return the extended simulation of a discrepancy job: ``extended.json``."""
     return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/extended", lambda response: response.content)

@@ -8,7 +8,7 @@ import numpy as np
 from islands_api.client.calls import JobRef, RequestSpec, quote_id
 from islands_api.client.response_parsing import read_as
 from islands_api.model_simulation_schemas import SimulatedOutput
-from islands_api.result_schemas import SearchFreeRun
+from islands_api.result_schemas import SearchFreeRunView
 
 
 def simulate(
@@ -50,6 +50,6 @@ def simulate(
     return RequestSpec("POST", path, read_as(SimulatedOutput), json=body)
 
 
-def free_run(which: JobRef) -> RequestSpec[SearchFreeRun]:
+def free_run(which: JobRef) -> RequestSpec[SearchFreeRunView]:
     """Return the free run of the best model so far of a running search, with the measured output."""
-    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/free-run", read_as(SearchFreeRun))
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/free-run", read_as(SearchFreeRunView))

@@ -41,7 +41,7 @@ class SearchFreeRun:
     size : int
         Number of terms of the model.
     document : mapping
-        Fields of `islands_api.result_schemas.SearchFreeRun`, without the job.
+        Fields of `islands_api.result_schemas.SearchFreeRunView`, without the job.
     """
 
     generation: int

@@ -1,1 +1,1 @@
-"""HTML reports of identifications and diagnoses, each a single file with embedded figures."""
+"""HTML reports of identifications, diagnoses and comparisons, each a single file with embedded figures."""

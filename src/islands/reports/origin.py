@@ -38,18 +38,18 @@ class Origin:
         """Return the origin of a result at a time in seconds since 1970."""
         return cls(name, datetime.fromtimestamp(seconds, UTC).date(), owner, job)
 
-    def list_facts(self, sha256: str) -> list[str]:
-        """Return what is known: day, version, data set, owner and job.
+    def list_facts(self, *sha256: str) -> list[str]:
+        """Return what is known: day, version, data sets, owner and job.
 
         Parameters
         ----------
-        sha256 : str
-            SHA-256 of the data set.
+        *sha256 : str
+            SHA-256 of every data set.
         """
         return [
             *([] if self.day is None else [self.day.isoformat()]),
             f"islands {read_version()}",
-            f"data set {sha256[:_DIGITS]}",
+            *(f"data set {each[:_DIGITS]}" for each in sha256),
             *([f"owner {self.owner}"] if self.owner else []),
             *([f"job {self.job}"] if self.job else []),
         ]

@@ -1,5 +1,6 @@
 /** Comparison of models of any jobs: free runs, errors, fronts, parameters, settings that differ. */
 
+import { makeComparisonReportButtons } from "../components/comparison_report.js";
 import {
   listEquations,
   makeFrontChart,
@@ -94,6 +95,7 @@ function makeContent(found, signal) {
       describeData(entries),
       makeScrollable("Compared models", makeModelTable(entries)),
       listEquations(entries),
+      entries.length > 1 ? makeComparisonReportButtons(entries) : [],
     ),
     makeCard("Free runs on the validation data", makeRuns(entries, signal)),
     makeCard("Error against number of terms", makeFrontChart(entries)),

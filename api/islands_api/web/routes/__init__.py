@@ -8,6 +8,7 @@ from fastapi import APIRouter
 from islands_api.web.routes import (
     administered_jobs,
     caller,
+    comparisons,
     datasets,
     diagnoses,
     events,
@@ -38,6 +39,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     models.router,
     figures.router,
     model_simulations.router,
+    comparisons.router,
     monitors.router,
     keys.router,
     owners.router,

@@ -4,6 +4,7 @@ import asyncio
 import errno
 import sys
 from asyncio.subprocess import PIPE
+from collections.abc import Sequence
 from time import monotonic
 from typing import Annotated, Any
 
@@ -74,12 +75,12 @@ _CSV_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
 }
 
-_HTML_RESPONSES: dict[int | str, dict[str, Any]] = {
+HTML_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"text/html": {"schema": {"type": "string"}}}}
 }
 
 #: Content-Security-Policy of a report, which contains its styles and figures and loads nothing.
-_REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
 
 ModelFigure = Annotated[
     str,
@@ -207,7 +208,7 @@ async def fmu(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Respon
     return response
 
 
-@router.get("/{job}/report", response_class=Response, responses=_HTML_RESPONSES)
+@router.get("/{job}/report", response_class=Response, responses=HTML_RESPONSES)
 async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return the report of a job: a self-contained HTML file with the result and its figures."""
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
@@ -221,7 +222,7 @@ async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
             f"job {job} was cancelled and has no report: see its /result, or resume it"
         )
     response = await _figure_response(state, caller, job, REPORT, None, "text/html; charset=utf-8")
-    response.headers["Content-Security-Policy"] = _REPORT_POLICY
+    response.headers["Content-Security-Policy"] = REPORT_POLICY
     return response
 
 
@@ -288,31 +289,42 @@ async def _draw(state: AppState, caller: Principal, job: str, rank: int | None, 
         await state.run_blocking(state.store.datasets.get, caller.owner, dataset, deleted=True)
     _FAILURES.refuse(job, rank, part)
     try:
-        await _run_figure_worker(state, caller, job, rank, part)
+        await _run_drawing(state, caller, job, rank, part)
     except (FigureError, BlobNotFoundError) as error:
         _FAILURES.remember(job, rank, error, part)
         raise
 
 
-async def _run_figure_worker(
+async def _run_drawing(
     state: AppState, caller: Principal, job: str, rank: int | None, part: str | None
 ) -> None:
     options = [] if rank is None else ["--rank", str(rank)]
     if part is not None:
         options.append(part)
     what, done = ("FMU", "compiled") if part == _PARTS[FMU] else ("figures", "drawn")
-    failure = f"the {what} of job {job} cannot be {done}"
+    await run_figure_worker(state, caller, [job, *options], f"the {what} of job {job} cannot be {done}")
+
+
+async def run_figure_worker(
+    state: AppState, caller: Principal, arguments: Sequence[str], failure: str
+) -> bytes:
+    """Run `islands_service.figure_worker` for an owner; return its standard output.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+    failure : str
+        Beginning of the message of an error.
+
+    Raises
+    ------
+    FigureError, StorageFullError, DataFolderUnavailableError, ObjectStoreError, StoreUnavailableError,
+    BlobNotFoundError
+    """
     readers = state.settings.readers
     inherited = {} if readers is None else {REQUESTS: str(readers)}
     process = await asyncio.create_subprocess_exec(
-        *(
-            sys.executable,
-            "-m",
-            "islands_service.figure_worker",
-            job,
-            f"--owner={caller.owner}",
-            *options,
-        ),
+        *(sys.executable, "-m", "islands_service.figure_worker", f"--owner={caller.owner}", *arguments),
         stdout=PIPE,
         stderr=PIPE,
         env=state.settings.environment() | inherited,
@@ -328,7 +340,7 @@ async def _run_figure_worker(
             process.kill()
             await process.wait()
     if process.returncode == 0:
-        return
+        return stdout
     # The error output is for the log: it may contain paths and messages of the database driver.
     reason = _decode(stderr)
     match process.returncode:
@@ -344,7 +356,7 @@ async def _run_figure_worker(
             raise StoreUnavailableError(reason)
         case errno.ENODATA:
             raise BlobNotFoundError(reason)
-    log.error("drawing failed", job=job, status=process.returncode, reason=reason)
+    log.error("drawing failed", arguments=arguments, status=process.returncode, reason=reason)
     raise FigureError(f"{failure}: the log of the service gives the reason")
 
 

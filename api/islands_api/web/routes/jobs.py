@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import SettingsError
-from islands_api.result_schemas import SearchFreeRun
+from islands_api.result_schemas import SearchFreeRunView
 from islands_api.schemas import (
     LINE,
     TAG_PATTERN,
@@ -223,7 +223,7 @@ async def history(
     return await state.run_blocking(_read_history, state, found, after)
 
 
-@router.get("/{job}/free-run", response_model=SearchFreeRun)
+@router.get("/{job}/free-run", response_model=SearchFreeRunView)
 async def free_run(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Return the free run of the best model so far of a running search, with the measured output.
 

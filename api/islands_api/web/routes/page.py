@@ -38,6 +38,7 @@ FILES = {
     "components/chart.js": _SCRIPT,
     "components/column_choice.js": _SCRIPT,
     "components/compare_choice.js": _SCRIPT,
+    "components/comparison_report.js": _SCRIPT,
     "components/confirm.js": _SCRIPT,
     "components/convergence.js": _SCRIPT,
     "components/coupled_model.js": _SCRIPT,

@@ -43,6 +43,32 @@ def write_coupled_headline(outputs: Sequence[Document]) -> str:
     return f"{len(outputs)} equations simulate {' and '.join(stated)}"
 
 
+def write_comparison_headline(
+    models: Sequence[tuple[str, tuple[str, str], Document]], is_comparable: bool
+) -> str:
+    """State which of several models has the least free-run error on the validation data.
+
+    Parameters
+    ----------
+    models : sequence of (str, (str, str), mapping)
+        Name of each model, name and unit of its output, and its entry in ``result.json``.
+    is_comparable : bool
+        Whether all models were validated on the same samples.
+    """
+    outputs = " and ".join(dict.fromkeys(output for _, (output, _), _ in models))
+    errors = [entry["metrics"]["validation"]["free_run"] for _, _, entry in models]
+    known = [at for at, error in enumerate(errors) if error["rmse"] is not None]
+    if not is_comparable:
+        return f"{len(models)} models of {outputs}"
+    if not known:
+        return f"The free runs of {len(models)} models of {outputs} diverge on the validation data"
+    # The error that is stated is the least one; it is undefined for a constant output.
+    stated = "rmse" if any(errors[at]["mape"] is None for at in known) else "mape"
+    name, (_, unit), _ = models[best := min(known, key=lambda at: float(errors[at][stated]))]
+    error = _state_error(errors[best], unit)
+    return f"Of {len(models)} models, {name} simulates {outputs} best, with a {error}"
+
+
 def write_diagnosis_headline(document: Document) -> str:
     """State the error of the simulation on the held-out data, and that of the extended simulation.
 

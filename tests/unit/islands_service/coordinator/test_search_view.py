@@ -88,7 +88,7 @@ def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.Monke
     assert front.update(searched([individual(1, 0.25)]))[0]["error"] == 0.5
 
 
-def test_smallest_model_near_the_least_error_is_simulated_over_the_measured_output() -> None:
+def test_free_run_is_that_of_the_smallest_model_near_the_least_error() -> None:
     rng = np.random.default_rng(1)
     signals = {"u": rng.normal(size=(900, 1)), "y": rng.normal(size=900)}
     record = replace(RECORD, **signals, segments=(900,), start=2.0)
