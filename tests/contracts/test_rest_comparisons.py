@@ -64,7 +64,7 @@ def test_models_of_two_jobs_are_compared_in_one_file(service, jobs):
     assert service.store.results.artefact(second.id, f"{other}/free-run.json")
 
 
-def test_what_cannot_be_compared_is_refused_with_advice(service, jobs):
+def test_models_that_are_missing_or_equal_are_refused_with_advice(service, jobs):
     first, second = (job.id for job in jobs)
     assert "given twice" in problem_of(ask(service, first, second, first), 422, "invalid-settings")
     assert "no model 99" in problem_of(ask(service, first, f"{second}:99"), 404, "not-found")

@@ -44,6 +44,23 @@ def generations(store, lease, **limits):
     return [each[0] for each in store.results.history(lease.job.id, **limits)]
 
 
+def test_artefacts_of_reports_replace_each_other_and_end_with_the_result(store, lease):
+    job = lease.job.id
+    for blob in ("a" * 64, "b" * 64):
+        store.leases.report(lease, ProgressReport({}, artefacts={"live.json": blob}))
+        assert store.results.artefact(job, "live.json") == blob
+    # A report without it keeps it, and so does one of a coordinator that has lost the job.
+    store.leases.report(lease, ProgressReport({"generation": 1}))
+    store.leases.release(lease)
+    newer = claimed(store)
+    with pytest.raises(LeaseLostError):
+        store.leases.report(lease, ProgressReport({}, artefacts={"live.json": "c" * 64}))
+    assert store.results.artefact(job, "live.json") == "b" * 64
+    assert "b" * 64 in store.retention.named_blobs()
+    store.leases.finish(newer, FOUND)
+    assert store.results.artefact(job, "live.json") is None
+
+
 def test_parts_of_a_report_appear_together(store, lease):
     reported = store.leases.report(lease, brought_on(7))
     assert reported == store.jobs.get(ALICE, lease.job.id)
