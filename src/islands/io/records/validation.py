@@ -145,8 +145,8 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
             name_option("gaps", "interpolate"),
             " to fill it or ",
             name_option("gaps", "split"),
-            " to leave the row out, or select rows without it; only an output, of several the first, may have "
-            "empty cells",
+            " to leave the row out, or select rows without it; only an output, of several the first, may "
+            "have empty cells",
         )
     )
 
