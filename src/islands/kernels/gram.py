@@ -75,8 +75,8 @@ def gram(
         running[:] = 0.0
         for index in range(rows.offset.size):
             evaluate(program, rows, index, arena, place, chunk)
-            _add_tiles(chunk, blocks, begin, end, running)
-        _read_tiles(running, blocks, begin, end, terms, out)
+            add_tiles(chunk, blocks, begin, end, running)
+        read_tiles(running, blocks, begin, end, terms, out)
 
 
 @kernel
@@ -102,8 +102,8 @@ def gram_of_residual(
         for term in range(terms):
             chunk[term * CHUNK : term * CHUNK + rows] = jacobian[term, begin : begin + rows]
         chunk[terms * CHUNK : terms * CHUNK + rows] = residual[begin : begin + rows]
-        _add_tiles(chunk, blocks, 0, tiles, running)
-    _read_tiles(running, blocks, 0, tiles, terms + 1, out)
+        add_tiles(chunk, blocks, 0, tiles, running)
+    read_tiles(running, blocks, 0, tiles, terms + 1, out)
 
 
 @kernel(_nrt=False)
@@ -127,7 +127,7 @@ def _add_pairs(chunk, pairs, running):
 
 
 @kernel(_nrt=False)
-def _add_tiles(chunk, blocks, begin, end, running):
+def add_tiles(chunk, blocks, begin, end, running):
     """Add the products of a chunk of rows to the running sums of some tiles, four terms times four."""
     tile = 0
     for one in range(blocks):
@@ -154,7 +154,7 @@ def _add_tiles(chunk, blocks, begin, end, running):
 
 
 @kernel(_nrt=False)
-def _read_tiles(running, blocks, begin, end, terms, out):
+def read_tiles(running, blocks, begin, end, terms, out):
     """Fold the running sums of some tiles and write both halves of the symmetric matrix."""
     tile = 0
     for one in range(blocks):

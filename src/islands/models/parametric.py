@@ -55,18 +55,8 @@ class ParametricModel(ABC):
     #: Tag of the class in documents.
     kind: ClassVar[str]
 
-    #: Names of the parameters.
-    names: ClassVar[tuple[str, ...]]
-
     #: Description of the class in one sentence.
     summary: ClassVar[str]
-
-    #: Names of the states, ``x1``, ``x2``; ``starts`` are their values before the first prediction.
-    states: ClassVar[tuple[str, ...]] = ()
-    starts: ClassVar[tuple[str, ...]] = ()
-
-    #: Number of past samples before the first prediction.
-    maximum_lag: ClassVar[int] = 1
 
     parameters: tuple[float, ...]
     input_names: tuple[str, ...]
@@ -81,6 +71,26 @@ class ParametricModel(ABC):
             if values is not None and len(values) != len(self.names):
                 raise ModelError(f"a model {self.kind} has the parameters {', '.join(self.names)}")
 
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters; an attribute of a class whose models have one structure."""
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, ``x1``, ``x2``."""
+        return ()
+
+    @property
+    def starts(self) -> tuple[str, ...]:
+        """Values of the states before the first prediction."""
+        return ()
+
+    @property
+    def maximum_lag(self) -> int:
+        """Number of past samples before the first prediction."""
+        return 1
+
     @abstractmethod
     def right_sides(self) -> Mapping[str, str]:
         """Return the right side of the equation of the output ``y`` and of each state.
@@ -90,9 +100,12 @@ class ParametricModel(ABC):
         """
 
     @classmethod
-    @abstractmethod
-    def start(cls, record: Dataset) -> Iterable[Self]:
-        """Yield models with parameters from which the estimation on a record starts."""
+    def start(cls, _record: Dataset) -> Iterable[Self]:
+        """Yield models with parameters from which the estimation on a record starts.
+
+        A class whose structures are searched has none.
+        """
+        return ()
 
     @classmethod
     def of_record(cls, record: Dataset, parameters: Sequence[float]) -> Self:
@@ -158,7 +171,7 @@ class ParametricModel(ABC):
             maximum_lag=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
-            texts=tuple(self._write_lines(self.signals)),
+            texts=tuple(self._write_lines(sides, self.signals, self.signals)),
         )
 
     def _parse(self, text: str) -> Expression:
@@ -166,25 +179,47 @@ class ParametricModel(ABC):
 
     def equation(self) -> EquationText:
         """Return the equations as text, with the values of the parameters."""
+        return self.write_equation(self.right_sides())
+
+    def write_equation(self, sides: Mapping[str, str], further: Sequence[str] = ()) -> EquationText:
+        """Return equations as text.
+
+        Parameters
+        ----------
+        sides : mapping
+            Right sides of the output ``y``, of the states and of further signals.
+        further : sequence of str
+            Names of signals that only the text has.
+        """
         output, *inputs = signal_names(self)
+        signals = self._insert(further)
         statement = describe_signals(self)
-        line = "\n".join(self._write_lines(self.signals))
-        rows = self._write(LatexSignals(self.signals, self._numbers(latex_number)), " = ")
+        line = "\n".join(self._write_lines(sides, signals, signals))
+        rows = self._write(sides, signals, LatexSignals(signals, self._numbers(latex_number)), " = ")
         rows += [latex_statement(statement)] if statement else []
-        sides = self._write(MathmlSignals(self.signals, self._numbers(mathml_number)), "<mo>=</mo>")
-        elements = [f"<mrow>{each}</mrow>" for each in sides] + mathml_statement(statement)
+        printer = MathmlSignals(signals, self._numbers(mathml_number))
+        written = self._write(sides, signals, printer, "<mo>=</mo>")
+        elements = [f"<mrow>{each}</mrow>" for each in written] + mathml_statement(statement)
+        named = (output, *self.states, *further, *inputs)
         return EquationText(
             line=line,
             plain=f"{line}\nwhere {statement}" if statement else line,
-            named="\n".join(self._write_lines((output, *self.states, *inputs))),
+            named="\n".join(self._write_lines(sides, signals, named)),
             terms=self.names,
             latex=rows[0] if len(rows) == 1 else _gather(rows),
             mathml="\n".join(f'<math display="block">{each}</math>' for each in elements),
         )
 
-    def _write_lines(self, signals: Sequence[str]) -> list[str]:
+    def _insert(self, further: Sequence[str]) -> tuple[str, ...]:
+        """Return the signals with further ones before the inputs."""
+        computed = 1 + len(self.states)
+        return (*self.signals[:computed], *further, *self.signals[computed:])
+
+    def _write_lines(
+        self, sides: Mapping[str, str], signals: Sequence[str], names: Sequence[str]
+    ) -> list[str]:
         """Return the equations as plain text with the given names of the signals."""
-        return self._write(PlainSignals(signals, self._numbers(str)), " = ")
+        return self._write(sides, signals, PlainSignals(names, self._numbers(str)), " = ")
 
     def _numbers(self, write: Callable[[str], str]) -> dict[str, str]:
         """Return the text of each parameter by name, in brackets if it is negative."""
@@ -194,17 +229,19 @@ class ParametricModel(ABC):
             for name, number in zip(self.names, numbers, strict=True)
         }
 
-    def _write(self, printer: Printer, equals: str) -> list[str]:
+    def _write(
+        self, sides: Mapping[str, str], signals: Sequence[str], printer: Printer, equals: str
+    ) -> list[str]:
         """Return the equations as a printer writes them, with the signals of the record at sample k."""
-        sides, leads = self.right_sides(), self.leads
+        leads = dict(zip(self.signals, self.leads, strict=True))
 
         def delay(leaf: Lagged) -> Expression:
-            return Lagged(leaf.channel, leaf.lag - leads[leaf.channel])
+            return Lagged(leaf.channel, leaf.lag - leads.get(signals[leaf.channel], 0))
 
         return [
-            f"{printer.write(Lagged(place, 0))}{equals}"
-            f"{printer.write(replace_leaves(self._parse(sides[name]), delay))}"
-            for place, name in enumerate(("y", *self.states))
+            f"{printer.write(Lagged(signals.index(name), 0))}{equals}"
+            f"{printer.write(replace_leaves(parse_signals(side, signals), delay))}"
+            for name, side in sides.items()
         ]
 
     def document(self) -> dict[str, Any]:
@@ -240,9 +277,12 @@ class ParametricModel(ABC):
             A field is missing or invalid.
         """
         try:
+            structure = cls.read_structure(document)
             entries = {entry["name"]: entry for entry in document["parameters"]}
-            values = tuple(float(entries[each]["value"]) for each in cls.names)
-            errors = [entries[each].get("standard_error") for each in cls.names]
+            # A class of one structure has its names as an attribute.
+            names: tuple[str, ...] = tuple(entries) if structure else cls.names  # type: ignore[assignment]
+            values = tuple(float(entries[each]["value"]) for each in names)
+            errors = [entries[each].get("standard_error") for each in names]
             steps = document.get("preprocessing")
             found = cls(
                 parameters=values,
@@ -252,12 +292,18 @@ class ParametricModel(ABC):
                 average=int(document.get("average", 1)),
                 preprocessing=None if steps is None else Preprocessing.from_document(steps),
                 standard_errors=None if None in errors else tuple(map(float, errors)),
+                **structure,
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ModelError(f"{name} is not a model {cls.kind}: {error!r} is missing or invalid") from error
         if not found.input_names or not all(map(isfinite, found.parameters)):
             raise ModelError(f"{name} is not a model {cls.kind}: it needs an input and finite parameters")
         return found
+
+    @classmethod
+    def read_structure(cls, _document: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields of the structure of JSON values; none if all models of the class have one."""
+        return {}
 
 
 def _gather(rows: Sequence[str]) -> str:

@@ -1,0 +1,355 @@
+"""State space with static units: a linear system with a few curves in its feedback.
+
+    x(k+1) = A x(k) + B u(k) + E h(k) + o,    h(k) = f(W x(k) + V u(k) + s)
+    y(k)   = C x(k) + D u(k) + F h(k) + level
+
+A unit is a function of one argument. Parameters that are zero are not part of a model, so that Wiener,
+Hammerstein and feedback systems are structures of one class (nonlinear linear-fractional representation:
+Schoukens and Toth, Automatica 113 (2020) 108731).
+"""
+
+from cmath import log
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import pi
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.channel_names import parse_channel_name
+from islands.errors import ModelError
+from islands.models.parametric import ParametricModel
+from islands.models.protocol import EquationText
+from islands.models.signal_statement import symbols
+
+#: Text of the function of each unit with its argument, in the order of the codes of the kernel.
+UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "tanh": "tanh({0})",
+        "square": "({0})^2",
+        "cube": "({0})^3",
+        "abs": "abs({0})",
+        "hinge": "max({0}, 0)",
+        "root": "sign({0})*sqrt({0})",
+        "dead zone": "(max({0} + -1, 0) + min({0} + 1, 0))",
+        "saturation": "min(max({0}, -1), 1)",
+        "bell": "exp(-({0})^2)",
+    }
+)
+
+#: Text of units in equations for readers, if it is another one.
+_NAMED_POWERS: Mapping[str, str] = MappingProxyType({"square": "square({0})", "cube": "cube({0})"})
+
+#: Writes the product of a parameter, given by name, and the text of a factor; the parameter for no factor.
+Factor = Callable[[str, str], str]
+
+#: Newton steps that find the states at rest, and the step that ends them.
+_REST_STEPS, _STILL = 50, 1e-12
+
+#: Significant digits of the parameters in the text of an equation.
+_DIGITS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class StateSpaceLayout:
+    """Sizes of a state space with units; the names of all of its parameters in the order of the kernel.
+
+    Attributes
+    ----------
+    order, inputs, units : int
+        Numbers of states, inputs and units.
+    """
+
+    order: int
+    inputs: int
+    units: int
+
+    @property
+    def blocks(self) -> dict[str, tuple[str, ...]]:
+        """Names of the entries of each matrix, row by row."""
+        states, inputs, units = (range(1, size + 1) for size in (self.order, self.inputs, self.units))
+        one = self.inputs == 1
+        return {
+            "A": tuple(f"a{i}_{j}" for i in states for j in states),
+            "B": tuple(f"b{i}" if one else f"b{i}_{j}" for i in states for j in inputs),
+            "C": tuple(f"c{i}" for i in states),
+            "D": ("d",) if one else tuple(f"d{j}" for j in inputs),
+            "E": tuple(f"e{i}_{unit}" for i in states for unit in units),
+            "F": tuple(f"f{unit}" for unit in units),
+            "W": tuple(
+                name
+                for unit in units
+                for name in (
+                    *(f"w{unit}_{j}" for j in states),
+                    *(f"v{unit}" if one else f"v{unit}_{j}" for j in inputs),
+                )
+            ),
+            "s": tuple(f"s{unit}" for unit in units),
+            "o": tuple(f"o{i}" for i in states),
+            "level": ("level",),
+        }
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters."""
+        return tuple(name for names in self.blocks.values() for name in names)
+
+    def find_slices(self) -> dict[str, slice]:
+        """Return the positions of the entries of each matrix."""
+        found, at = {}, 0
+        for name, names in self.blocks.items():
+            found[name] = slice(at, at + len(names))
+            at += len(names)
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatentModel(ParametricModel):
+    """State space with static units.
+
+    Attributes
+    ----------
+    order : int
+        Number of states.
+    units : tuple of str
+        Function of each unit, an entry of `UNITS`.
+    wiring : tuple of str
+        Names of the parameters that are not zero, in the order of `StateSpaceLayout`.
+    memory : int
+        Number of samples from which the initial states of a free run are estimated.
+    operating_inputs : tuple of float
+        Inputs of the operating point, as the means of the estimation data.
+
+    Raises
+    ------
+    ModelError
+        A unit or a name is unknown, or the output reads an input that is not read one sample early.
+    """
+
+    kind: ClassVar[str] = "latent"
+    summary: ClassVar[str] = "State space with static units: a linear system with curves in its feedback."
+
+    order: int
+    units: tuple[str, ...] = ()
+    wiring: tuple[str, ...]
+    memory: int
+    operating_inputs: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if unknown := set(self.units) - set(UNITS):
+            raise ModelError(f"unknown unit {min(unknown)!r}; units are {', '.join(UNITS)}")
+        if tuple(name for name in self.layout.names if name in self.names) != self.names:
+            known = ", ".join(self.layout.names)
+            raise ModelError(f"the parameters of a model {self.kind} are some of {known}, in this order")
+        early = [parse_channel_name(name).at_once for name in self.input_names]
+        if self.reads_at_once and not all(early):
+            raise ModelError("the output reads the inputs at sample k: read them one sample early (u+1)")
+
+    @property
+    def layout(self) -> StateSpaceLayout:
+        """Sizes and names of all parameters."""
+        return StateSpaceLayout(self.order, self.inputs, len(self.units))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.wiring
+
+    @property
+    def maximum_lag(self) -> int:
+        """Number of samples before the first prediction."""
+        return self.memory
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return tuple(f"x{place}" for place in range(1, self.order + 1))
+
+    @property
+    def starts(self) -> tuple[str, ...]:
+        """The states rest at the operating point before the first prediction, unless they are estimated."""
+        return tuple(repr(float(value)) for value in self.rest)
+
+    @cached_property
+    def rest(self) -> NDArray[np.float64]:
+        """States at rest at the operating point, shape (states,); zeros if they are not found."""
+        x = np.zeros(self.order)
+        for _ in range(_REST_STEPS):
+            change, jacobian = self._linearise(x)
+            try:
+                step = np.linalg.solve(np.eye(self.order) - jacobian, change - x)
+            except np.linalg.LinAlgError:
+                break
+            x = x + step
+            if not np.isfinite(x).all():
+                break
+            if np.abs(step).max() <= _STILL * max(1.0, np.abs(x).max()):
+                return x
+        return np.zeros(self.order)
+
+    def _linearise(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the next states at the operating point, and their derivatives."""
+        # A command that does not simulate loads no kernels.
+        from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415
+
+        theta, slices, n = self.theta, self.layout.find_slices(), self.order
+        a, b = theta[slices["A"]].reshape(n, n), theta[slices["B"]].reshape(n, self.inputs)
+        e = theta[slices["E"]].reshape(n, len(self.units))
+        w = theta[slices["W"]].reshape(len(self.units), n + self.inputs)
+        u = np.array(self.operating_inputs)
+        arguments = w @ np.concatenate([x, u]) + theta[slices["s"]]
+        pairs = [evaluate_unit(code, s) for code, s in zip(self.codes, arguments, strict=True)]
+        values, slopes = np.array(pairs).reshape(-1, 2).T
+        return a @ x + b @ u + e @ values + theta[slices["o"]], a + (e * slopes) @ w[:, :n]
+
+    @property
+    def reads_at_once(self) -> bool:
+        """Whether the output reads an input at sample k, itself or through a unit."""
+        units = {name[1:] for name in self.names if name[0] == "f"}
+        return any(
+            name[0] == "d" or (name[0] == "v" and name[1:].split("_")[0] in units) for name in self.names
+        )
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """All parameters in the order of the kernel, with zeros."""
+        values = dict(zip(self.names, self.parameters, strict=True))
+        return np.array([values.get(name, 0.0) for name in self.layout.names])
+
+    @property
+    def codes(self) -> NDArray[np.int64]:
+        """Codes of the units for the kernel."""
+        return find_codes(self.units)
+
+    def right_sides(self) -> Mapping[str, str]:
+        """Return the equations of the output and of the states, with the units inside."""
+        units = {lag: [self._write_unit(unit, lag, _name_factor) for unit in self._places] for lag in (0, 1)}
+        return self._write_sides(units, _name_factor)
+
+    def equation(self) -> EquationText:
+        """Return the equations as text, with the values of the parameters and with the units as signals."""
+        written = self.write_equation(*self._display())
+        modes = self.describe_modes()
+        ends = f"\n{modes}" if modes else ""
+        return replace(written, plain=written.plain + ends, named=written.named + ends)
+
+    def describe_modes(self) -> str:
+        """State the time constants and resonances at rest at the operating point; empty without a time."""
+        if self.dt is None:
+            return ""
+        poles = map(complex, np.linalg.eigvals(self._linearise(self.rest)[1]))
+        inputs = zip(symbols(self.inputs)[1:], self.operating_inputs, strict=True)
+        point = ", ".join(f"{name} = {value:.4g}" for name, value in inputs)
+        return f"about rest at {point}: {_describe_poles(poles, self.dt)}"
+
+    def _display(self) -> tuple[dict[str, str], tuple[str, ...]]:
+        """Return the right sides of all displayed signals with numbers, and the names of the units."""
+        values = {
+            name: f"{value:.{_DIGITS}g}" for name, value in zip(self.names, self.parameters, strict=True)
+        }
+
+        def write(name: str, factor: str) -> str:
+            return f"{values[name]}*{factor}" if factor else values[name]
+
+        names = tuple(f"h{unit}" for unit in self._places)
+        units = {0: [f"{name}(k)" for name in names], 1: [f"{name}(k-1)" for name in names]}
+        sides = self._write_sides(units, write)
+        for name, unit in zip(names, self._places, strict=True):
+            text = _NAMED_POWERS.get(self.units[unit - 1], UNITS[self.units[unit - 1]])
+            sides[name] = text.format(self._write_argument(unit, 0, write))
+        return sides, names
+
+    @property
+    def _places(self) -> range:
+        return range(1, len(self.units) + 1)
+
+    def _write_sides(self, units: Mapping[int, Sequence[str]], write: Factor) -> dict[str, str]:
+        """Return the right sides of the output and of the states; ``units`` are the texts by lag."""
+        now = [(f"c{place}", f"{name}(k)") for place, name in enumerate(self.states, start=1)]
+        now += self._read_inputs("d", "d", 0)
+        now += [(f"f{unit}", text) for unit, text in zip(self._places, units[0], strict=True)]
+        sides = {"y": self._sum([*now, ("level", "")], write)}
+        for row, state in enumerate(self.states, start=1):
+            past = [(f"a{row}_{place}", f"{name}(k-1)") for place, name in enumerate(self.states, start=1)]
+            past += self._read_inputs(f"b{row}", f"b{row}_", 1)
+            past += [(f"e{row}_{unit}", text) for unit, text in zip(self._places, units[1], strict=True)]
+            sides[state] = self._sum([*past, (f"o{row}", "")], write)
+        return sides
+
+    def _write_unit(self, unit: int, lag: int, write: Factor) -> str:
+        """Return the text of a unit at sample k - lag."""
+        return UNITS[self.units[unit - 1]].format(self._write_argument(unit, lag, write))
+
+    def _write_argument(self, unit: int, lag: int, write: Factor) -> str:
+        """Return the text of the argument of a unit at sample k - lag."""
+        at = f"(k-{lag})" if lag else "(k)"
+        terms = [(f"w{unit}_{place}", f"{name}{at}") for place, name in enumerate(self.states, start=1)]
+        terms += self._read_inputs(f"v{unit}", f"v{unit}_", lag)
+        return self._sum([*terms, (f"s{unit}", "")], write)
+
+    def _read_inputs(self, only: str, prefix: str, lag: int) -> list[tuple[str, str]]:
+        """Return the parameter and the text of every input at sample k - lag."""
+        found = []
+        names, leads = symbols(self.inputs)[1:], self.leads[1 + self.order :]
+        for place, (name, lead) in enumerate(zip(names, leads, strict=True), start=1):
+            sample = f"{name}(k-{lag + lead})" if lag + lead else f"{name}(k)"
+            found.append((only if self.inputs == 1 else f"{prefix}{place}", sample))
+        return found
+
+    def _sum(self, terms: Iterable[tuple[str, str]], write: Factor) -> str:
+        """Return the sum of the terms whose parameters are not zero."""
+        written = [write(name, factor) for name, factor in terms if name in self.names]
+        return " + ".join(written) or "0"
+
+    def document(self) -> dict[str, Any]:
+        """Return the model as JSON values."""
+        structure: dict[str, Any] = {"order": self.order, "units": list(self.units), "memory": self.memory}
+        structure["operating_inputs"] = list(self.operating_inputs)
+        return {**structure, **super().document()}
+
+    @classmethod
+    def read_structure(cls, document: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the fields of the structure of JSON values."""
+        return {
+            "order": int(document["order"]),
+            "units": tuple(map(str, document["units"])),
+            "memory": int(document["memory"]),
+            "operating_inputs": tuple(map(float, document["operating_inputs"])),
+            "wiring": tuple(str(entry["name"]) for entry in document["parameters"]),
+        }
+
+
+def find_codes(units: Sequence[str]) -> NDArray[np.int64]:
+    """Return the codes of units for the kernel."""
+    names = list(UNITS)
+    return np.array([names.index(unit) for unit in units], np.int64)
+
+
+def _describe_poles(poles: Iterable[complex], dt: float) -> str:
+    """State the time constants and resonances of poles, slowest first."""
+    stated = []
+    for pole in sorted(poles, key=lambda each: (-abs(each), -each.imag)):
+        rate = log(pole) / dt if pole else 0j
+        if pole.imag < 0.0:
+            continue
+        if not pole:
+            stated.append("a delay of one sample")
+        elif pole.imag > 0.0:
+            frequency, damping = abs(rate) / (2.0 * pi), -rate.real / abs(rate)
+            stated.append(f"resonance at {frequency:.4g} Hz with a damping ratio of {damping:.3g}")
+        elif pole.real < 0.0:
+            stated.append(f"an alternating mode (pole {pole.real:.4g})")
+        elif pole.real >= 1.0:
+            stated.append(f"a mode that does not decay (pole {pole.real:.6g})")
+        else:
+            stated.append(f"time constant {-1.0 / rate.real:.4g} s")
+    return "; ".join(stated)
+
+
+def _name_factor(name: str, factor: str) -> str:
+    """Return a factor times a parameter by name."""
+    return f"{name}*{factor}" if factor else name
