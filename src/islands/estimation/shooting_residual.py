@@ -164,7 +164,7 @@ class BlockResidual(Residual):
         warm_up: int | None,
     ) -> None:
         first = model.maximum_lag if warm_up is None else warm_up
-        self._simulate = make_simulator(model.block(), record, interval, first)
+        self._simulate = make_simulator(model, record, interval, first)
         self._predicted = self._simulate.predicted
         outputs = np.atleast_2d(record.y.T)
         self._y = outputs[:, self._predicted]

@@ -20,6 +20,7 @@ from islands.io.narx_documents import (
 )
 from islands.io.result_models import read_preprocessing
 from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.latent import LatentModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel, no_model_error
@@ -27,7 +28,7 @@ from islands.models.protocol import DynamicModel, no_model_error
 #: Tag of NARX models.
 NARX = Model.kind
 
-_CLASSES: dict[str, type[ParametricModel]] = {}
+_CLASSES: dict[str, type[ParametricModel]] = {LatentModel.kind: LatentModel}
 
 #: Classes of models by tag that `fit` estimates by the error of the free run; NARX models are selected from a
 #: library or evolved.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.coupled_record import AnyRecord
+from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL
@@ -13,7 +14,10 @@ from islands.expressions.tree import Apply, Expression, Lagged, Symbol, remove_s
 from islands.kernels.interpreter import Program
 from islands.kernels.simulate_block import LANES, MANY_LANES, simulate_block
 from islands.models.block import Block
+from islands.models.coupled_narx import AnyModel
+from islands.models.latent import LatentModel
 from islands.program.term_pool import link
+from islands.simulation.initial_states import estimate_initial_states
 from islands.simulation.layout import check_warm_up, find_intervals
 
 
@@ -31,6 +35,8 @@ class BlockSimulator:
         First predicted sample and number of samples of every interval.
     warm_up : int
         Number of samples before the first prediction that may be read, at least the largest lag.
+    states : ndarray, shape (intervals, states), optional
+        States at the last samples before the intervals, in place of the starts of the block.
     """
 
     def __init__(
@@ -41,8 +47,9 @@ class BlockSimulator:
         start: NDArray[np.int64],
         length: NDArray[np.int64],
         warm_up: int,
+        states: NDArray[np.float64] | None = None,
     ) -> None:
-        self._block, self._warm_up = block, warm_up
+        self._block, self._warm_up, self._states = block, warm_up, states
         self._program, self._weights = _link(block)
         self._ends = np.cumsum([len(equation) for equation in block.equations], dtype=np.int64)
         self._outputs, self._inputs = outputs, inputs
@@ -123,8 +130,11 @@ class BlockSimulator:
             (self._start[intervals] - self._warm_up) + np.arange(rows)[:, None], self._outputs.shape[1] - 1
         )
         states = np.zeros((len(self._block.starts), rows, width))
-        signals = np.concatenate([self._outputs[:, samples], states, self._inputs[:, samples]])
-        self._start_states(signals, sets)
+        # The order of the axes in memory is otherwise that of the record.
+        signals = np.ascontiguousarray(
+            np.concatenate([self._outputs[:, samples], states, self._inputs[:, samples]])
+        )
+        self._start_states(signals, sets, intervals)
         ones = np.ones(width)
         weights = np.array([ones if place is None else sets[place] for place in self._weights])
         constants = np.empty((self._program.constants.size, width))
@@ -136,20 +146,26 @@ class BlockSimulator:
         simulate_block(self._program, weights, constants, self._ends, self._warm_up, flat)
         return flat.reshape(signals.shape)
 
-    def _start_states(self, signals: NDArray[np.float64], sets: NDArray[np.float64]) -> None:
+    def _start_states(
+        self, signals: NDArray[np.float64], sets: NDArray[np.float64], intervals: NDArray[np.int64]
+    ) -> None:
         """Write the states of the warm-up."""
+        if self._states is not None:
+            signals[self._block.outputs : self._block.computed, self._warm_up - 1] = self._states[intervals].T
+            return
         named = dict(zip(self._block.parameters, sets, strict=True))
         first = signals[:, : self._warm_up]
         for place, start in enumerate(self._block.starts, start=self._block.outputs):
             first[place] = value(start, lambda channel, _lag: first[channel], named)
 
 
-def make_simulator(block: Block, record: AnyRecord, interval: int | None, warm_up: int) -> BlockSimulator:
-    """Return the simulator of a block on the intervals of a record.
+def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, warm_up: int) -> BlockSimulator:
+    """Return the simulator of the block of a model on the intervals of a record.
 
     Parameters
     ----------
-    block : Block
+    model : DynamicModel or CoupledModel
+        The initial states of a `LatentModel` are those that its parameters estimate from the warm-up.
     record : Dataset or CoupledRecord
         Signals of the block.
     interval : int or None
@@ -169,11 +185,16 @@ def make_simulator(block: Block, record: AnyRecord, interval: int | None, warm_u
     """
     if interval is not None and interval < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
+    block = model.block()
     start, length = find_intervals(record, warm_up, interval if block.restarts_from_outputs else None)
     outputs = np.atleast_2d(record.y.T)
     for y in outputs:
         check_warm_up(y, start, warm_up)
-    return BlockSimulator(block, outputs, record.u.T, start, length, warm_up)
+    states = None
+    if isinstance(model, LatentModel):
+        assert isinstance(record, Dataset), "the record matches the model"
+        states = estimate_initial_states(model, record, start, warm_up)
+    return BlockSimulator(block, outputs, record.u.T, start, length, warm_up, states)
 
 
 def _make_groups(runs: Sequence[tuple[int, int]]) -> Iterator[Sequence[tuple[int, int]]]:

@@ -136,7 +136,7 @@ def _simulate_block(
     signals, offsets = _map(model, record)
     block, outputs = model.block(), np.atleast_2d(signals.y.T)
     bounds = [divergence_bound(y) if bound is None else bound for y in outputs]
-    simulate_record = make_simulator(block, signals, interval, warm_up)
+    simulate_record = make_simulator(model, signals, interval, warm_up)
     predicted = simulate_record(np.array([model.parameters]))[0, : len(outputs)]
     failed = simulate_record.remove_diverged(predicted, bounds)
     y = np.ascontiguousarray(predicted.T.reshape(signals.y.shape)) + offsets
@@ -237,7 +237,7 @@ def free_runs(
     if not isinstance(model, Model):
         outputs = np.atleast_2d(signals.y.T)
         bounds = [divergence_bound(y) for y in outputs]
-        simulate_record = make_simulator(model.block(), signals, None, warm_up)
+        simulate_record = make_simulator(model, signals, None, warm_up)
         runs = simulate_record(thetas)[:, : len(outputs)]
         for run in runs:
             simulate_record.remove_diverged(run, bounds)

@@ -1,0 +1,138 @@
+"""Estimation of the initial states of a free run of a state space from the samples of its warm-up.
+
+The states are not measured. They are those with which the simulation of the warm-up has the least squared
+error; states that the warm-up does not show remain near rest, since all states have the same magnitude.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.errors import RecordError
+from islands.kernels.state_space import accumulate_products, simulate_state_space
+from islands.models.latent import LatentModel
+
+#: Weight of the measurement of the initial states, relative to the variance of the output of the states.
+_RIDGE = 1e-3
+
+#: Steps of the estimation of initial states, and the step that ends it.
+_STATE_STEPS, _NEGLIGIBLE_STEP = 15, 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """Consecutive rows of a record.
+
+    Attributes
+    ----------
+    u : ndarray, shape (rows, inputs)
+    y : ndarray, shape (rows,)
+        NaN where it is missing.
+    """
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+
+    @property
+    def known(self) -> int:
+        """Number of measured outputs."""
+        return int(np.count_nonzero(~np.isnan(self.y)))
+
+
+def estimate_states(
+    theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, rest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Estimate the states at the first row of a segment by least squares.
+
+    Parameters
+    ----------
+    theta, codes
+        As of `StateSpaceFit`.
+    segment : Segment
+    rest : ndarray, shape (states,)
+        States at rest.
+
+    Returns
+    -------
+    ndarray, shape (states,)
+        The states move about those at rest with the magnitude 1, which is a weak measurement of each of them:
+        a state that the rows do not show rests. All states rest if the model diverges from there.
+    """
+    order = len(rest)
+    places = np.full(theta.size, -1)
+    fixed = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
+    states = rest.copy()
+    products = np.empty((order + 1, order + 1))
+    for _ in range(_STATE_STEPS):
+        rows = accumulate_products(theta, places, codes, segment.u, states, segment.y, 0, products)
+        if rows < len(segment.y) or not np.isfinite(products).all():
+            return rest.copy()
+        normal = products[:-1, :-1] + fixed * np.eye(order)
+        step = np.linalg.lstsq(normal, products[:-1, -1] - fixed * (states - rest), rcond=None)[0]
+        states = states + step
+        if np.abs(step).max() < _NEGLIGIBLE_STEP:
+            break
+    return states
+
+
+def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tuple[NDArray[np.float64], int]:
+    """Return the inputs at the samples of a part of a segment, and the number of samples that lack one.
+
+    An input that is read one sample early is not known at the first sample of a segment.
+
+    Parameters
+    ----------
+    record : Dataset
+    model : LatentModel
+    begin, end : int
+        First sample of a segment, and sample after the last one.
+
+    Returns
+    -------
+    ndarray, shape (end - begin - late, inputs)
+    int
+    """
+    leads = model.leads[1 + model.order :]
+    late = max(leads)
+    columns = [record.u[begin + late - lead : end - lead, place] for place, lead in enumerate(leads)]
+    return np.column_stack(columns), late
+
+
+def estimate_initial_states(
+    model: LatentModel, record: Dataset, start: NDArray[np.int64], warm_up: int
+) -> NDArray[np.float64]:
+    """Estimate the states before the first prediction of every interval.
+
+    Parameters
+    ----------
+    model : LatentModel
+    record : Dataset
+        Signals of the model.
+    start : ndarray of int64, shape (intervals,)
+        First predicted samples.
+    warm_up : int
+        Number of samples before them.
+
+    Returns
+    -------
+    ndarray, shape (intervals, states)
+        States at the last sample of the warm-up.
+
+    Raises
+    ------
+    RecordError
+        The model diverges in the warm-up.
+    """
+    theta, codes = model.theta, model.codes
+    found = []
+    for first in start.tolist():
+        begin = first - warm_up
+        u, late = read_inputs(record, model, begin, first)
+        x = estimate_states(theta, codes, Segment(u, record.y[begin + late : first]), model.rest)
+        rows = len(u) - 1
+        if simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) < rows:
+            raise RecordError(f"the model diverges in the warm-up before sample {first}")
+        found.append(x)
+    return np.array(found)

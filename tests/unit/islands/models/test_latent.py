@@ -1,0 +1,114 @@
+"""Latent models: equations, structure, documents, rest and modes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.errors import ModelError
+from islands.export import export
+from islands.models.latent import UNITS, LatentModel, StateSpaceLayout
+from islands.simulation.predictors import free_run
+from support.latent_systems import SPRING, make_model, spring_record
+
+
+def test_equations_have_the_units_as_signals():
+    assert make_model().equation().plain.splitlines() == [
+        "y(k) = 1.2*x1(k) + 0.3",
+        "x1(k) = 0.9*x1(k-1) + 0.3*x2(k-1) + 0.02*u(k-1)",
+        "x2(k) = (-0.3)*x1(k-1) + 0.9*x2(k-1) + 0.15*u(k-1) + (-0.05)*h1(k-1)",
+        "h1(k) = cube(1*x1(k))",
+        "about rest at u = 0: resonance at 5.189 Hz with a damping ratio of 0.162",
+    ]
+    assert make_model().equation().named.startswith("y_mm(k) = 1.2*x1(k)")
+
+
+def test_inputs_that_are_read_early_are_read_at_sample_k():
+    model = make_model(SPRING | {"level": 0.3}, input_names=("u_V+1",))
+    direct = make_model(
+        {**dict(list(SPRING.items())[:7]), "d": 0.7, **dict(list(SPRING.items())[7:])}, input_names=("u_V+1",)
+    )
+    assert "0.02*u_V(k-1)" in model.equation().named
+    assert "0.7*u_V(k)" in direct.equation().named
+    assert direct.reads_at_once
+    with pytest.raises(ModelError, match="one sample early"):
+        replace(direct, input_names=("u_V",))
+
+
+def test_the_free_run_continues_from_the_states_of_the_warm_up():
+    record = spring_record()
+    run = free_run(make_model(), record)
+    assert np.isnan(run.y[:20]).all()
+    assert run.y[20:] == pytest.approx(record.y[20:], abs=1e-3)
+    longer = free_run(make_model(), record, 200)
+    assert longer.y[200:] == pytest.approx(record.y[200:], abs=1e-4)
+
+
+def test_programs_start_at_rest_at_the_operating_point():
+    model, module = make_model(operating_inputs=(0.5,)), {}
+    exec(export(model, "python"), module)
+    rest = 1.2 * model.rest[0] + 0.3
+    found = module["simulate"]([0.5] * 50, [rest] * 20)
+    assert found == pytest.approx([rest] * 50, abs=1e-9)
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_program_is_the_simulation_from_the_same_states(unit):
+    """The record rests in the warm-up, so that the estimated states are those of the program."""
+    model, module = make_model(units=(unit,)), {}
+    exec(export(model, "python"), module)
+    rest = 1.2 * model.rest[0] + 0.3
+    record = spring_record(300)
+    u = np.concatenate([np.zeros(20), record.u[:, 0]])
+    y = np.concatenate([np.full(20, rest), record.y])
+    found = module["simulate"](u.tolist(), y[:20].tolist())
+    data = Dataset(u, y, record.dt, record.input_names, record.output_name)
+    assert found[20:] == pytest.approx(free_run(model, data).y[20:].tolist(), abs=1e-9)
+
+
+def test_a_document_has_the_whole_model():
+    model = make_model(standard_errors=(0.1,) * 10, operating_inputs=(0.2,))
+    assert LatentModel.read(model.document(), "model.json") == model
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"units": ("cosh",)}, "unknown unit 'cosh'"),
+        ({"wiring": tuple(reversed(tuple(SPRING)))}, "in this order"),
+        ({"parameters": (1.0,)}, "has the parameters"),
+    ],
+)
+def test_an_impossible_structure_is_refused(change, message):
+    with pytest.raises(ModelError, match=message):
+        replace(make_model(), **change)
+
+
+def test_names_are_in_the_order_of_the_kernel():
+    names = StateSpaceLayout(1, 2, 1).names
+    assert names == (
+        "a1_1",
+        "b1_1",
+        "b1_2",
+        "c1",
+        "d1",
+        "d2",
+        "e1_1",
+        "f1",
+        "w1_1",
+        "v1_1",
+        "v1_2",
+        "s1",
+        "o1",
+        "level",
+    )
+
+
+def test_modes_are_those_about_the_operating_point():
+    lag = make_model({"a1_1": np.exp(-0.01 / 0.3), "b1": 1.0, "c1": 1.0}, (), 1)
+    assert lag.describe_modes() == "about rest at u = 0: time constant 0.3 s"
+    # The cubic spring is stiffer away from zero.
+    stiff = make_model(operating_inputs=(1.0,)).describe_modes()
+    assert float(stiff.split("resonance at ")[1].split()[0]) > 5.2
+    assert replace(lag, dt=None).describe_modes() == ""

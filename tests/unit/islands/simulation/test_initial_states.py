@@ -1,0 +1,73 @@
+"""Initial states of a free run: those of the least error over the warm-up."""
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset, join
+from islands.data.input_lead import advance_inputs
+from islands.errors import RecordError
+from islands.simulation.initial_states import Segment, estimate_initial_states, estimate_states
+from islands.simulation.predictors import free_run
+from support.latent_systems import SPRING, make_model, spring_record
+
+
+def test_states_of_a_record_without_noise_are_found():
+    record = spring_record(400, start=(0.5, -0.4))
+    model = make_model()
+    found = estimate_states(model.theta, model.codes, Segment(record.u, record.y), model.rest)
+    assert found == pytest.approx([0.5, -0.4], abs=1e-3)
+
+
+def test_a_state_that_the_output_does_not_show_rests():
+    model = make_model({"a1_1": 0.5, "a2_2": 0.9, "b1": 1.0, "c1": 1.0, "o2": 0.2}, ())
+    record = spring_record(100)
+    found = estimate_states(model.theta, model.codes, Segment(record.u, record.y), model.rest)
+    assert model.rest[1] == pytest.approx(2.0)
+    assert found[1] == pytest.approx(2.0)
+
+
+def test_every_segment_has_its_initial_states():
+    parts = [
+        spring_record(300, seed=seed, start=start) for seed, start in ((0, (0.5, -0.4)), (1, (-0.6, 0.2)))
+    ]
+    run = free_run(make_model(), join(tuple(parts)), 60)
+    for begin, part in ((0, parts[0]), (300, parts[1])):
+        assert run.y[begin + 60 : begin + 300] == pytest.approx(part.y[60:], abs=1e-3)
+        assert np.isnan(run.y[begin : begin + 60]).all()
+
+
+def test_a_model_of_two_inputs_is_simulated():
+    """Rows of several inputs have another order in memory than those of one."""
+    parameters = {"a1_1": 0.9, "b1_1": 0.4, "b1_2": -0.2, "c1": 1.0}
+    names = ("u1", "u2")
+    model = make_model(parameters, (), 1, input_names=names, output_name="y", operating_inputs=(0.0, 0.0))
+    u, x, y = np.random.default_rng(0).standard_normal((200, 2)), 0.3, np.empty(200)
+    for k in range(200):
+        y[k] = x
+        x = 0.9 * x + u[k] @ [0.4, -0.2]
+    assert free_run(model, Dataset(u, y, 0.01, names, "y")).y[20:] == pytest.approx(y[20:], abs=1e-3)
+
+
+def test_an_input_that_is_read_early_gives_the_same_states():
+    record, model = spring_record(200), make_model()
+    early = make_model(input_names=("u_V+1",))
+    found = [
+        estimate_initial_states(each, data, np.array([100]), 80)
+        for each, data in ((model, record), (early, advance_inputs(record, [0])))
+    ]
+    assert found[0] == pytest.approx(found[1], abs=1e-3)
+
+
+def test_outputs_after_the_warm_up_have_no_influence():
+    record, model = spring_record(200), make_model()
+    found = estimate_initial_states(model, record, np.array([50]), 50)
+    changed = spring_record(200)
+    changed.y.flags.writeable = True
+    changed.y[50:] = 7.0
+    assert (estimate_initial_states(model, changed, np.array([50]), 50) == found).all()
+
+
+def test_a_model_that_diverges_in_the_warm_up_is_an_error():
+    model = make_model(SPRING | {"a1_1": 3.0, "a2_2": 3.0})
+    with pytest.raises(RecordError, match="diverges in the warm-up"):
+        free_run(model, spring_record(200), 100)
