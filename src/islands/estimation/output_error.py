@@ -85,7 +85,7 @@ def fit_output_error(
     found: list[LinearSimulation] = []
     least, failed = inf, 0
     for order in range(1, min(_LARGEST_ORDER, lags) + 1):
-        problem = _make_problem(record, order, late, lags)
+        problem = make_problem(record, order, late, lags)
         best = _fit_order(problem, max_terms) if problem else None
         failed = 0 if best and best.criterion < least else failed + 1
         if best:
@@ -104,7 +104,7 @@ def fit_output_error(
     ]
 
 
-def _make_problem(record: Dataset, order: int, delays: Sequence[int], lags: int) -> LinearProblem | None:
+def make_problem(record: Dataset, order: int, delays: Sequence[int], lags: int) -> LinearProblem | None:
     """Return the rows of a model without a constant; None if no segment is long enough."""
     early = [parse_channel_name(name).at_once for name in record.input_names]
     read = [

@@ -1,0 +1,135 @@
+"""Linear state spaces of the least error of the free run, which are the starts of models with units.
+
+The difference equation of `linear_simulation` is written in the observer form and balanced: its states are
+then shown by the output as much as the input reaches them (Moore, IEEE Trans. Autom. Control 26 (1981)
+17-32). Entries of very different magnitudes would slow the estimation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.estimation.linear_simulation import find_start, minimise, project
+from islands.estimation.output_error import make_problem
+from islands.kernels.state_space import simulate_state_space
+from islands.models.latent import StateSpaceLayout
+
+#: The steps end when one reduces the squared error by a smaller relative amount.
+_LEAST_GAIN = 1e-6
+
+#: Largest magnitude of a pole in the Gramians, which an integrator does not have.
+_LARGEST_POLE = 0.9995
+
+#: Eigenvalues of a Gramian below this fraction of the largest are replaced by it.
+_LEAST_EIGENVALUE = 1e-14
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearStateSpace:
+    """Matrices of ``x(k+1) = A x(k) + B u(k)``, ``y(k) = C x(k) + D u(k) + level``.
+
+    Attributes
+    ----------
+    a, b, c, d : ndarray, shapes (states, states), (states, inputs), (states,) and (inputs,)
+    level : float
+    """
+
+    a: NDArray[np.float64]
+    b: NDArray[np.float64]
+    c: NDArray[np.float64]
+    d: NDArray[np.float64]
+    level: float
+
+    @property
+    def layout(self) -> StateSpaceLayout:
+        """Sizes without units."""
+        return StateSpaceLayout(len(self.a), len(self.d), 0)
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Parameters in the order of the kernel."""
+        drift = np.zeros(len(self.a))
+        return np.concatenate([self.a.ravel(), self.b.ravel(), self.c, self.d, drift, [self.level]])
+
+
+def fit_linear_state_space(record: Dataset, order: int) -> LinearStateSpace | None:
+    """Fit a linear state space whose states have the standard deviation 1.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record without missing values.
+    order : int
+        Number of states. The output reads the inputs that are read one sample early, also at sample k.
+
+    Returns
+    -------
+    LinearStateSpace or None
+        None if the record is too short, or without a stable model.
+    """
+    problem = make_problem(record, order, (0,) * record.inputs, order + 1)
+    if problem is None:
+        return None
+    problem = problem.with_constant()
+    start = find_start(problem) if problem.is_determined else None
+    if start is None:
+        return None
+    poles = minimise(start, _LEAST_GAIN).denominator
+    divided = np.roll(problem.divide(poles, problem.columns), -problem.states, axis=0)
+    coefficients = project(divided, problem.y)
+    if coefficients is None:
+        return None
+    a = np.diag(np.ones(order - 1), 1)
+    a[:, 0] = -poles
+    b, d, at = np.zeros((order, record.inputs)), np.zeros(record.inputs), 0
+    for place, name in enumerate(record.input_names):
+        if parse_channel_name(name).at_once:
+            d[place] = coefficients[at]
+            at += 1
+        b[:, place] = coefficients[at : at + order] - d[place] * poles
+        at += order
+    gain = 1.0 + poles.sum()
+    level = float(coefficients[at] / gain) if gain else 0.0
+    found = _balance(a, b, np.eye(order)[0])
+    return _normalise(LinearStateSpace(*found, d, level), record)
+
+
+def _balance(
+    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the balanced form; poles outside of the unit circle count as slow ones."""
+    radius = float(np.abs(np.linalg.eigvals(a)).max())
+    stable = a * min(1.0, _LARGEST_POLE / max(radius, _LARGEST_POLE))
+    reached = scipy.linalg.solve_discrete_lyapunov(stable, b @ b.T, method="bilinear")
+    shown = scipy.linalg.solve_discrete_lyapunov(stable.T, np.outer(c, c), method="bilinear")
+    values, vectors = np.linalg.eigh((reached + reached.T) / 2.0)
+    if not values.max() > 0.0:
+        return a, b, c
+    root = vectors * np.sqrt(np.maximum(values, _LEAST_EIGENVALUE * values.max()))
+    left, squares, _ = np.linalg.svd(root.T @ shown @ root)
+    squares = np.maximum(squares, np.finfo(float).tiny)
+    forward = root @ left / squares**0.25
+    backward = np.linalg.inv(forward)
+    return backward @ a @ forward, backward @ b, c @ forward
+
+
+def _normalise(model: LinearStateSpace, record: Dataset) -> LinearStateSpace | None:
+    """Return the model with states of the standard deviation 1 for the inputs of a record."""
+    slices, theta = model.layout.find_slices(), model.theta
+    order, scales = len(model.a), []
+    # An input that is read one sample early only shifts the states.
+    for state in range(order):
+        probe, y = theta.copy(), np.empty(record.samples)
+        probe[slices["C"]], probe[slices["D"]] = np.eye(order)[state], 0.0
+        rows = simulate_state_space(probe, np.zeros(0, np.int64), record.u, np.zeros(order), y)
+        if rows < record.samples:
+            return None
+        scales.append(float(y[record.samples // 10 :].std()) or 1.0)
+    by = np.array(scales)
+    return LinearStateSpace(
+        model.a * by / by[:, None], model.b / by[:, None], model.c * by, model.d, model.level
+    )
