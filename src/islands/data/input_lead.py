@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from islands.data.channel_names import AT_ONCE
+from islands.data.channel_names import AT_ONCE, parse_channel_name
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 
@@ -35,6 +35,12 @@ def advance_inputs(record: Dataset, places: Sequence[int]) -> Dataset:
         name + AT_ONCE if place in places else name for place, name in enumerate(record.input_names)
     )
     return replace(record, u=u, input_names=names)
+
+
+def advance_all_inputs(record: Dataset) -> Dataset:
+    """Return a record with all inputs read one sample early; see `advance_inputs`."""
+    names = enumerate(record.input_names)
+    return advance_inputs(record, [place for place, name in names if not parse_channel_name(name).at_once])
 
 
 def check_feedthrough(feedthrough: str) -> None:

@@ -1,17 +1,21 @@
 """Fit of a class of models by the error of the free run, from the starting models of the class."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 
 from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_all_inputs
 from islands.data.split import Split
 from islands.errors import SettingsError, lookup
 from islands.estimation.estimator_table import refinement_criterion
+from islands.estimation.latent_search import search_latent_models
 from islands.estimation.refinement import refine
 from islands.evolution.search_result import SearchResult, SearchStatistics, rank_models, with_bands
 from islands.facade.results.model_simulation import SHOOTING
 from islands.io.models import MODEL_CLASSES, NARX
+from islands.models.latent import LatentModel
 from islands.models.parametric import ParametricModel
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
@@ -29,7 +33,7 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
     """Fit the models of a class.
 
     Every starting model of the class is refined on the free run of the estimation data. The model with the
-    least error is kept.
+    least error is kept. Latent models are searched instead (see `search_latent_models`).
 
     Parameters
     ----------
@@ -46,26 +50,36 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
     Raises
     ------
     SettingsError
-        There is no such class, or no starting model has a free run that remains bounded.
+        There is no such class, or no model has a free run that remains bounded.
     """
     lookup(dict.fromkeys((NARX, *MODEL_CLASSES)), kind, "class of models")
     entry = MODEL_CLASSES[kind]
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
-    found = list(_estimate(entry, split.estimation, steps))
-    if not found:
+    if issubclass(entry, LatentModel):
+        latent = search_latent_models(split.estimation, seed, steps)
+        if any(each.reads_at_once for each in latent):
+            split = Split(advance_all_inputs(split.estimation), advance_all_inputs(split.validation))
+        models: Sequence[DynamicModel] = latent
+    else:
+        found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
+        models = [model for _, model in found[:1]]
+    if not models:
         raise SettingsError(
-            f"no model {kind} was found: the free run of every starting model diverges; take another class, "
-            "or scale the record"
+            f"no model {kind} was found: the record is too short, a column is constant, or the free run of "
+            "every starting model diverges; take another record or another class"
         )
-    _, model = min(found, key=lambda pair: pair[0])
-    steps("assessment of the model", 0.9)
-    assessment = assess(model, split, interval, criterion=_CRITERION)
+    steps.report("assessment of the models", 0.9)
+    assessed = [assess(model, split, interval, criterion=_CRITERION) for model in models]
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
-    counts = {"ok": len(found)}
-    search = SearchStatistics(len(found), counts, {"candidates": len(found), "bytes": 0})
-    result = SearchResult(record, split, seed, settings, search, rank_models([assessment]))
-    error = free_run(model, split.validation).mean_squared_error
-    return with_bands(result, [ValidatedModel(model, _CRITERION, error)], "none", model.maximum_lag, steps)
+    counts = {"ok": len(models)}
+    search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
+    result = SearchResult(record, split, seed, settings, search, rank_models(assessed))
+    validated = [
+        ValidatedModel(model, _CRITERION, free_run(model, split.validation).mean_squared_error)
+        for model in models
+    ]
+    warm_up = max(model.maximum_lag for model in models)
+    return with_bands(result, validated, "none", warm_up, steps)
 
 
 def _estimate(

@@ -1,0 +1,437 @@
+"""Search of state spaces with static units by the error of the free run.
+
+Linear models of several orders are the starts. Units are added with random directions and negligible
+effects. The effects are estimated first, then all parameters. Starts race (successive halving: Karnin, Koren
+and Somekh 2013): after some steps, those with larger errors on held-out blocks are left. The blocks are
+spread over the record, because the least error on the estimation data prefers models that are too large.
+Parameters that the held-out error does not need are removed in the end.
+"""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import isfinite, log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_all_inputs
+from islands.estimation.linear_state_space import fit_linear_state_space
+from islands.estimation.modal_form import find_modal_form
+from islands.estimation.state_space_fit import StateSpaceFit
+from islands.kernels.state_space import simulate_state_space
+from islands.models.latent import LatentModel, StateSpaceLayout, find_codes
+from islands.progress import Steps
+from islands.simulation.initial_states import Segment, estimate_states
+
+#: Numbers of states of the linear models.
+_ORDERS = (1, 2, 3, 4, 6)
+
+#: Units that are tried with every order.
+_UNITS = (
+    *(("tanh",) * count for count in (1, 2, 4, 6)),
+    *((name,) for name in ("square", "cube", "abs", "root")),
+    ("square", "cube"),
+    *((name,) * 2 for name in ("hinge", "saturation", "dead zone", "bell")),
+)
+
+#: Random starts of each order and units; orders with a larger error than this multiple of the least linear
+#: error are left out.
+_STARTS, _LARGEST_RATIO = 2, 3.0
+
+#: Steps of the effects of the units, then of all parameters before the first comparison.
+_FIRST_STEPS, _TRIAL_STEPS = 6, 10
+
+#: Rounds of the race: steps, and models that are left before them.
+_ROUNDS = ((15, 12), (40, 6), (150, 3))
+
+#: Blocks of a record, samples of a block at most, and the part of each that is held out.
+_BLOCKS, _LARGEST_BLOCK, _HELD_OUT = 5, 4_000, 0.2
+
+#: Samples of the final estimation, at most.
+_LARGEST_SAMPLES = 60_000
+
+#: Samples from which the initial states of a block are estimated, at least for a state and at most.
+_SAMPLES_PER_STATE, _LARGEST_MEMORY = 3, 100
+
+#: Largest part of a segment that gives the initial states of a free run of the result.
+_LARGEST_PART = 0.05
+
+#: Part to which a mode decays in the warm-up.
+_DECAY = 0.01
+
+#: Standard deviations of random directions and offsets of the units, and of their first effects.
+_OFFSET, _EFFECT = 0.7, 1e-3
+
+#: Gain of the held-out error, as a fraction, that justifies further parameters; increase by a removal.
+_NEGLIGIBLE, _LARGEST_INCREASE = 0.01, 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Data:
+    """A record with the standard deviation 1 of all signals, in blocks.
+
+    Attributes
+    ----------
+    record : Dataset
+    used, held_out : tuple of Segment
+        Blocks for the estimation and for the comparison of models, in pairs.
+    whole : tuple of Segment
+        Both together.
+    """
+
+    record: Dataset
+    used: tuple[Segment, ...]
+    held_out: tuple[Segment, ...]
+    whole: tuple[Segment, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """A fit of a structure, and its error on the held-out blocks."""
+
+    layout: StateSpaceLayout
+    units: tuple[str, ...]
+    start: int
+    fit: StateSpaceFit
+    error: float
+
+    @property
+    def order(self) -> tuple[float, int, tuple[str, ...], int]:
+        """Sort key: the error; ties are broken by the structure."""
+        return self.error, self.layout.order, self.units, self.start
+
+    @property
+    def free(self) -> int:
+        """Number of free parameters."""
+        return int(np.count_nonzero(self.fit.places >= 0))
+
+    def advance(self, steps: int, data: _Data, stop: Steps) -> "_Candidate":
+        """Return the candidate after some steps."""
+        self.fit.advance(steps, lambda: stop.skip("refinement of parameters"))
+        return replace(self, error=_measure(self.fit, data.held_out))
+
+
+def search_latent_models(record: Dataset, seed: int, steps: Steps) -> list[LatentModel]:
+    """Search state spaces with static units.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record without missing values.
+    seed : int
+        Seed of the random starts.
+    steps : Steps
+
+    Returns
+    -------
+    list of LatentModel
+        Models that no other one exceeds in both the number of parameters and the held-out error, the smallest
+        first. They are estimated on all blocks. If the output of the one with the least error reads an input
+        at sample k, the inputs of all are read one sample early. Empty if the record is too short.
+    """
+    advanced = advance_all_inputs(record)
+    data = _make_data(advanced)
+    linear = _fit_linear(data, steps)
+    if not linear:
+        return []
+    least = min(each.error for each in linear)
+    candidates = list(linear)
+    starts = [
+        (each, units, start)
+        for each in linear
+        if each.error <= _LARGEST_RATIO * least
+        for units in _UNITS
+        for start in range(_STARTS)
+    ]
+
+    def begin(entry: tuple[_Candidate, tuple[str, ...], int]) -> _Candidate | None:
+        return None if steps.skip("starts of further units") else _begin(*entry, data, seed, steps)
+
+    with ThreadPoolExecutor() as threads:
+        steps.report("starts of state spaces with units", 0.1)
+        candidates += [each for each in threads.map(begin, starts) if each is not None]
+        for number, (count, most) in enumerate(_ROUNDS, start=1):
+            steps.report(f"round {number} of {len(_ROUNDS)} of the race of state spaces", 0.2 + 0.15 * number)
+            front = _find_front(candidates)
+            ranked = sorted(candidates, key=lambda each: each.order)
+            kept = {id(each): each for each in (*ranked[:most], *front)}
+            racing = [each for each in kept.values() if each.units]
+            moved = threads.map(lambda each: each.advance(count, data, steps), racing)  # noqa: B023
+            candidates = [each for each in candidates if not each.units] + list(moved)
+        steps.report("final estimation of state spaces", 0.7)
+        front = _find_front(candidates)
+        best = _make_model(
+            _remove_blocks(front[-1], data, True).fit, front[-1].layout, front[-1].units, advanced
+        )
+        direct = best.reads_at_once
+
+        def finish(each: _Candidate) -> LatentModel | None:
+            return _finish(each, data, direct, advanced, steps)
+
+        models = [each for each in threads.map(finish, front) if each is not None]
+    return models if direct else [replace(each, input_names=record.input_names) for each in models]
+
+
+def _make_data(record: Dataset) -> _Data:
+    """Scale a record and cut blocks out of it."""
+    scaled = replace(
+        record,
+        u=(record.u - record.u.mean(axis=0)) / _deviation(record.u),
+        y=(record.y - record.y.mean()) / _deviation(record.y),
+        preprocessing=None,
+    )
+    used: list[Segment] = []
+    held_out: list[Segment] = []
+    whole: list[Segment] = []
+    for begin, end in _cut_blocks(scaled):
+        cut = end - round(_HELD_OUT * (end - begin))
+        for found, first, last in ((used, begin, cut), (held_out, cut, end), (whole, begin, end)):
+            found.append(_take(scaled, first, last))
+    return _Data(scaled, tuple(used), tuple(held_out), tuple(whole))
+
+
+def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviation of each column, 1 for a constant."""
+    found = values.std(axis=0)
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _cut_blocks(record: Dataset) -> Iterator[tuple[int, int]]:
+    """Yield the first and the last row of each block; blocks do not cross segments."""
+    share = max(1, record.samples // _BLOCKS)
+    for begin, end in record.bounds:
+        count = max(1, round((end - begin) / share))
+        cuts = np.linspace(begin, end, count + 1).astype(int).tolist()
+        for first, last in pairwise(cuts):
+            yield first, min(last, first + _LARGEST_BLOCK)
+
+
+def _take(record: Dataset, begin: int, end: int) -> Segment:
+    """Return rows with the inputs at the same samples."""
+    # All inputs are read one sample early, so that the first row of a segment lacks them.
+    first = begin + 1 if begin in {bounds[0] for bounds in record.bounds} else begin
+    return Segment(np.ascontiguousarray(record.u[first - 1 : end - 1]), record.y[first:end].copy())
+
+
+def _fit_linear(data: _Data, steps: Steps) -> list[_Candidate]:
+    steps.check("linear state spaces")
+    found: list[_Candidate] = []
+    for order in _ORDERS:
+        if found and steps.skip("linear state spaces of larger orders"):
+            break
+        steps.report(f"linear state space of order {order}", 0.0)
+        model = fit_linear_state_space(data.record[: _BLOCKS * _LARGEST_BLOCK], order)
+        if model is None:
+            continue
+        fit = _make_fit(model.theta, model.layout, (), data.used)
+        fit.advance(_TRIAL_STEPS)
+        found.append(_Candidate(model.layout, (), 0, fit, _measure(fit, data.held_out)))
+    return [each for each in found if isfinite(each.error)]
+
+
+def _make_fit(
+    theta: NDArray[np.float64], layout: StateSpaceLayout, units: tuple[str, ...], segments: Sequence[Segment]
+) -> StateSpaceFit:
+    codes = find_codes(units)
+    states = [_estimate_start(theta, codes, each, layout.order) for each in segments]
+    return StateSpaceFit(theta, np.arange(theta.size), codes, segments, np.array(states))
+
+
+def _count_memory(segment: Segment, order: int) -> int:
+    """Return the number of rows from which initial states are estimated."""
+    return min(len(segment.y) // 3, max(_SAMPLES_PER_STATE * order, _LARGEST_MEMORY))
+
+
+def _estimate_start(
+    theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, order: int
+) -> NDArray[np.float64]:
+    rows = _count_memory(segment, order)
+    return estimate_states(theta, codes, Segment(segment.u[:rows], segment.y[:rows]), np.zeros(order))
+
+
+def _measure(fit: StateSpaceFit, segments: Sequence[Segment]) -> float:
+    """Return the mean squared error after the rows that give the initial states; infinite if one diverges."""
+    total, count, order = 0.0, 0, fit.states.shape[1]
+    for segment in segments:
+        rows = _count_memory(segment, order)
+        x, y = _estimate_start(fit.theta, fit.codes, segment, order), np.empty(len(segment.y))
+        if simulate_state_space(fit.theta, fit.codes, segment.u, x, y) < len(y):
+            return np.inf
+        total += float(np.nansum((segment.y - y)[rows:] ** 2))
+        count += len(y) - rows
+    return total / max(1, count)
+
+
+def _begin(
+    linear: _Candidate, units: tuple[str, ...], start: int, data: _Data, seed: int, steps: Steps
+) -> _Candidate:
+    """Add units to a linear model and estimate."""
+    order, inputs, count = linear.layout.order, linear.layout.inputs, len(units)
+    layout = StateSpaceLayout(order, inputs, count)
+    rng = np.random.default_rng(
+        np.random.SeedSequence(seed, spawn_key=(order, list(_UNITS).index(units), start))
+    )
+    theta, slices, given = np.zeros(len(layout.names)), layout.find_slices(), linear.layout.find_slices()
+    for block in ("A", "B", "C", "D", "o", "level"):
+        theta[slices[block]] = linear.fit.theta[given[block]]
+    theta[slices["E"]] = _EFFECT * rng.standard_normal(order * count)
+    theta[slices["F"]] = _EFFECT * rng.standard_normal(count)
+    theta[slices["W"]] = rng.standard_normal(count * (order + inputs)) / np.sqrt(order + inputs)
+    theta[slices["s"]] = _OFFSET * rng.standard_normal(count)
+    codes = find_codes(units)
+    fixed = np.zeros(theta.size, bool)
+    fixed[slices["W"]] = fixed[slices["s"]] = True
+    fit = StateSpaceFit(theta, _number(~fixed), codes, data.used, linear.fit.states.copy())
+    fit.advance(_FIRST_STEPS)
+    fit.release(np.arange(theta.size))
+    found = _Candidate(layout, units, start, fit, np.inf)
+    return found.advance(_TRIAL_STEPS, data, steps)
+
+
+def _number(free: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the columns of the free parameters, -1 for the others."""
+    return np.where(free, np.cumsum(free) - 1, -1)
+
+
+def _find_front(candidates: Sequence[_Candidate]) -> list[_Candidate]:
+    """Return the candidates that no other one exceeds in size and error, the smallest first."""
+    front: list[_Candidate] = []
+    for each in sorted(candidates, key=lambda each: (each.free, each.order)):
+        if isfinite(each.error) and (not front or each.error < (1.0 - _NEGLIGIBLE) * front[-1].error):
+            front.append(each)
+    return front
+
+
+def _remove_blocks(candidate: _Candidate, data: _Data, direct: bool) -> _Candidate:
+    """Return the candidate without the blocks of parameters that the held-out error does not need.
+
+    Without ``direct``, the output reads no input at the same row: the units read none, or it reads no unit.
+    """
+    layout = candidate.layout
+    slices, every = layout.find_slices(), np.arange(len(layout.names))
+    weights = every[slices["W"]].reshape(layout.units, layout.order + layout.inputs)
+    of_states, of_inputs = weights[:, : layout.order].ravel(), weights[:, layout.order :].ravel()
+    through, past = every[slices["D"]], every[slices["F"]]
+    if not direct:
+        tried = [_fit_without(candidate, np.append(through, each), data) for each in (past, of_inputs)]
+        candidate = min(tried, key=lambda each: each.error)
+    for block in (past, through, of_inputs, of_states):
+        if (candidate.fit.places[block] >= 0).any():
+            found = _fit_without(candidate, block, data)
+            if found.error <= (1.0 + _LARGEST_INCREASE) * candidate.error:
+                candidate = replace(found, error=min(found.error, candidate.error))
+    return candidate
+
+
+def _fit_without(candidate: _Candidate, block: NDArray[np.int64], data: _Data) -> _Candidate:
+    """Return the candidate without some parameters, after further steps."""
+    theta, free = candidate.fit.theta.copy(), candidate.fit.places >= 0
+    theta[block], free[block] = 0.0, False
+    fit = StateSpaceFit(theta, _number(free), candidate.fit.codes, data.used, candidate.fit.states.copy())
+    fit.advance(_ROUNDS[0][0])
+    return replace(candidate, fit=fit, error=_measure(fit, data.held_out))
+
+
+def _finish(
+    candidate: _Candidate, data: _Data, direct: bool, record: Dataset, steps: Steps
+) -> LatentModel | None:
+    """Remove parameters that are not needed, estimate on all blocks and return the model of the record."""
+    fit = _remove_blocks(candidate, data, direct).fit
+    final = StateSpaceFit(fit.theta, fit.places, fit.codes, data.whole, fit.states)
+    final.advance(_ROUNDS[-1][0], lambda: steps.skip("refinement of parameters"))
+    if not isfinite(final.mean_square):
+        return None
+    return _make_model(final, candidate.layout, candidate.units, record)
+
+
+def _write_in_modes(fit: StateSpaceFit, layout: StateSpaceLayout, segment: Segment) -> NDArray[np.float64]:
+    """Return the parameters with one or two states for each mode, of the standard deviation 1."""
+    theta, slices = fit.theta.copy(), layout.find_slices()
+    order = layout.order
+    found = find_modal_form(theta[slices["A"]].reshape(order, order))
+    if found is None:
+        return theta
+    blocks, forward = found
+    modal = _transform(theta, layout, forward)
+    modal[slices["A"]] = blocks.ravel()
+    scales = _measure_states(modal, fit.codes, layout, np.linalg.solve(forward, fit.states[0]), segment)
+    for state, next_state in pairwise(range(order)):
+        if blocks[state, next_state]:  # both states of a pair have one scale
+            scales[[state, next_state]] = np.hypot(*scales[[state, next_state]])
+    scaled = _transform(modal, layout, np.diag(scales))
+    scaled[slices["A"]] = blocks.ravel()
+    return scaled if np.isfinite(scaled).all() else theta
+
+
+def _transform(
+    theta: NDArray[np.float64], layout: StateSpaceLayout, forward: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the parameters for the states z of ``x = T z``."""
+    found, slices, order = theta.copy(), layout.find_slices(), layout.order
+    for name, width in (("A", order), ("B", layout.inputs), ("E", layout.units), ("o", 1)):
+        block = theta[slices[name]].reshape(order, width)
+        found[slices[name]] = np.linalg.solve(forward, block).ravel()
+    found[slices["A"]] = (found[slices["A"]].reshape(order, order) @ forward).ravel()
+    found[slices["C"]] = theta[slices["C"]] @ forward
+    w = theta[slices["W"]].reshape(layout.units, order + layout.inputs).copy()
+    w[:, :order] = w[:, :order] @ forward
+    found[slices["W"]] = w.ravel()
+    return found
+
+
+def _measure_states(
+    theta: NDArray[np.float64],
+    codes: NDArray[np.int64],
+    layout: StateSpaceLayout,
+    start: NDArray[np.float64],
+    segment: Segment,
+) -> NDArray[np.float64]:
+    """Return the standard deviations of the states, 1 of a state that does not move."""
+    slices, scales = layout.find_slices(), np.ones(layout.order)
+    for state in range(layout.order):
+        probe, y = theta.copy(), np.empty(len(segment.y))
+        probe[slices["C"]], probe[slices["D"]] = np.eye(layout.order)[state], 0.0
+        probe[slices["F"]] = 0.0
+        simulate_state_space(probe, codes, segment.u, start.copy(), y)
+        scales[state] = _deviation(y)
+    return scales
+
+
+def _make_model(
+    fit: StateSpaceFit, layout: StateSpaceLayout, units: tuple[str, ...], record: Dataset
+) -> LatentModel:
+    """Return the model in the units of a record."""
+    theta, slices = _write_in_modes(fit, layout, fit.segments[0]), layout.find_slices()
+    mean, scale = record.u.mean(axis=0), _deviation(record.u)
+    level, height = float(record.y.mean()), float(_deviation(record.y))
+    b = theta[slices["B"]].reshape(layout.order, layout.inputs) / scale
+    w = theta[slices["W"]].reshape(layout.units, layout.order + layout.inputs)
+    w[:, layout.order :] /= scale
+    d = height * theta[slices["D"]] / scale
+    theta[slices["o"]] -= b @ mean
+    theta[slices["s"]] -= w[:, layout.order :] @ mean
+    theta[slices["level"]] = level + height * theta[slices["level"]] - d @ mean
+    theta[slices["B"]], theta[slices["W"]], theta[slices["D"]] = b.ravel(), w.ravel(), d
+    theta[slices["C"]] *= height
+    theta[slices["F"]] *= height
+    wiring = tuple(name for name, value in zip(layout.names, theta, strict=True) if value != 0.0)
+    radius = float(np.abs(np.linalg.eigvals(theta[slices["A"]].reshape(layout.order, layout.order))).max())
+    decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
+    shortest = min(record.segments) * _LARGEST_PART
+    # The first sample of a segment lacks its input.
+    memory = 1 + round(max(_SAMPLES_PER_STATE * layout.order, min(_LARGEST_MEMORY - 1, decay, shortest)))
+    return LatentModel(
+        order=layout.order,
+        units=units,
+        wiring=wiring,
+        memory=memory,
+        operating_inputs=tuple(mean.tolist()),
+        parameters=tuple(value for value in theta.tolist() if value != 0.0),
+        input_names=record.input_names,
+        output_name=record.output_name,
+        dt=record.dt,
+        preprocessing=record.preprocessing,
+    )

@@ -1,0 +1,67 @@
+"""A latent model from the command line: fit, files, simulation, programs, figures."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import islands
+from islands.simulation.predictors import free_run
+from support.command_line import fail, succeed
+from support.latent_systems import spring_record
+
+pytestmark = pytest.mark.ci
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The folder of a fit of a cubic spring."""
+    folder = tmp_path_factory.mktemp("latent")
+    islands.write_record(spring_record(1200, noise=0.02), folder / "spring.csv")
+    islands.write_record(spring_record(800, noise=0.02, seed=7), folder / "other.csv")
+    columns = ("--input", "u_V", "--output", "y_mm")
+    succeed("fit", folder / "spring.csv", *columns, "--model", "latent", "--out", folder / "out")
+    return folder
+
+
+def read(folder):
+    return islands.read_record(folder / "other.csv", inputs="u_V", output="y_mm")
+
+
+def test_the_summary_has_the_units_and_the_resonance(folder):
+    text = succeed("show", folder / "out")
+    assert "cube(" in text
+    assert "resonance at 5.1" in text
+    assert (folder / "out" / "figures").is_dir()
+
+
+def test_a_saved_model_simulates_another_record(folder):
+    text = succeed("simulate", folder / "out", folder / "other.csv", "--bands", "0.9")
+    model, other = islands.load(folder / "out").best.model, read(folder)
+    run = free_run(model, other)
+    error = (run.y - other.y)[model.maximum_lag :]
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(0.02, rel=0.15)
+    assert "RMSE 0.02" in text
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
+def test_a_c_file_approaches_the_simulation_from_rest(folder, tmp_path):
+    model = islands.load(folder / "out").best.model
+    other = read(folder)
+    (tmp_path / "model.c").write_text(succeed("show", folder / "out", "--format", "c"))
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]
+    subprocess.run(["gcc", *flags, "model.c", "-o", "model.so", "-lm"], cwd=tmp_path, check=True)
+    states = [np.zeros(other.samples) for _ in range(model.order)]
+    rows = [other.u[:, 0].copy(), other.y.copy(), *states]
+    pointers = (row.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for row in rows)
+    ctypes.CDLL(tmp_path / "model.so").simulate(*pointers, ctypes.c_size_t(other.samples))
+    # The program starts at rest, and its transient decays.
+    assert rows[1][400:] == pytest.approx(free_run(model, other).y[400:], abs=1e-4)
+
+
+def test_settings_of_narx_models_are_refused(folder):
+    columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused")
+    text = fail("fit", folder / "spring.csv", *columns, "--model", "latent", "--lags", "3")
+    assert "settings of NARX models" in text
