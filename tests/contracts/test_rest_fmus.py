@@ -6,12 +6,15 @@ import zipfile
 
 import numpy as np
 import pytest
+import scipy
 
+import islands
 from islands_api import Client
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.domain.job import JobOutcome, JobState
+from support.command_line import succeed
 from support.oscillator_fmus import write_oscillator
-from support.service import npz, problem_of, spec
+from support.service import execute_diagnosis, npz, problem_of, spec
 
 pytestmark = pytest.mark.ci
 
@@ -32,14 +35,15 @@ def shared(serve):
             yield running
 
 
-def make_axis(offset=0.0, samples=400):
-    """Return a record of the oscillator of the FMU with another mass, and an offset that the FMU lacks."""
+def make_axis(offset=0.0, samples=240):
+    """Return a record of the law of the FMU with another mass, noise, and an offset that the FMU lacks."""
     t = 0.01 * np.arange(samples)
-    u = 10.0 * np.sin(3.0 * t) + np.random.default_rng(1).standard_normal(samples)
-    x, v = np.zeros(samples), 0.0
-    for k in range(1, samples):
-        v += 0.01 * (u[k - 1] - 4.0 * v - 200.0 * x[k - 1]) / 0.55
-        x[k] = x[k - 1] + 0.01 * v
+    rng = np.random.default_rng(1)
+    u = 10.0 * np.sin(3.0 * t) + rng.standard_normal(samples)
+    law = scipy.signal.StateSpace(
+        [[0.0, 1.0], [-200.0 / 0.55, -4.0 / 0.55]], [[0.0], [1.0 / 0.55]], [1, 0], 0
+    )
+    x = scipy.signal.lsim(law, u, t)[1] + 2e-4 * rng.standard_normal(samples)
     return npz(t_s=t, F_N=u, x_m=x + offset)
 
 
@@ -157,24 +161,46 @@ def test_a_diagnosis_of_an_fmu_can_be_cancelled_during_a_simulation(shared, fmu)
     shared.store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
 
 
-@pytest.mark.nightly
-@pytest.mark.timeout(1800)
-def test_a_diagnosis_of_an_fmu_names_the_missing_offset(shared, fmu):
-    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
-    from islands_service.store.blobs import Blobs
-    from support.job_runs import make_run
-    from support.undrawn import undrawn_figures
-
+@pytest.fixture(scope="module")
+def diagnosed(shared, content):
+    """Id of the finished diagnosis of a record with an offset."""
     dataset = shared.upload(make_axis(0.02), "axis.npz").json()["id"]
-    tolerance = {"tolerance": {"m": 0.2, "c": 0.05, "k": 0.05}}
-    job = shared.client.post("/v1/discrepancies", json={**of_fmu(dataset, fmu), **tolerance}).json()
-    lease = shared.store.leases.claim("test", 600.0)
-    assert lease.job.id == job["id"]
-    with undrawn_figures():
-        outcome = run_diagnosis_job(make_run(lease, shared.store, Blobs(shared.settings.blobs)))
-    shared.store.leases.finish(lease, outcome)
-    assert "offset" in outcome.summary["effects"]
-    extended = shared.client.get(f"/v1/jobs/{job['id']}/extended").json()
-    assert (extended["core"]["kind"], extended["core"]["file"]) == ("fmu", "mass.fmu")
-    export = shared.client.get(f"/v1/jobs/{job['id']}/extended/export")
+    asked = of_fmu(dataset, send(shared, content).json()["id"])
+    tolerance = {"m": 0.2, "c": 0.05, "k": 0.05}
+    job = shared.client.post("/v1/discrepancies", json={**asked, "tolerance": tolerance}).json()["id"]
+    assert execute_diagnosis(shared) == job
+    return job
+
+
+def test_a_diagnosis_of_an_fmu_names_the_missing_offset(shared, diagnosed):
+    job = shared.client.get(f"/v1/jobs/{diagnosed}").json()
+    assert (job["state"], job["summary"]["effects"]) == ("succeeded", ["offset"])
+    report = shared.client.get(f"/v1/jobs/{diagnosed}/report")
+    assert report.status_code == 200
+    assert report.text.count("data:image/svg+xml") >= 3
+    assert "mass.fmu" in report.text
+    assert "/tmp" not in report.text
+    outputs = shared.client.get(f"/v1/jobs/{diagnosed}/outputs").json()
+    assert [each["name"] for each in outputs["outputs"]] == ["measured", "simulated", "extended"]
+
+
+def test_the_extended_simulation_of_an_fmu_runs_beside_its_file(
+    shared, diagnosed, content, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    succeed("jobs", "result", diagnosed, "--url", shared.url, "--out", "found")
+    shown = succeed("show", "found/extended.json")
+    assert shown.startswith("x_m from F_N: fmu ")
+    assert "offset (output map)" in shown
+    (tmp_path / "mass.fmu").write_bytes(content)
+    (tmp_path / "axis.npz").write_bytes(make_axis(0.02))
+    record = islands.read_record("axis.npz", inputs=["F_N"], output="x_m")
+    residual = islands.load("found/extended.json").simulate(record).y - record.y
+    assert np.sqrt(np.mean(residual**2)) < 4e-4
+
+
+def test_a_diagnosed_fmu_is_neither_exported_nor_monitored(shared, diagnosed):
+    export = shared.client.get(f"/v1/jobs/{diagnosed}/extended/export")
     assert "is not one difference equation" in problem_of(export, 404, "not-found")
+    monitor = shared.client.post("/v1/monitors", json={"diagnosis": diagnosed})
+    assert "run 'islands monitor' locally" in problem_of(monitor, 422, "invalid-settings")

@@ -228,19 +228,23 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
 
 def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     """Upload a record, submit a diagnosis and execute it in this process; return the id of the job."""
-    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
-    from support.job_runs import make_run
-
     dataset = service.upload(content).json()["id"]
     asked = held(dataset, channels=["T_K"], tolerance=KNOWN, **changes)
     job = service.client.post("/v1/discrepancies", json=asked).json()
+    assert execute_diagnosis(service) == job["id"]
+    return str(job["id"])
+
+
+def execute_diagnosis(service: Service) -> str:
+    """Execute the diagnosis that is next in the queue in this process; return the id of the job."""
+    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
+    from support.job_runs import make_run
+
     lease = service.store.leases.claim("test", 600.0)
     assert lease is not None
-    assert lease.job.id == job["id"]
-    run = make_run(lease, service.store, Blobs(service.settings.blobs))
-    outcome = run_diagnosis_job(run, map_cases=map)
+    outcome = run_diagnosis_job(make_run(lease, service.store, Blobs(service.settings.blobs)), map_cases=map)
     service.store.leases.finish(lease, outcome)
-    return str(job["id"])
+    return lease.job.id
 
 
 #: Settings of a search that takes a second.

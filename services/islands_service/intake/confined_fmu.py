@@ -9,7 +9,7 @@ import pickle
 import socket
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from struct import Struct
@@ -21,10 +21,8 @@ import numpy as np
 from islands.errors import ModelError
 from islands.kernels.jit_cache import cache_folder
 from islands.simulators.fmu.fmi_description import FmiDescription
-from islands.simulators.fmu.fmi_kernel import FmuEquations
-from islands.simulators.fmu.instance import FmuInstance, FmuRun
+from islands.simulators.fmu.instance import FmuInstance, FmuLane, FmuRun
 from islands.simulators.fmu.source import FmuSource
-from islands.simulators.ode.sampled_signal import SampledSignal
 from islands_service.domain.uploaded_fmu import check_interface, describe_fmu, read_fmu
 from islands_service.intake.confined_process import end_writing, enter, make_message
 from islands_service.intake.reader_process import SIMULATION_SERVER, open_memory
@@ -34,6 +32,9 @@ _REQUEST, _ANSWER = Struct("<q"), Struct("<qqq")
 
 #: Longest time of a simulation in seconds, and time between two calls of the check during it.
 _MAX_SECONDS, _CHECK_SECONDS = 120.0, 0.5
+
+#: Largest number of samples of the simulations of a request, unless one simulation has more.
+_MAX_SAMPLES = 200_000
 
 #: Largest number of bytes of a failure.
 _MAX_FAILURE = 4000
@@ -67,14 +68,7 @@ class ConfinedFmu:
         if failure := self._receive(0, 0).failure:
             raise ModelError(failure)
 
-    def simulate(
-        self,
-        values: Mapping[int, float],
-        signals: Mapping[int, SampledSignal],
-        equations: FmuEquations,
-        start_time: float,
-        dt: float,
-    ) -> FmuRun:
+    def simulate(self, lanes: Sequence[FmuLane], start_time: float, dt: float) -> list[FmuRun]:
         """Simulate as `islands.simulators.fmu.instance.FmuInstance.simulate` does.
 
         Raises
@@ -82,10 +76,15 @@ class ConfinedFmu:
         ModelError
             The process has ended, or takes too long.
         """
-        request = pickle.dumps((dict(values), dict(signals), equations, start_time, dt))
-        self._send(_REQUEST.pack(len(request)) + request)
-        samples = len(next(iter(signals.values())).moments)
-        return self._receive(equations.instructions.outputs.size, samples)
+        together = max(1, _MAX_SAMPLES // lanes[0].shape[1])
+        found = []
+        for first in range(0, len(lanes), together):
+            part = lanes[first : first + together]
+            # Lanes have most signals in common, which a request contains once.
+            request = pickle.dumps((part, start_time, dt))
+            self._send(_REQUEST.pack(len(request)) + request)
+            found += [self._receive(*lane.shape) for lane in part]
+        return found
 
     def _send(self, data: bytes) -> None:
         rest = memoryview(data)
@@ -213,8 +212,9 @@ def main() -> None:
     _answer(answer, FmuRun(np.empty((0, 0))))
     with os.fdopen(os.dup(answer.fileno()), "rb") as requests:
         while header := requests.read(_REQUEST.size):
-            request = pickle.loads(requests.read(_REQUEST.unpack(header)[0]))
-            _answer(answer, fmu.simulate(*request))
+            lanes, start_time, dt = pickle.loads(requests.read(_REQUEST.unpack(header)[0]))
+            for lane in lanes:
+                _answer(answer, *fmu.simulate([lane], start_time, dt))
 
 
 def _answer(stream: IO[bytes], run: FmuRun) -> None:

@@ -7,11 +7,11 @@ import sys
 import tempfile
 import threading
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,30 @@ _MESSAGES = 3
 
 #: Status of a call after which an instance cannot be used again, and after which it must not even be freed.
 _ERROR, _FATAL = 3, 4
+
+
+class FmuLane(NamedTuple):
+    """Values and signals of a simulation.
+
+    Attributes
+    ----------
+    values : mapping
+        Start values by value reference.
+    signals : mapping
+        Inputs by value reference; a co-simulation takes their values at the start and in the middle of each
+        step.
+    equations : FmuEquations
+        A co-simulation has no states in them.
+    """
+
+    values: Mapping[int, float]
+    signals: Mapping[int, SampledSignal]
+    equations: FmuEquations
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of outputs and of samples."""
+        return self.equations.instructions.outputs.size, len(next(iter(self.signals.values())).moments)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,44 +107,33 @@ class FmuInstance:
         except Exception as error:  # fmpy raises bare exceptions
             raise ModelError(self._describe(f"{description.path} cannot be loaded: {error}")) from error
 
-    def simulate(
-        self,
-        values: Mapping[int, float],
-        signals: Mapping[int, SampledSignal],
-        equations: FmuEquations,
-        start_time: float,
-        dt: float,
-    ) -> FmuRun:
-        """Simulate the outputs of equations from the start values of the FMU.
+    def simulate(self, lanes: Sequence[FmuLane], start_time: float, dt: float) -> list[FmuRun]:
+        """Simulate the outputs of equations, each time from the start values of the FMU.
 
         Parameters
         ----------
-        values : mapping
-            Start values by value reference.
-        signals : mapping
-            Inputs by value reference; a co-simulation takes their values at the start and in the middle of
-            each step.
-        equations : FmuEquations
-            A co-simulation has no states in them.
+        lanes : sequence of FmuLane
         start_time, dt : float
             Time of the first sample, and step, in seconds.
 
         Returns
         -------
-        FmuRun
+        list of FmuRun
         """
         with self._lock:
-            self._messages.clear()
-            try:
-                self._initialise(values, signals, start_time)
-            except ModelError:
-                raise
-            except Exception as error:  # a status of the FMU that is not OK, or an instance that fails
-                self._is_fresh = False
-                self._recover(getattr(error, "status", 0))
-                size = len(next(iter(signals.values())).moments), equations.instructions.outputs.size
-                return FmuRun(np.full(size[::-1], np.nan), self._describe(str(error)))
-            return self._run(signals, equations, start_time, dt)
+            return [self._simulate(lane, start_time, dt) for lane in lanes]
+
+    def _simulate(self, lane: FmuLane, start_time: float, dt: float) -> FmuRun:
+        self._messages.clear()
+        try:
+            self._initialise(lane.values, lane.signals, start_time)
+        except ModelError:
+            raise
+        except Exception as error:  # a status of the FMU that is not OK, or an instance that fails
+            self._is_fresh = False
+            self._recover(getattr(error, "status", 0))
+            return FmuRun(np.full(lane.shape, np.nan), self._describe(str(error)))
+        return self._run(lane, start_time, dt)
 
     def _instantiate(self) -> None:
         from fmpy.simulation import instantiate_fmu  # noqa: PLC0415 - only if an FMU is used
@@ -170,10 +183,8 @@ class FmuInstance:
             fmu.setFloat64(list(first), list(first.values()))
         fmu.exitInitializationMode()
 
-    def _run(
-        self, signals: Mapping[int, SampledSignal], equations: FmuEquations, start_time: float, dt: float
-    ) -> FmuRun:
-        y, done, status = call_kernel(self._functions, self.description, signals, equations, start_time, dt)
+    def _run(self, lane: FmuLane, start_time: float, dt: float) -> FmuRun:
+        y, done, status = call_kernel(self._functions, self.description, lane, start_time, dt)
         failure = ""
         if done < len(y):
             reason = "it ends the simulation" if status == TERMINATED else f"it fails with status {status}"
@@ -189,8 +200,7 @@ class FmuInstance:
 def call_kernel(
     functions: FmiFunctions,
     description: FmiDescription,
-    signals: Mapping[int, SampledSignal],
-    equations: FmuEquations,
+    lane: FmuLane,
     start_time: float,
     dt: float,
 ) -> tuple[NDArray[np.float64], int, int]:
@@ -204,6 +214,7 @@ def call_kernel(
     status : int
         That of the last call.
     """
+    _, signals, equations = lane
     inputs = np.array(list(signals), dtype=np.uint32)
     moments = np.stack([signal.moments for signal in signals.values()])
     start, middle, end = (np.ascontiguousarray(each.T) for each in moments.transpose(2, 0, 1))

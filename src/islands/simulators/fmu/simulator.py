@@ -71,10 +71,11 @@ class FmuSimulator(OdeSimulator):
         """Simulate expressions of the system at its nominal values; the result says why if it fails."""
         program = generate_program(self.system, outputs)
         run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
-        (lane,) = self._make_lanes(program, (), [run], context)
+        lanes = self._make_lanes(program, (), [run], context)
         dt = context.dt / self._steps
         fmu = self.source.load(self.model.description)
-        return simulate_fmu(fmu, self.model, program, context.start_time, dt, lane)
+        (found,) = simulate_fmu(fmu, self.model, program, context.start_time, dt, lanes)
+        return found
 
     def _simulate_lanes(
         self,
@@ -85,8 +86,8 @@ class FmuSimulator(OdeSimulator):
         every: int,
     ) -> Signal:
         fmu = self.source.load(self.model.description)
-        outputs = [simulate_fmu(fmu, self.model, program, start_time, dt, lane).y for lane in lanes]
-        return np.stack(outputs)[:, :, ::every]
+        found = simulate_fmu(fmu, self.model, program, start_time, dt, lanes)
+        return np.stack([each.y for each in found])[:, :, ::every]
 
 
 def make_fmu_simulator(

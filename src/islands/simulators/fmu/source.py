@@ -1,26 +1,17 @@
 """Source of an FMU: how its description is read, and how it is loaded."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from islands.simulators.fmu.fmi_description import FmiDescription, read_description
-from islands.simulators.fmu.fmi_kernel import FmuEquations
-from islands.simulators.fmu.instance import FmuRun, load_fmu
-from islands.simulators.ode.sampled_signal import SampledSignal
+from islands.simulators.fmu.instance import FmuLane, FmuRun, load_fmu
 
 
 class LoadedFmu(Protocol):
     """FMU that simulates, in this process or in another one."""
 
-    def simulate(
-        self,
-        values: Mapping[int, float],
-        signals: Mapping[int, SampledSignal],
-        equations: FmuEquations,
-        start_time: float,
-        dt: float,
-    ) -> FmuRun:
+    def simulate(self, lanes: Sequence[FmuLane], start_time: float, dt: float) -> list[FmuRun]:
         """Simulate the outputs of equations; see `islands.simulators.fmu.instance.FmuInstance.simulate`."""
 
 

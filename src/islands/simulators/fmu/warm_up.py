@@ -1,7 +1,7 @@
 """Compilation of the kernels that simulate an FMU, without an FMU."""
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +9,12 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.simulators.fmu.fmi_calls import FmiFunctions
 from islands.simulators.fmu.fmi_description import FmiDescription, FmiInterface, FmiVariable
-from islands.simulators.fmu.fmi_kernel import FmuEquations
-from islands.simulators.fmu.instance import FmuRun, call_kernel
+from islands.simulators.fmu.instance import FmuLane, FmuRun, call_kernel
 from islands.simulators.fmu.model import choose_variables
 from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.fmu.source import FmuSource
 from islands.simulators.fmu.system import make_fmu_system
 from islands.simulators.ode.record_channels import make_nominal_context
-from islands.simulators.ode.sampled_signal import SampledSignal
 
 #: Status of every call, after which the kernels end.
 _ERROR = 3
@@ -48,20 +46,14 @@ class _FailingFmu:
 
     description: FmiDescription
 
-    def simulate(
-        self,
-        _values: Mapping[int, float],
-        signals: Mapping[int, SampledSignal],
-        equations: FmuEquations,
-        start_time: float,
-        dt: float,
-    ) -> FmuRun:
+    def simulate(self, lanes: Sequence[FmuLane], start_time: float, dt: float) -> list[FmuRun]:
         # The convention of C lets a function ignore its arguments.
         function = ctypes.CFUNCTYPE(ctypes.c_int)(lambda: _ERROR)
         address = ctypes.cast(function, ctypes.c_void_p).value or 0
         addresses = dict.fromkeys(FmiFunctions._fields, address) | {"version": self.description.version}
-        y, _, _ = call_kernel(FmiFunctions(**addresses), self.description, signals, equations, start_time, dt)
-        return FmuRun(np.ascontiguousarray(y.T))
+        functions = FmiFunctions(**addresses)
+        found = (call_kernel(functions, self.description, lane, start_time, dt)[0] for lane in lanes)
+        return [FmuRun(np.ascontiguousarray(y.T)) for y in found]
 
 
 def _describe(interface: FmiInterface) -> FmiDescription:

@@ -15,6 +15,7 @@ from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
 from islands_service.domain.uploaded_fmu import describe_fmu, read_fmu
+from islands_service.intake import confined_fmu
 from islands_service.intake.confined_fmu import open_confined
 from support.oscillator_fmus import write_oscillator
 
@@ -29,8 +30,11 @@ def calibrate(fmu: Path, source: FmuSource = LOCAL_FMUS) -> CalibrationPreview:
     return preview_calibration(record, make_simulator(parse_spec(f"fmu:{fmu}"), record, None, source))
 
 
-@pytest.mark.parametrize("interface", ["ModelExchange", "CoSimulation"])
-def test_a_confined_fmu_gives_the_same_bits(tmp_path: Path, interface: str) -> None:
+@pytest.mark.parametrize(("interface", "most"), [("ModelExchange", 200_000), ("CoSimulation", 700)])
+def test_a_confined_fmu_gives_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interface: str, most: int
+) -> None:
+    monkeypatch.setattr(confined_fmu, "_MAX_SAMPLES", most)
     fmu = write_oscillator(tmp_path / "mass.fmu", interfaces=interface, resources=True)
     local = calibrate(fmu)
     document = describe_fmu(read_description(str(fmu)))

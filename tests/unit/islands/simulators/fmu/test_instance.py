@@ -53,7 +53,7 @@ def run(
         make_fmu_system(model), (Symbol("x"), Symbol("v")) if is_exchange else tuple(computed)
     )
     lane = LaneInput(values, {"x": x, "v": v}, {"u": interpolate_linearly(U).refine(every)})
-    found = simulate_fmu(fmu, model, program, start, DT / every, lane)
+    (found,) = simulate_fmu(fmu, model, program, start, DT / every, [lane])
     return replace(found, y=found.y[:, ::every])
 
 
