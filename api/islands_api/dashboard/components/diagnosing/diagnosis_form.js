@@ -112,7 +112,10 @@ export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows
   function setRecord() {
     const taken = [...choice.inputs, choice.output];
     const columns = usable.map((each) => each.name).filter((each) => !taken.includes(each));
-    simulated?.setRecord({ columns, units: [units[driver.value], units[choice.output]] });
+    const channels = choice.inputs
+      .filter((each) => each !== driver.value)
+      .map((each) => ({ name: each, unit: units[each] ?? "" }));
+    simulated?.setRecord({ columns, units: [units[driver.value], units[choice.output]], channels });
     update();
   }
 

@@ -19,14 +19,62 @@ function uploadFmu(file) {
   return getJson("v1/fmus", { method: "POST", body });
 }
 
-/** Make the fields of the variables of an FMU; `read()` returns its simulation and the tolerances. */
-function makeVariableFields(fmu) {
+/** Return whether a channel has a name, with or without a unit behind it: `w`, `w_N` or `w [N]`. */
+const hasName = (channel, name) =>
+  channel.name === name ||
+  (channel.unit !== "" &&
+    channel.name.startsWith(name) &&
+    /^(_[^_]+|\s*[[(（,/].+)$/.test(channel.name.slice(name.length)));
+
+/** Make the fields of further inputs, which are driven by channels `{name, unit}` of the same name. */
+function makeChannelFields(inputs, channels) {
+  const fields = inputs.map(({ name }, place) => {
+    const found = channels.find((each) => hasName(each, name));
+    const options = found ? [el("option", { value: name }, found.name)] : [];
+    options.push(el("option", { value: "" }, "nothing"));
+    const field = el("select", { name: `fmu-channel-${place}` }, options);
+    const hint = found
+      ? "Without a channel it keeps its start value."
+      : `It keeps its start value. To drive it, choose a column with the name ${name} as a further input.`;
+    return { field, nodes: makeField(FORM, `${name} is driven by`, field, hint) };
+  });
+  return {
+    nodes: fields.flatMap(({ nodes }) => nodes),
+    read: () => fields.map(({ field }) => field.value).filter(Boolean),
+  };
+}
+
+/** Quote a value of an option behind the name of an FMU. */
+const quoteOption = (text) => text.replace(/[%&+]/g, encodeURIComponent);
+
+/**
+ * Make the fields of the variables of an FMU; `read()` returns its simulation and the tolerances.
+ * `setChannels(channels)` states which channels `{name, unit}` can drive further inputs.
+ */
+function makeVariableFields(fmu, onChange) {
   const [input, output] = [makeChoice("fmu-input", fmu.inputs), makeChoice("fmu-output", fmu.outputs)];
   const isShort = fmu.parameters.length <= fmu.most_parameters;
   const described = fmu.parameters.map(({ name, unit, start }) => ({ name, unit, default: start }));
   const chosen = isShort ? described.map(({ name }) => name) : [];
   const fields = makeParameterFields(described, { hasValues: true, units: ["", ""], chosen });
   const initial = fmu.initial.map(({ name }) => name).join(", ") || "none";
+  const further = el("div", { class: "fields" });
+  let [channels, channelFields] = [[], null];
+
+  function showChannels() {
+    channelFields = makeChannelFields(fmu.inputs.filter(({ name }) => name !== input.value), channels);
+    further.replaceChildren(...channelFields.nodes);
+  }
+
+  function setChannels(found) {
+    if (JSON.stringify(found) === JSON.stringify(channels)) return;
+    channels = found;
+    showChannels();
+    onChange();
+  }
+
+  input.addEventListener("change", showChannels);
+  showChannels();
   const node = el(
     "div",
     {},
@@ -36,6 +84,7 @@ function makeVariableFields(fmu) {
       makeField(FORM, "Input of the FMU", input, "It is driven by the input of the record."),
       makeField(FORM, "Output of the FMU", output, "It is compared with the measured output."),
     ),
+    further,
     described.length > 0 && fields.node,
     el("p", { class: "soft small" }, `Calibrated at the first sample: ${initial}.`),
   );
@@ -53,26 +102,31 @@ function makeVariableFields(fmu) {
 
   function read() {
     const found = fields.read();
-    const names = { input: input.value, output: output.value };
+    const driven = channelFields.read();
+    const names = { input: input.value, output: output.value, ...(driven.length && { channels: driven }) };
     const parameters = readParameters(found);
     const simulation = { kind: "fmu", file: fmu.id, ...names, parameters };
     const listed = Object.entries(parameters).map(([name, { value }]) =>
       value === undefined ? name : `${name}=${value}`,
     );
-    const options = new URLSearchParams({ ...names, parameters: listed.join(",") });
-    // The command line has no exact values: they are in a file.
+    const options = Object.entries({ ...names, parameters: listed }).map(
+      ([name, value]) => `${name}=${quoteOption(String(value))}`,
+    );
+    // The command line has neither exact values nor names with its separators: they are in a file.
     const isFixed = Object.values(parameters).some(({ fixed }) => fixed);
-    const argument = isFixed ? "fmu.toml" : `${fmu.name}?${decodeURIComponent(options)}`;
+    const hasSeparators = [...driven, ...Object.keys(parameters)].some((name) => /[,=]/.test(name));
+    const isInFile = isFixed || hasSeparators || fmu.name.includes("?");
+    const argument = isInFile ? "fmu.toml" : `${fmu.name}?${options.join("&")}`;
     const tolerance = Object.entries(found.tolerance).filter(([name]) => found.chosen.includes(name));
     const request = { simulation, tolerance: Object.fromEntries(tolerance), argument };
-    if (!isFixed) return request;
+    if (!isInFile) return request;
     const lines = writeFile(fmu.name, names, parameters);
     return { ...request, before: ["cat > fmu.toml <<'END'", ...lines, "END"] };
   }
-  return { node, read };
+  return { node, setChannels, read };
 }
 
-/** Return the lines of a TOML file of an FMU with exact parameters. */
+/** Return the lines of a TOML file of an FMU. */
 function writeFile(file, names, parameters) {
   const entries = Object.entries(parameters).map(([name, each]) => {
     const fields = Object.entries(each).map(([key, value]) => `${key} = ${value}`);
@@ -84,10 +138,12 @@ function writeFile(file, names, parameters) {
 
 /**
  * Make the choice of an FMU; `refusal` says why the service runs none, or is empty. `read()` returns the
- * simulation, its tolerances and the parts of its command, or null. `onChange()` is called at every change.
+ * simulation, its tolerances and the parts of its command, or null. `onChange()` is called at every change;
+ * `setChannels(channels)` states the channels `{name, unit}` of the record.
  */
 export function makeFmuFields(refusal, onChange, signal) {
-  if (refusal) return { node: el("p", { class: "complaint" }, refusal), read: () => null };
+  const complaint = el("p", { class: "complaint" }, refusal);
+  if (refusal) return { node: complaint, setChannels() {}, read: () => null };
   const file = el("input", { name: "fmu", type: "file", accept: ".fmu" });
   const stored = el("select", { name: "stored-fmu" });
   const storedFields = el(
@@ -97,10 +153,11 @@ export function makeFmuFields(refusal, onChange, signal) {
   );
   const message = el("p", { class: "check", role: "status" });
   const host = el("div");
-  let variables = null;
+  let [variables, channels] = [null, []];
 
   function show(fmu, words = "") {
-    variables = fmu && makeVariableFields(fmu);
+    variables = fmu && makeVariableFields(fmu, onChange);
+    variables?.setChannels(channels);
     host.replaceChildren(...(fmu ? [variables.node] : []));
     message.classList.toggle("complaint", fmu === null && words !== "");
     setText(message, words);
@@ -140,5 +197,13 @@ export function makeFmuFields(refusal, onChange, signal) {
   const hint = "FMI 2.0 or 3.0. The service runs its code in a process that can read nothing else.";
   const fields = el("div", { class: "fields" }, makeField(FORM, "File", file, hint));
   const node = el("div", { class: "fmu" }, fields, storedFields, message, host);
-  return { node, open: () => listSafely(stored.value), read: () => variables && variables.read() };
+  return {
+    node,
+    open: () => listSafely(stored.value),
+    setChannels(found) {
+      channels = found;
+      variables?.setChannels(channels);
+    },
+    read: () => variables && variables.read(),
+  };
 }

@@ -146,9 +146,9 @@ function listKinds(simulations, given) {
 /**
  * Make the choice from the listed simulations; `initial` has the simulation and the tolerance of a request.
  *
- * `setRecord({columns, units})` states the columns that may be a recorded simulation, and the units of input
- * and output. `read()` returns the simulation, the tolerance and the parts of its command, or a false value
- * if the choice is incomplete; `onChange()` is called at every change.
+ * `setRecord({columns, units, channels})` states the columns that may be a recorded simulation, the units of
+ * input and output, and the channels `{name, unit}`. `read()` returns the simulation, the tolerance and the
+ * parts of its command, or a false value if the choice is incomplete; `onChange()` is called at every change.
  */
 export function makeSimulationChoice(simulations, initial, onChange, signal) {
   const byKind = listKinds(simulations, initial.simulation);
@@ -157,7 +157,7 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
   const kind = makeSelect("simulation", kinds.map((each) => [each, LABELS[each] ?? each]));
   const chosen = initial.simulation?.kind;
   if (chosen) kind.value = chosen;
-  let record = { columns: [], units: ["", ""] };
+  let record = { columns: [], units: ["", ""], channels: [] };
   const templates = simulations.filter(({ equations }) => equations);
   const makers = {
     column: () => makeColumnFields(record.columns),
@@ -178,6 +178,7 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
     if (!made.has(kind.value)) {
       made.set(kind.value, isKept ? makeKeptFields() : make());
       if (kind.value === chosen) made.get(kind.value).fill(initial);
+      made.get(kind.value).setChannels?.(record.channels);
     }
     return made.get(kind.value);
   }
@@ -207,6 +208,7 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
     if (!made.size && !chosen && !record.columns.length) kind.value = kinds.find((each) => each !== "column");
     for (const each of kinds)
       if ((each === "column" && columns) || (byKind.get(each).parameters.length && units)) made.delete(each);
+    for (const each of made.values()) each.setChannels?.(record.channels);
     if (!made.has(kind.value)) show();
   }
 

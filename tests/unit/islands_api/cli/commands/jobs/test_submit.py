@@ -1,5 +1,6 @@
 """``islands jobs submit`` and ``diagnose`` in this process: submitted values and errors."""
 
+import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome
 from islands_service.domain.job_spec import Identification
 from islands_service.store.blobs import Blobs
 from support.command_line import COLUMNS
+from support.oscillator_fmus import write_oscillator
 from support.service import Service, csv, held
 from support.stores import taken
 
@@ -196,6 +198,35 @@ def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: st
     }
     code, out, err = run("show", job["id"])
     assert out.splitlines()[0] == f"job {job['id']}: queued"
+
+
+@pytest.mark.ci
+def test_the_fmu_of_a_diagnosis_is_uploaded(serve: Any, command_line: Run, tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_bytes(csv())
+    content = write_oscillator(tmp_path / "mass.fmu").read_bytes()
+    (tmp_path / "fmu.toml").write_text('file = "mass.fmu"\n[parameters]\nk = { value = 150, fixed = true }\n')
+
+    def diagnose(argument: str) -> tuple[int, str, str]:
+        words = ("--simulation", argument, "--url", service.url, "--json")
+        return command_line("jobs", "diagnose", "r.csv", *COLUMNS, *words)
+
+    with serve(rate=0, allow_fmus=True) as service:
+        asked = []
+        for argument in ("fmu:mass.fmu?parameters=m,k=150", "fmu:fmu.toml"):
+            code, out, err = diagnose(argument)
+            assert (code, err) == (0, "")
+            asked.append(json.loads(out)["spec"]["simulation"])
+        (fmu,) = service.client.get("/v1/fmus").json()["items"]
+        code, _, err = diagnose("fmu:mass.fmu?parameters=mm")
+    assert fmu["sha256"] == hashlib.sha256(content).hexdigest()
+    assert asked == [
+        {"kind": "fmu", "file": fmu["id"], "parameters": {"m": {}, "k": {"value": 150.0}}},
+        {"kind": "fmu", "file": fmu["id"], "parameters": {"k": {"value": 150.0, "fixed": True}}},
+    ]
+    assert (code, "mass.fmu has no parameter 'mm'" in err) == (2, True)
+    with serve(rate=0, allow_fmus=False) as service:
+        code, _, err = diagnose("fmu:mass.fmu")
+    assert (code, "ISLANDS_ALLOW_FMUS=true" in err) == (2, True)
 
 
 @pytest.mark.nightly
