@@ -121,7 +121,7 @@ def test_an_fmu_is_uploaded_previewed_and_diagnosed(
 
 
 @pytest.mark.parametrize("stiffness", ["k%2B", "k=a,b"])
-def test_channels_drive_further_inputs_and_the_command_has_the_names_of_the_request(
+def test_channels_drive_further_inputs_and_the_command_is_the_request(
     quiet: Callable[..., Screen],
     desk: Service,
     dataset: str,

@@ -184,7 +184,7 @@ def test_a_diagnosis_of_an_fmu_names_the_missing_offset(shared, diagnosed):
     assert [each["name"] for each in outputs["outputs"]] == ["measured", "simulated", "extended"]
 
 
-def test_the_extended_simulation_of_an_fmu_runs_beside_its_file(
+def test_the_extended_simulation_of_an_fmu_runs_in_the_folder_of_its_file(
     shared, diagnosed, content, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
