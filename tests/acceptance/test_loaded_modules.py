@@ -24,7 +24,7 @@ LIMITS = {
     "fit --help": (710, ""),
     "inspect {record}": (545, ""),
     "jobs --help": (885, ""),
-    "jobs list --url http://127.0.0.1:9": (835, ""),
+    "jobs list --url http://127.0.0.1:9": (840, ""),
     "show {model}": (560, ""),
     "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
