@@ -13,6 +13,7 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 from islands.data.preprocessing_steps import Preprocessing
 from islands.data.split import compare_input_ranges
 from islands.errors import name_option
+from islands.io.result_text.dry_friction import DryFriction, find_dry_friction
 from islands.models.equations import name_columns
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
 from islands.validation.prediction_bands import LEVEL
@@ -352,6 +353,19 @@ class ResultFacts(RunFacts):
         """Measured quantities of the verdict."""
         return "; ".join(write_statements(VERDICT_DETAILS, self))
 
+    @property
+    def counts_samples(self) -> bool:
+        """Whether k counts samples of the given data: means or filtered rates have other units."""
+        done = self.document["preprocessing"]
+        steps = done.get("steps")
+        filtered = steps is not None and Preprocessing.from_document(steps).has_rate_steps
+        return bool(done["average"] == 1 and not filtered)
+
+    @cached_property
+    def friction(self) -> DryFriction | None:
+        """Dry friction of a model of a velocity."""
+        return find_dry_friction(self.model["terms"], self.unit) if self.counts_samples else None
+
     @cached_property
     def doubtful(self) -> list[tuple[str, float]]:
         """Terms that are not certain, each with the probability of its inclusion."""
@@ -513,8 +527,7 @@ def write_statements(statements: Iterable[Statement[F]], facts: F) -> list[str]:
 def _describe_rate(facts: ResultFacts) -> str:
     model, done = facts.model, facts.document["preprocessing"]
     signals, steps = model.get("named_signals", model.get("signals", "")), done.get("steps")
-    filtered = steps is not None and Preprocessing.from_document(steps).has_rate_steps
-    if done["average"] == 1 and not filtered:
+    if facts.counts_samples:
         return "; ".join(filter(None, [signals, f"k counts samples of {done['dt']:g} s"]))
     dt = facts.record["dt"] if steps is None else steps["dt"]
     return f"{signals}, and simulate prepares a record of {dt:g} s in the same way"
@@ -523,6 +536,15 @@ def _describe_rate(facts: ResultFacts) -> str:
 def _describe_feedthrough(facts: ResultFacts) -> str:
     inputs = ", ".join(facts.document["preprocessing"]["feedthrough"])
     return f"Direct feedthrough: the output responds to {inputs} within the sample, so models read it at k."
+
+
+def _describe_friction(friction: DryFriction, facts: ResultFacts) -> str:
+    step, dt = facts.write_amount(friction.step), facts.document["preprocessing"]["dt"]
+    text = f"Dry friction: {step} against the motion in each sample of {dt:g} s"
+    if friction.input is not None:
+        (name,), (unit,) = facts.record["names"]["inputs"], facts.record["units"]["inputs"]
+        text += f", as much as {write_amount(friction.input, unit)} of {name}"
+    return f"{text}."
 
 
 def _describe_criterion(facts: ResultFacts) -> str:
@@ -840,6 +862,11 @@ _REMARKS: Final[tuple[Statement[ResultFacts], ...]] = (
 
 #: Estimate of the parameters, measured errors, uncertainty, and what the model meets.
 MEASURES: Final[tuple[Statement[ResultFacts], ...]] = (
+    Statement(
+        "dry-friction",
+        lambda facts: facts.friction,
+        lambda facts: _describe_friction(facts.friction, facts) if facts.friction else "",
+    ),
     Statement("criterion", lambda facts: facts.criterion, _describe_criterion),
     Statement("error", lambda facts: facts.error()["rmse"] is not None, _describe_error),
     Statement(

@@ -95,6 +95,21 @@ def test_the_equation_has_the_names_and_units_of_the_record(findings):
     assert f"RMSE {rmse:.4g} um" in error
 
 
+def test_dry_friction_is_stated_in_the_units_of_output_and_input(findings):
+    document = result_document(findings)
+    place = document["recommended"]["rank"] - 1
+    for regressor in ("u(k-1)", "sign(y(k-1))"):
+        term = {"regressor": regressor, "parameter": -0.9, "standard_error": 0.001, "term": regressor}
+        document["models"][place]["terms"].append(term)
+    assert not [line for line in statements.describe(document) if line.startswith("Dry friction")]
+    document["record"]["units"] |= {"output": "rad/s"}
+    document["models"][place]["terms"] = document["models"][place]["terms"][-2:]
+    (line,) = (line for line in statements.describe(document) if line.startswith("Dry friction"))
+    assert line == (
+        "Dry friction: 0.9 rad/s against the motion in each sample of 0.1 s, as much as 1 V of u_V."
+    )
+
+
 def test_uses_and_failures_follow_the_free_run(findings):
     good, bad = Metrics(1.0, 0.99, 0.1, 90.0), Metrics(20.0, 0.3, 2.0, 10.0)
     assert "simulation from the inputs alone" in said(findings, metrics=errors(findings, good))["Good for"]
