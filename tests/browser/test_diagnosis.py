@@ -91,7 +91,9 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
                 {"phase": "looking for each of 32 effects", "fraction": 0.3, "seconds_left": 14.0}
             ),
         )
-        expect(page.locator(".status .progress-text")).to_have_text("looking for each of 32 effects")
+        expect(page.locator(".doing")).to_have_text("Looking for each of 32 effects.")
+        # The sentence is not repeated beside the bar.
+        expect(page.locator(".status .progress-text")).to_be_hidden()
         assert page.locator(".status progress").evaluate("bar => bar.value") == pytest.approx(0.3)
         expect(page.locator(".status .facts")).to_contain_text(re.compile(r"about \d+(\.\d)? s"))
         store.leases.finish(lease, make_outcome(desk))
@@ -191,6 +193,7 @@ def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
     )
     widths = [float(bar.get_attribute("width")) for bar in rows.locator("rect").all()]
     assert widths == [100.0, 25.0, 0.0]
+    expect(page.locator("table.causes th[scope=col]")).to_have_count(5)
     expect(page.locator(".card", has=rows).locator(".facts")).to_contain_text("hold the input")
 
 

@@ -75,10 +75,13 @@ def test_bar_and_time_left_of_a_search_move_from_its_first_phase_on(
     with stored(desk) as store:
         lease = taken(store, job)
         expect(page.locator(".title .state")).to_have_text("running")
-        for phase, fraction, left in (("preset auto: trial of smooth", 0.05, None), ("search", 0.4, 6.0)):
+        for phase, sentence, fraction, left in (
+            ("preset auto: trial of smooth", "Choice of the preset: trial of smooth.", 0.05, None),
+            ("search", "Evolution of equations.", 0.4, 6.0),
+        ):
             progress = {"phase": phase, "fraction": fraction, "seconds_left": left}
             store.leases.report(lease, ProgressReport(progress))
-            expect(text).to_have_text(phase)
+            expect(page.locator(".doing")).to_have_text(sentence)
             assert bar.evaluate("bar => bar.value") == pytest.approx(fraction)
         facts = page.locator(".status .facts")
         expect(facts).to_contain_text(re.compile(r"about [345]\.\d s"))
@@ -99,7 +102,7 @@ def test_a_job_shows_its_run_time_and_the_limit(
     expect(run_time).to_have_count(0)
     with stored(desk) as store:
         lease = taken(store, job)
-        expect(run_time).to_have_text(re.compile(r"^[\d.]+ s of 1 h$"))
+        expect(run_time).to_have_text(re.compile(r"^[\d.]+ s \(limit 1 h\)$"))
         shown = run_time.text_content()
         advance(store, lease, 0, 40)
         # The time runs on with every report.
@@ -107,7 +110,7 @@ def test_a_job_shows_its_run_time_and_the_limit(
         store.leases.renew(lease, LONG, ran=7500.0)
         store.leases.finish(lease, JobOutcome(JobState.FAILED, problem=PROBLEM))
     expect(page.locator(".title .state")).to_have_text("failed")
-    expect(run_time).to_have_text("2 h 5 min of 1 h")
+    expect(run_time).to_have_text("2 h 5 min (limit 1 h)")
 
 
 @pytest.mark.ci
@@ -299,6 +302,8 @@ def test_the_page_shows_the_settings_and_the_data_set_of_a_job(
     assert wanted.items() <= shown.items()
     roles = page.locator(".about tbody tr td:nth-child(3)").all_text_contents()
     assert roles == ["time", "input", "output"]
+    page.locator(".about").get_by_role("link", name="data.csv").click()
+    page.get_by_role("heading", name="Signals").wait_for()
 
 
 STYLED = (

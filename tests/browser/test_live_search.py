@@ -41,6 +41,7 @@ def test_a_running_job_states_its_phase_in_words(
         lease = taken(store, job)
         # Before the first report the bar moves.
         expect(page.locator(".status progress")).not_to_have_attribute("value", "0")
+        expect(stage).to_have_text("Record")
         for phase, name, sentence in (
             ("reading the record", "Record", "Reading the record."),
             ("preset auto: fit of friction", "Preset", "Choice of the preset: fit of friction."),

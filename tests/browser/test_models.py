@@ -100,6 +100,18 @@ def test_a_result_begins_with_its_equation_and_its_free_run(
         part.wait_for()
         box = part.bounding_box()
         assert box["y"] + box["height"] <= height
+    assert result.locator(".symbols").inner_text() == "y: y_um (um); u: u_V (V); k: samples of 0.01 s"
+
+
+@pytest.mark.ci
+def test_the_models_of_a_result_stand_above_the_course_of_its_search(
+    opened: Callable[..., Any], finished: str
+) -> None:
+    page = opened(f"#/jobs/{finished}")
+    page.locator("table.models").wait_for()
+    parts = (".result", "table.models", ".status", ".convergence", ".about")
+    places = [page.locator(part).first.bounding_box()["y"] for part in parts]
+    assert places == sorted(places)
 
 
 @pytest.mark.ci

@@ -1,16 +1,20 @@
 /** Convergence of a search: the error of each island by generation, and the last migration. */
 
 import { getJobPath, getJson } from "../lib/api.js";
-import { el } from "../lib/dom.js";
+import { el, setText } from "../lib/dom.js";
 import { poll } from "../lib/polling.js";
 import { COLOURS, makeLineChart } from "./chart.js";
 import { makeIslandMap } from "./island_map.js";
+import { isEnded } from "./job_state.js";
 
 /** Maximum number of points kept; beyond it every other point is dropped. The chart has no more pixels. */
 const MAX_POINTS = 600;
 
 /** Seconds between two requests for the history without an event of the job. */
 const REFRESH_SECONDS = 600;
+
+/** Text in place of the chart before the first generation. */
+const WAITING = "The error of the search is drawn from its first generation on.";
 
 /** Convert a mean squared error of the service to an RMS error in the unit of the output. */
 const toRms = (error) => (Number.isFinite(error) ? Math.sqrt(error) : null);
@@ -46,7 +50,7 @@ export function makeConvergencePanel(id, unit, signal) {
     y: { label, log: true },
   });
   const map = makeIslandMap(unit);
-  const placeholder = el("p", { class: "soft" }, "There are no data before the first generation.");
+  const placeholder = el("p", { class: "soft" });
   let points = [];
   let targetGeneration = -1;
   let loadNow = null;
@@ -78,6 +82,7 @@ export function makeConvergencePanel(id, unit, signal) {
     ),
     advance(job) {
       map.show(job.progress ?? {});
+      setText(placeholder, isEnded(job) ? "The search ended before its first generation." : WAITING);
       targetGeneration = job.progress?.generation ?? -1;
       if (targetGeneration < 0) return;
       if (loadNow === null) loadNow = poll(load, signal);

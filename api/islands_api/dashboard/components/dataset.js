@@ -90,14 +90,17 @@ function listIrregularities({ jitter, counts = {}, ...rows }) {
 const describeChoice = ({ reason, confidence }) =>
   Number.isFinite(confidence) ? `${reason} Probably right: ${Math.round(100 * confidence)} %.` : reason;
 
-/** List the facts about a record, with their columns as the title; the reason if no columns are chosen. */
-export function listFacts({ facts, choice, rows, sampling }) {
+/**
+ * List the facts about a record, with their columns as the title; the reason if no columns are chosen. They
+ * are folded unless `open`.
+ */
+export function listFacts({ facts, choice, rows, sampling }, open = false) {
   if (!choice.output) return el("p", { class: "soft" }, choice.reason);
   const shown = facts.filter(({ name, value }) => value || !ONLY_PROBLEMS.includes(name));
   const title = `Facts about ${choice.inputs.join(", ")} and ${choice.output}`;
   return el(
     "details",
-    {},
+    { open },
     el("summary", {}, rows ? `${title}, samples ${rows}` : title),
     el(
       "ul",
@@ -116,7 +119,7 @@ function describeDataset(dataset, spec) {
   const { preview } = dataset;
   return [
     makeFacts([
-      ["File", el("bdi", {}, dataset.name)],
+      ["File", el("a", { href: `#/data/${dataset.id}` }, el("bdi", {}, dataset.name))],
       ["Size", formatBytes(dataset.bytes)],
       ["Samples", formatCount(preview.samples)],
       ["Sampling time", preview.dt === null ? null : `${formatShort(preview.dt)} s`],
@@ -127,18 +130,18 @@ function describeDataset(dataset, spec) {
   ];
 }
 
-/** Make the panel of a data set; `onUnitKnown(unit)` receives the unit of the output. */
+/** Make the panel of a data set; `onUnitKnown(unit, columns)` receives the unit of the output. */
 export function makeDatasetPanel(spec, onUnitKnown, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   poll(async () => {
     try {
       const dataset = await getJson(getDatasetPath(spec.dataset), { signal });
       body.replaceChildren(...describeDataset(dataset, spec));
-      onUnitKnown(findUnit(dataset.preview.columns, spec));
+      onUnitKnown(findUnit(dataset.preview.columns, spec), dataset.preview.columns);
     } catch (error) {
       if (!(error instanceof Problem) || error.status !== 404) throw error;
       body.replaceChildren(el("p", { class: "soft" }, "The data set has been deleted."));
-      onUnitKnown("");
+      onUnitKnown("", []);
     }
     return Infinity;
   }, signal);
@@ -146,7 +149,7 @@ export function makeDatasetPanel(spec, onUnitKnown, signal) {
 }
 
 function formatValidation({ validation: value }) {
-  if (value === undefined) return "default";
+  if (value === undefined) return "the end of the rows";
   if (typeof value === "number") return `the last ${formatShort(100 * value)} %`;
   return [`data set ${value.dataset}`, value.rows && `rows ${value.rows}`].filter(Boolean).join(", ");
 }

@@ -67,6 +67,7 @@ function getStages({ kind, spec }) {
 
 /** Return the position of the present stage; the one with the longest beginning of the phase. */
 function findStage(stages, phase) {
+  if (!phase) return 0;
   const fits = stages.map(([, beginnings]) =>
     Math.max(-1, ...beginnings.filter((each) => phase.startsWith(each)).map((each) => each.length)));
   const best = Math.max(...fits);

@@ -56,14 +56,15 @@ function formatProgress(job) {
 
 /**
  * Make a progress bar with a text. It is full if a search succeeded, even before its last generation.
- * With `showsReason`, the text of a failed job is the reason.
+ * With `showsReason`, the text of a failed job is the reason. `show(job, isDescribed)` has no text between
+ * epochs if the phase is described elsewhere.
  */
 export function makeProgressBar({ showsReason = false } = {}) {
   const bar = el("progress", { max: "1", value: "0", "aria-label": "Progress" });
   const text = el("span", { class: "progress-text" });
   return {
     node: el("div", { class: "progress" }, bar, text),
-    show(job) {
+    show(job, isDescribed = false) {
       const { fraction, generation = 0, generations = 1 } = job.progress ?? {};
       const reached = Number.isFinite(fraction) ? fraction : generation / Math.max(1, generations);
       bar.value = job.state === "succeeded" ? 1 : reached;
@@ -76,7 +77,8 @@ export function makeProgressBar({ showsReason = false } = {}) {
       const { note, seconds_to_start: start } = job.progress ?? {};
       const isSentence = Boolean(reason) || (job.state === "queued" && Boolean(note || start));
       text.classList.toggle("long", isSentence || !isSearch(job) || isBetweenEpochs(job));
-      setText(text, reason ?? formatProgress(job));
+      const isTold = isDescribed && isBetweenEpochs(job);
+      setText(text, reason ?? (isTold ? "" : formatProgress(job)));
     },
   };
 }

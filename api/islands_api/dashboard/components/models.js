@@ -45,7 +45,7 @@ function makeMetric(model, part, name, format) {
   return makeExactValue(value, format);
 }
 
-const HEADINGS = ["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val.", "Residuals"];
+const HEADINGS = ["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val.", "Free-run residual"];
 
 /** Headings of models of hysteresis, before the last one. */
 const HYSTERESIS_HEADINGS = ["Hold drift %", "Property 1"];
@@ -213,7 +213,7 @@ function makeDetail(job, model, hysteresis, signal) {
       el(
         "div",
         {},
-        el("h4", {}, "Residual tests"),
+        el("h4", {}, "Residual tests, one step ahead"),
         makeScrollable("Residual tests", makeResidualTable(model)),
       ),
     ),

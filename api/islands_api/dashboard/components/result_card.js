@@ -7,8 +7,8 @@ import { makeLineChart } from "./chart.js";
 import { makeEquation } from "./models.js";
 import { makeTryModel } from "./try_model.js";
 
-/** Beginnings of the sentences of the summary that are the verdict. */
-const VERDICT = ["As a simulation", "Fails at"];
+/** Beginnings of the sentences of the summary that are shown: physical quantities, and the verdict. */
+const SHOWN = ["Dry friction", "As a simulation", "Fails at"];
 
 /** Return the median of half the width of a band; NaN if there is none. */
 function findHalfWidth({ band }) {
@@ -30,11 +30,27 @@ function drawSimulation(chart, { time_s: times, measured, free_run: free, band }
   ]);
 }
 
-/** Make the card of the recommended model of a job of one output. */
-export function makeResultCard(job, unit, signal) {
+/** State which columns the symbols of the equation stand for, and the sampling time that k counts. */
+function describeSymbols({ inputs, output }, columns, words) {
+  // `u_V+1` is the column `u_V` advanced by one sample.
+  const isColumn = (name) => (each) => [name, name.replace(/\+\d+$/, "")].includes(each.name);
+  const unitOf = (name) => columns.find(isColumn(name))?.unit;
+  const symbols = inputs.length > 1 ? inputs.map((_, at) => `u${at + 1}`) : ["u"];
+  const names = [["y", output], ...symbols.map((symbol, at) => [symbol, inputs[at]])];
+  const listed = names.map(([symbol, name]) => `${symbol}: ${labelQuantity(name, unitOf(name))}`);
+  const [, clock] = /k counts (samples of \S+ s)/.exec(words) ?? [];
+  return [...listed, ...(clock ? [`k: ${clock}`] : [])].join("; ");
+}
+
+/**
+ * Make the card of the recommended model of a job of one output. `unit` is that of the output; `columns` are
+ * those of the data set, none if it has been deleted.
+ */
+export function makeResultCard(job, unit, columns, signal) {
   const { rank, size, metrics, words = "" } = job.summary;
   const path = `${getJobPath(job.id)}/models/${rank}`;
-  const verdict = words.split("\n").filter((line) => VERDICT.some((start) => line.startsWith(start)));
+  const sentences = words.split("\n").filter((line) => SHOWN.some((start) => line.startsWith(start)));
+  const symbols = describeSymbols(job.spec, columns, words);
   const facts = el("div");
   const showFacts = (half) =>
     facts.replaceChildren(
@@ -65,10 +81,11 @@ export function makeResultCard(job, unit, signal) {
     { class: "card result", "aria-label": "Result" },
     el("h2", { class: "visually-hidden" }, "Result"),
     makeEquation(path, { equation: job.summary.equation }, signal),
+    el("p", { class: "soft small symbols" }, symbols),
     facts,
     note,
     chart.node,
-    verdict.map((line) => el("p", {}, line)),
+    sentences.map((line) => el("p", {}, line)),
     makeTryModel(path, job.spec, signal),
   );
 }

@@ -4,6 +4,7 @@ import { el, makeScrollable, setText } from "../lib/dom.js";
 import { formatNumber, formatTerms } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeLine } from "./equation.js";
+import { isEnded } from "./job_state.js";
 import { makeSearchRun } from "./search_run.js";
 
 /** Make a chart of errors by size. */
@@ -43,6 +44,7 @@ export function makeLivePanel(job, unit, signal) {
   const equation = el("code", { class: "plain" });
   const host = makeScrollable("Equation of the best model so far", equation);
   host.classList.add("equation");
+  const heading = el("h2");
   const statement = el("p", { class: "soft small" });
   let [front, size, simulated] = [[], null, null];
   const run = makeSearchRun(job, unit, signal);
@@ -60,7 +62,7 @@ export function makeLivePanel(job, unit, signal) {
   const node = el(
     "section",
     { class: "card live", hidden: true },
-    el("h2", {}, "Best models so far"),
+    heading,
     el("div", { class: "live-model" }, host, statement, preliminary),
     chart.node,
     run.node,
@@ -83,11 +85,13 @@ export function makeLivePanel(job, unit, signal) {
 
   return {
     node,
-    show({ progress, state }) {
+    show(job) {
+      const { progress, state } = job;
       front = getFront(progress ?? {});
       simulated = progress?.free_run?.size;
       node.hidden = front.length === 0 || state === "succeeded";
       preliminary.hidden = state !== "running";
+      setText(heading, isEnded(job) ? "Best models when the search ended" : "Best models so far");
       if (node.hidden) return;
       showModel();
       run.show(progress.free_run);

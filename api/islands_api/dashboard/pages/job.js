@@ -117,7 +117,7 @@ function formatRunTime({ state, started, run_seconds: counted, max_run_seconds: 
   // Progress events do not contain the run time.
   const since = state === "running" ? (performance.now() - loaded) / 1000 : 0;
   const written = formatDuration(counted + since);
-  return Number.isFinite(limit) ? `${written} of ${formatDuration(limit)}` : written;
+  return Number.isFinite(limit) ? `${written} (limit ${formatDuration(limit)})` : written;
 }
 
 const hasSeveralOutputs = ({ spec }) => Array.isArray(spec.output);
@@ -130,7 +130,7 @@ function makeJobFacts(job, unit) {
     ? el("data", { value: best }, `${formatNumber(best)} ${unit}`)
     : null;
   return makeFacts([
-    ["Best error", bestError],
+    [running ? "Best error" : "Best error of the search", bestError],
     ["Evaluations", progress.evaluations === undefined ? null : formatCount(progress.evaluations)],
     ["Per second", running && rate ? formatCount(rate) : null],
     ["Time left", running && Number.isFinite(left) && !isStopping(job) ? makeCountdown(left) : null],
@@ -167,11 +167,18 @@ export function mountJob(host, { id, rank }, signal) {
     el("div", { class: "title" }, heading, rename.node, state.node, tags.node),
     el("code", { class: "soft small" }, id),
   );
-  let [current, unit, convergence, live, models] = [null, null, null, null, null];
+  const status = el(
+    "section",
+    { class: "card status", "aria-label": "Progress" },
+    phase.node,
+    bar.node,
+    factsHost,
+  );
+  let [current, unit, columns, convergence, live, models] = [null, null, [], null, null, null];
 
   function build(job) {
-    const onUnitKnown = (value) => {
-      unit = value;
+    const onUnitKnown = (value, found) => {
+      [unit, columns] = [value, found];
       // The errors of several outputs have no common scale.
       if (!isSearch(job) || hasSeveralOutputs(job)) return;
       convergence = makeConvergencePanel(id, unit, signal);
@@ -186,8 +193,8 @@ export function mountJob(host, { id, rank }, signal) {
       titleBar,
       buttons.node,
       resultHost,
-      el("section", { class: "card status", "aria-label": "Progress" }, phase.node, bar.node, factsHost),
       failureHost,
+      status,
       convergenceHost,
       modelsHost,
       aboutHost,
@@ -203,8 +210,8 @@ export function mountJob(host, { id, rank }, signal) {
     rename.show(getIsolatedName(job));
     tags.show(job);
     state.show(job);
-    bar.show(job);
     phase.show(job);
+    bar.show(job, !phase.node.hidden);
     buttons.show(job);
     factsHost.replaceChildren(makeJobFacts(job, unit ?? ""));
     showResult(job);
@@ -221,6 +228,8 @@ export function mountJob(host, { id, rank }, signal) {
       models = hasSeveralOutputs(job)
         ? makeCoupledPanel(job, signal)
         : makeModelsPanel(job, rank, unit, signal);
+      // A reader of a result wants its models before the course of the search.
+      status.before(modelsHost);
       modelsHost.replaceChildren(models.node);
     }
   }
@@ -230,7 +239,7 @@ export function mountJob(host, { id, rank }, signal) {
     if (unit === null || job.state !== "succeeded" || resultHost.hasChildNodes()) return;
     // Results of earlier versions name no recommended model; several outputs have another panel.
     if (isSearch(job) && !hasSeveralOutputs(job) && job.summary?.rank)
-      resultHost.replaceChildren(makeResultCard(job, unit, signal));
+      resultHost.replaceChildren(makeResultCard(job, unit, columns, signal));
   }
 
   function lost(problem) {

@@ -23,26 +23,26 @@ function formatConfidence(value) {
   return value < 0.005 ? "below 0.01" : value.toFixed(2);
 }
 
-function makeRow({ name, score, eta }, effect, most) {
+function makeRow({ name, score, eta }, effect, most, hasEffects) {
   const isNamed = effect !== undefined && effect.claimed !== false;
   return [
     el("span", { class: isNamed ? "named" : null }, name),
     el("span", { class: "score" }, makeBar(score, most), formatNumber(score)),
     `${Math.floor(100 * eta)} %`,
-    effect ? formatConfidence(effect.confidence) : "",
-    effect?.equivalents.join(", ") ?? "",
+    // No cause that passed all tests: both columns would be empty.
+    ...(hasEffects
+      ? [effect ? formatConfidence(effect.confidence) : "", effect?.equivalents.join(", ") ?? ""]
+      : []),
   ];
 }
 
 function makeCauseTable(candidates, effects, most) {
   const headings = [
-    ...["Cause", "Score"],
-    ...["Explained", "Confidence"].map((name) => [name, "figure"]),
-    "Equivalent causes",
+    ...["Cause", "Score", ["Explained", "figure"]],
+    ...(effects.length ? [["Confidence", "figure"], "Equivalent causes"] : []),
   ];
-  const rows = candidates.map((each) =>
-    makeRow(each, effects.find(({ name }) => name === each.name), most),
-  );
+  const findEffect = (cause) => effects.find(({ name }) => name === cause);
+  const rows = candidates.map((each) => makeRow(each, findEffect(each.name), most, effects.length > 0));
   const table = makeTable("Screened causes, the best first", headings, rows);
   table.classList.add("causes");
   return makeScrollable("Screened causes", table);
