@@ -89,7 +89,7 @@ def test_the_visible_rows_are_those_of_the_job(looked: Any, desk: Service) -> No
     plot.focus()
     for key in ("+", "+", "+", "PageDown"):
         plot.press(key)
-    looked.get_by_role("button", name="Use the visible rows").click()
+    looked.get_by_role("button", name="Use only the visible rows").click()
     request = read_request(looked)
     start, stop = map(int, request["rows"].split(":"))
     assert 0 < start < stop
@@ -146,6 +146,24 @@ def test_a_column_has_one_role(looked: Any, expect: Any) -> None:
     expect(looked.get_by_label("u_V is an input")).not_to_be_checked()
     expect(looked.get_by_role("button", name="Identify")).to_be_enabled()
     expect(looked.locator(".run")).to_contain_text("y_um → u_V")
+
+
+@pytest.mark.parametrize(
+    ("steps", "count"), [((0.01, 0.01), 0), ((0.01, 0.02), 1)], ids=["equal", "different"]
+)
+def test_sampling_times_of_columns_are_shown_if_they_differ(
+    looked: Any, expect: Any, steps: tuple[float, float], count: int
+) -> None:
+    def answer(route: Any) -> None:
+        dataset = route.fetch().json()
+        for column, dt in zip(dataset["preview"]["columns"][1:], steps, strict=True):
+            column["dt"] = dt
+        route.fulfill(json=dataset)
+
+    looked.route(re.compile(r"/v1/datasets/[^/]+$"), answer)
+    looked.reload()
+    expect(looked.locator("table.choice th", has_text="Minimum")).to_be_visible()
+    expect(looked.locator("table.choice th", has_text="Sampling time")).to_have_count(count)
 
 
 def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: Service, expect: Any) -> None:

@@ -143,7 +143,7 @@ def test_a_diagnosis_is_followed_by_a_monitor_that_links_to_it(
     with stored(desk) as store:
         store.leases.finish(taken(store, job), JobOutcome(JobState.SUCCEEDED, {}, summary=summary))
     page = quiet(desk.url, 360, 800).go(f"#/jobs/{job}")
-    page.get_by_text("Follow with this diagnosis").click()
+    page.get_by_text("Monitor later records with this diagnosis").click()
     assert unreadable(page) == []
     page.get_by_label("Seconds between records").fill("3600")
     page.get_by_label("False alarms").fill("1 per 720 records")

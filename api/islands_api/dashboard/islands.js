@@ -104,12 +104,14 @@ async function show() {
 function showKeyForm({ detail }) {
   if (current.view === "key") return;
   current.controller.abort();
+  // Who opens the page for the first time has made no mistake.
+  const problem = key.get() ? detail : null;
   key.forget();
   current = { view: "key", controller: new AbortController() };
   renderTools();
   markSection();
   document.title = "Key · islands";
-  mountKeyForm(main, detail, () => {
+  mountKeyForm(main, problem, () => {
     current = { view: null, controller: new AbortController() };
     show();
   });

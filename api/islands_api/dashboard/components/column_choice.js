@@ -4,11 +4,13 @@ import { el, makeScrollable } from "../lib/dom.js";
 import { formatNumber, formatShort } from "../lib/numbers.js";
 import { STATISTICS, describeDefect } from "./dataset.js";
 
-const HEADINGS = [
-  ...["Column", "Unit", "Input", "Output", "Sampling time"],
-  ...STATISTICS.map((name) => [name, "figure"]),
-  "Remark",
-].map((heading) => [heading].flat());
+/** Return the headings; the sampling time is one of them if the columns have different ones. */
+const listHeadings = (hasTimes) =>
+  [
+    ...["Column", "Unit", "Input", "Output"],
+    ...[...(hasTimes ? ["Sampling time"] : []), ...STATISTICS].map((name) => [name, "figure"]),
+    "Remark",
+  ].map((heading) => [heading].flat());
 
 /** Columns from which on those that have no role are hidden. */
 const MANY = 8;
@@ -69,6 +71,10 @@ export function makeColumnChoice(preview, initial, onChange) {
     onChange(getChoice());
   }
 
+  // Data sets of earlier versions do not state it.
+  const times = columns.map(({ dt }) => dt).filter(Number.isFinite);
+  const hasTimes = new Set(times).size > 1;
+
   const row = (column) => {
     const { name, unit, dt, minimum, maximum, mean, deviation } = column;
     const chosen = byName.get(name);
@@ -81,13 +87,12 @@ export function makeColumnChoice(preview, initial, onChange) {
       el("td", {}, unit),
       el("td", {}, chosen?.input),
       el("td", {}, chosen?.output),
-      // Data sets of earlier versions do not state it.
-      el("td", { class: "figure" }, Number.isFinite(dt) ? `${formatShort(dt)} s` : ""),
+      hasTimes && el("td", { class: "figure" }, Number.isFinite(dt) ? `${formatShort(dt)} s` : ""),
       [minimum, maximum, mean, deviation].map((value) => el("td", { class: "figure" }, formatNumber(value))),
       el("td", { class: "soft small" }, remark),
     );
   };
-  const head = HEADINGS.map(([name, kind]) => el("th", { scope: "col", class: kind }, name));
+  const head = listHeadings(hasTimes).map(([name, kind]) => el("th", { scope: "col", class: kind }, name));
   const rows = columns.map(row);
   const table = el(
     "table",

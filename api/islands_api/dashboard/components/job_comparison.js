@@ -123,10 +123,12 @@ export function makeTermTable(entries) {
   );
 }
 
-const flatten = ({ settings = {}, ...fields }) => ({ ...fields, ...settings });
+/** Return the settings; the table of the models names the data set. */
+const flatten = ({ settings = {}, dataset: _, ...fields }) => ({ ...fields, ...settings });
 
 const format = (value) => {
   if (value === undefined || value === null) return "default";
+  if (Array.isArray(value) && value.every((each) => typeof each === "string")) return value.join(", ");
   return typeof value === "object" ? JSON.stringify(value) : String(value);
 };
 

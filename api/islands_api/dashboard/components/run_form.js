@@ -100,7 +100,7 @@ export function makeRunForm({ id, name, preview }, initial, ranges, signal) {
     fields: (row) => [row, makeRecordings(initial.recordings ?? []), settings].filter(Boolean),
   });
   return {
-    node: el("section", { class: "card" }, el("h2", {}, "Identify"), form.node),
+    node: el("section", { class: "card" }, el("h2", {}, "Identify a model"), form.node),
     update: form.update,
     show(newChoice) {
       choice = newChoice;

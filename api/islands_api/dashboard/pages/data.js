@@ -23,7 +23,8 @@ const makeName = ({ id, name, reading = {} }) => [
 ];
 
 function makeRow(dataset) {
-  const number = (name, text) => el("td", { class: "figure", "data-label": name }, text);
+  const number = (name, text) =>
+    el("td", { class: text === NONE ? "figure none" : "figure", "data-label": name }, text);
   const node = el(
     "tr",
     {},

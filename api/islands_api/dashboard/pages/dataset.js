@@ -71,7 +71,7 @@ function makeSignalCard(plot, ranges) {
       { class: "row" },
       el("span", { class: "soft small" }, HINT),
       button("Show all rows", plot.showAll),
-      button("Use the visible rows", () => ranges.use(plot.getVisibleRows())),
+      button("Use only the visible rows", () => ranges.use(plot.getVisibleRows())),
     ),
     ranges.node,
   );
@@ -134,7 +134,7 @@ function makeContent(dataset, initial, signal) {
       makeFacts([
         ["Rows", formatCount(preview.samples)],
         ["Sampling time", dt === null ? "unknown" : `${formatShort(dt)} s`],
-        ["Time", preview.time],
+        ["Time column", preview.time],
         ["Size", formatBytes(dataset.bytes)],
       ]),
       notes,
@@ -144,7 +144,7 @@ function makeContent(dataset, initial, signal) {
     diagnosis.node,
     el("section", { class: "card" }, el("h2", {}, "Columns"), choice.node),
     preview.inspection &&
-      el("section", { class: "card" }, el("h2", {}, "Facts"), listFacts(preview.inspection)),
+      el("section", { class: "card" }, el("h2", {}, "Facts"), listFacts(preview.inspection, true)),
   ].filter(Boolean);
 }
 

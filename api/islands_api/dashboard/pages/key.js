@@ -6,6 +6,9 @@ import { el, setText } from "../lib/dom.js";
 /** Characters that a header may contain. */
 const KEY_CHARACTERS = /^[\x21-\x7e]+$/;
 
+/** Command that creates a key, and its options. */
+const COMMAND = ["islands keys create", "--scope read", "--scope write"];
+
 /** Show the form; call `onAccepted()` once the service accepts the key. */
 export function mountKeyForm(host, problem, onAccepted) {
   const complaint = el("p", { class: "complaint", id: "complaint", role: "alert" }, problem?.message ?? "");
@@ -49,7 +52,8 @@ export function mountKeyForm(host, problem, onAccepted) {
         "p",
         { class: "soft" },
         "Its operator creates one with ",
-        el("code", {}, "islands keys create --scope read --scope write"),
+        // Lines break between the options only.
+        el("code", {}, COMMAND.flatMap((part, at) => [at ? " " : "", el("span", {}, part)])),
         ". The key is kept until this tab is closed.",
       ),
       el("label", { for: "key" }, "Key"),

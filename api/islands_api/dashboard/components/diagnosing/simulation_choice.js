@@ -205,7 +205,8 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
     const hasChanged = (part) => String(record[part]) !== String(newRecord[part]);
     const [columns, units] = [hasChanged("columns"), hasChanged("units")];
     record = newRecord;
-    if (!made.size && !chosen && !record.columns.length) kind.value = kinds.find((each) => each !== "column");
+    // A linear model suits any record; the built-in simulations are of a certain system.
+    if (!made.size && !chosen && !record.columns.length) kind.value = "linear";
     for (const each of kinds)
       if ((each === "column" && columns) || (byKind.get(each).parameters.length && units)) made.delete(each);
     for (const each of made.values()) each.setChannels?.(record.channels);
@@ -213,7 +214,7 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
   }
 
   kind.addEventListener("change", show);
-  const hint = "A service runs no Python functions: record the output of one in a column.";
+  const hint = "For a simulation in Python or another program, add its output to the file as a column.";
   const node = el(
     "div",
     { class: "simulation" },

@@ -32,7 +32,7 @@ export function makeMonitorForm(job) {
   return el(
     "details",
     { class: "follow" },
-    el("summary", {}, "Follow with this diagnosis"),
+    el("summary", {}, "Monitor later records with this diagnosis"),
     el(
       "form",
       { class: "fields", on: { submit: create } },

@@ -37,13 +37,13 @@ export function makeAlarmsPanel() {
   };
 }
 
-function makeRecordRow(result, record) {
+function makeRecordRow(result, record, hasTimes) {
   const isAlarm = result.alarms.some((alarm) => alarm.record.index === record.index);
   const statistic = formatNumber(record.statistic);
   return [
     String(record.index + 1),
     makeName(record.name),
-    record.time ? formatTime(record.time) : NONE,
+    ...(hasTimes ? [record.time ? formatTime(record.time) : NONE] : []),
     ...result.parameters.map(({ name }) => {
       const { value, ci95 } = record.values[name];
       return formatInterval(value, (ci95[1] - ci95[0]) / 2);
@@ -65,12 +65,14 @@ export function makeRecordsPanel() {
   const more = el("button", { type: "button", on: { click } }, "Show older records");
 
   function render() {
+    const last = records.slice(-shown);
+    const hasTimes = last.some(({ time }) => time);
     const headings = [
-      ...["Record", "Name", "Time"],
+      ...["Record", "Name", ...(hasTimes ? ["Time"] : [])],
       ...result.parameters.map(({ name, unit }) => [unit ? `${name} / ${unit}` : name, "figure"]),
       ...["Noise", "Statistic"].map((name) => [name, "figure"]),
     ];
-    const latest = records.slice(-shown).map((record) => makeRecordRow(result, record)).reverse();
+    const latest = last.map((record) => makeRecordRow(result, record, hasTimes)).reverse();
     host.replaceChildren(makeScrollable("Records", makeTable("Records, latest first", headings, latest)));
     more.hidden = shown >= records.length;
   }
