@@ -92,7 +92,7 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
             ),
         )
         expect(page.locator(".doing")).to_have_text("Looking for each of 32 effects.")
-        # The sentence is not repeated beside the bar.
+        # The sentence is not repeated at the bar.
         expect(page.locator(".status .progress-text")).to_be_hidden()
         assert page.locator(".status progress").evaluate("bar => bar.value") == pytest.approx(0.3)
         expect(page.locator(".status .facts")).to_contain_text(re.compile(r"about \d+(\.\d)? s"))

@@ -104,7 +104,7 @@ def test_a_result_begins_with_its_equation_and_its_free_run(
 
 
 @pytest.mark.ci
-def test_the_models_of_a_result_stand_above_the_course_of_its_search(
+def test_the_models_of_a_result_are_above_the_course_of_its_search(
     opened: Callable[..., Any], finished: str
 ) -> None:
     page = opened(f"#/jobs/{finished}")

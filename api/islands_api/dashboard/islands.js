@@ -104,7 +104,7 @@ async function show() {
 function showKeyForm({ detail }) {
   if (current.view === "key") return;
   current.controller.abort();
-  // Who opens the page for the first time has made no mistake.
+  // Without a key that was entered, there is nothing to correct.
   const problem = key.get() ? detail : null;
   key.forget();
   current = { view: "key", controller: new AbortController() };

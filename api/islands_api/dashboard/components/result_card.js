@@ -30,7 +30,7 @@ function drawSimulation(chart, { time_s: times, measured, free_run: free, band }
   ]);
 }
 
-/** State which columns the symbols of the equation stand for, and the sampling time that k counts. */
+/** State which columns the symbols of the equation are, and the sampling time that k counts. */
 function describeSymbols({ inputs, output }, columns, words) {
   // `u_V+1` is the column `u_V` advanced by one sample.
   const isColumn = (name) => (each) => [name, name.replace(/\+\d+$/, "")].includes(each.name);
