@@ -50,9 +50,6 @@ _ROUNDS = ((15, 12), (40, 6), (150, 3))
 #: Blocks of a record, samples of a block at most, and the part of each that is held out.
 _BLOCKS, _LARGEST_BLOCK, _HELD_OUT = 5, 4_000, 0.2
 
-#: Samples of the final estimation, at most.
-_LARGEST_SAMPLES = 60_000
-
 #: Samples from which the initial states of a block are estimated, at least for a state and at most.
 _SAMPLES_PER_STATE, _LARGEST_MEMORY = 3, 100
 

@@ -8,6 +8,9 @@ from islands.data.input_lead import advance_inputs
 from islands.estimation.linear_state_space import fit_linear_state_space
 from islands.kernels.state_space import simulate_state_space
 
+# The kernels of state spaces are compiled at their first use.
+pytestmark = pytest.mark.ci
+
 A = np.array([[0.9, 0.2], [-0.2, 0.8]])
 B = np.array([[0.3, 0.0], [0.1, 0.5]])
 C = np.array([1.0, -0.5])

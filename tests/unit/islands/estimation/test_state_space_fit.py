@@ -9,6 +9,9 @@ from islands.estimation.state_space_fit import StateSpaceFit
 from islands.simulation.initial_states import Segment
 from support.latent_systems import make_model, spring_record
 
+# The kernels of state spaces are compiled at their first use.
+pytestmark = pytest.mark.ci
+
 MODEL = make_model()
 
 

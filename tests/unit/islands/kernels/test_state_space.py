@@ -14,6 +14,9 @@ from islands.kernels.state_space import (
 )
 from islands.models.latent import UNITS, find_codes
 
+# The kernels of state spaces are compiled at their first use.
+pytestmark = pytest.mark.ci
+
 ALL_UNITS = np.arange(BELL + 1)
 ORDER, INPUTS, ROWS = 3, 2, 300
 

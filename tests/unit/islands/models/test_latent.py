@@ -12,6 +12,9 @@ from islands.models.latent import UNITS, LatentModel, StateSpaceLayout
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 
+# The kernels of state spaces are compiled at their first use.
+pytestmark = pytest.mark.ci
+
 
 def test_equations_have_the_units_as_signals():
     assert make_model().equation().plain.splitlines() == [

@@ -10,6 +10,9 @@ from islands.simulation.initial_states import Segment, estimate_initial_states, 
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 
+# The kernels of state spaces are compiled at their first use.
+pytestmark = pytest.mark.ci
+
 
 def test_states_of_a_record_without_noise_are_found():
     record = spring_record(400, start=(0.5, -0.4))
