@@ -103,6 +103,7 @@ def test_the_input_is_described_drawn_and_saved(
     assert (tmp_path / "input.csv").read_text() == CSV
 
 
+@pytest.mark.nightly
 def test_causes_that_no_input_separates_have_words_alone(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -114,6 +115,7 @@ def test_causes_that_no_input_separates_have_words_alone(
     assert section.get_by_role("button").count() == 0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
 def test_the_section_is_readable(
     quiet: Callable[..., Screen], desk: Service, tmp_path: Path, scheme: str, width: int

@@ -90,6 +90,7 @@ def submit(page: Any, desk: Service, button: str) -> dict[str, Any]:
     return job
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", REQUESTS)
 def test_a_diagnosis_is_run_again_with_all_of_its_settings(
     quiet: Callable[..., Screen], desk: Service, dataset: str, kind: str
@@ -116,6 +117,7 @@ def test_the_equations_of_a_diagnosis_are_edited_again(
     assert submit(page, desk, "Diagnose")["spec"] == job["spec"]
 
 
+@pytest.mark.nightly
 def test_a_changed_setting_is_the_only_difference(
     quiet: Callable[..., Screen], desk: Service, dataset: str
 ) -> None:

@@ -120,6 +120,8 @@ def test_an_fmu_is_uploaded_previewed_and_diagnosed(
     assert job["spec"]["tolerance"] == {"m": 0.05}
 
 
+@pytest.mark.nightly
+@pytest.mark.nightly
 @pytest.mark.parametrize("stiffness", ["k%2B", "k=a,b"])
 def test_channels_drive_further_inputs_and_the_command_is_the_request(
     quiet: Callable[..., Screen],

@@ -141,6 +141,7 @@ def test_an_fmu_is_kept_until_the_jobs_that_name_it_have_ended(shared, dataset, 
     assert send(shared, content).status_code == 201
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_of_an_fmu_can_be_cancelled_during_a_simulation(shared, fmu):
     from islands_service.coordinator.diagnosis.job import run_diagnosis_job
     from islands_service.store.blobs import Blobs
@@ -172,6 +173,7 @@ def diagnosed(shared, content):
     return job
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_of_an_fmu_names_the_missing_offset(shared, diagnosed):
     job = shared.client.get(f"/v1/jobs/{diagnosed}").json()
     assert (job["state"], job["summary"]["effects"]) == ("succeeded", ["offset"])
@@ -184,6 +186,7 @@ def test_a_diagnosis_of_an_fmu_names_the_missing_offset(shared, diagnosed):
     assert [each["name"] for each in outputs["outputs"]] == ["measured", "simulated", "extended"]
 
 
+@pytest.mark.nightly
 def test_the_extended_simulation_of_an_fmu_runs_in_the_folder_of_its_file(
     shared, diagnosed, content, tmp_path, monkeypatch
 ):
@@ -199,6 +202,7 @@ def test_the_extended_simulation_of_an_fmu_runs_in_the_folder_of_its_file(
     assert np.sqrt(np.mean(residual**2)) < 4e-4
 
 
+@pytest.mark.nightly
 def test_a_diagnosed_fmu_is_neither_exported_nor_monitored(shared, diagnosed):
     export = shared.client.get(f"/v1/jobs/{diagnosed}/extended/export")
     assert "is not one difference equation" in problem_of(export, 404, "not-found")

@@ -44,7 +44,7 @@ def test_the_cubic_spring_is_found(springs):
     assert any(name.startswith("w1") for name in found.names)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_models_are_a_front_of_size_and_error(springs):
     sizes = [each.size for each in springs]
     assert sizes == sorted(sizes)
@@ -53,7 +53,7 @@ def test_models_are_a_front_of_size_and_error(springs):
     assert errors == sorted(errors, reverse=True)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_saturation_of_the_input_has_units_that_read_the_input_alone():
     found = search(saturated_record(900, 1))
     best = min(found, key=lambda each: rmse(each, saturated_record(1500, 7)))
@@ -77,7 +77,7 @@ def test_a_stop_keeps_the_models_so_far():
         search(spring_record(240, noise=0.02), stop=lambda: True)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_units_of_the_record_do_not_matter():
     record = spring_record(240, noise=0.02)
     scaled = replace(record, u=1e3 * record.u + 5.0, y=1e-6 * record.y - 2.0)
