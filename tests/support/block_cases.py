@@ -8,7 +8,7 @@ from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
-from islands.simulation.blocks import make_simulator
+from islands.simulation.blocks import make_block_simulator
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.gain_scheduled import TRUE, GainScheduledModel, make_record
@@ -80,7 +80,7 @@ def model_case(exported, data):
 def state_case(exported, data):
     """Return the case of a model with states, which are outputs of its block."""
     block, first = measured_block(exported), exported.maximum_lag
-    simulated = make_simulator(block, data, None, first)(np.array([exported.parameters]))[0].T
+    simulated = make_block_simulator(block, data, None, first)(np.array([exported.parameters]))[0].T
     start = np.array([data.y[:first], *(data.y[:first] - TRUE[-1] for _ in block.starts)]).T
     return make_case(exported, data.u, np.concatenate([start, simulated[first:]]), simulated)
 

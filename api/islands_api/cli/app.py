@@ -13,7 +13,8 @@ SERVICE_COMMANDS = core.make_commands(
         "start.",
         "jobs": "Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, stop, resume, "
         "result.",
-        "report": "Write the report of a result folder or of a job as one HTML file.",
+        "report": "Write the report of a result folder, of a job, or of a comparison of jobs as one HTML "
+        "file.",
         "monitors": "Monitors of a service: create, add records, list, show, delete.",
         "keys": "API keys of a service: create, list, revoke.",
         "admin": "Operation of a service: audit, owners, jobs, backup, restore.",

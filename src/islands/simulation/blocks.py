@@ -35,7 +35,10 @@ class BlockSimulator:
         First predicted sample and number of samples of every interval.
     warm_up : int
         Number of samples before the first prediction that may be read, at least the largest lag.
-    states : ndarray, shape (intervals, states), optional
+
+    Attributes
+    ----------
+    states : ndarray, shape (intervals, states), or None
         States at the last samples before the intervals, in place of the starts of the block.
     """
 
@@ -47,9 +50,9 @@ class BlockSimulator:
         start: NDArray[np.int64],
         length: NDArray[np.int64],
         warm_up: int,
-        states: NDArray[np.float64] | None = None,
     ) -> None:
-        self._block, self._warm_up, self._states = block, warm_up, states
+        self._block, self._warm_up = block, warm_up
+        self.states: NDArray[np.float64] | None = None
         self._program, self._weights = _link(block)
         self._ends = np.cumsum([len(equation) for equation in block.equations], dtype=np.int64)
         self._outputs, self._inputs = outputs, inputs
@@ -79,6 +82,11 @@ class BlockSimulator:
                     :computed, self._warm_up : self._warm_up + length, lane
                 ]
         return found
+
+    @property
+    def start(self) -> NDArray[np.int64]:
+        """First predicted sample of every interval."""
+        return self._start
 
     @property
     def intervals(self) -> NDArray[np.int64]:
@@ -150,8 +158,8 @@ class BlockSimulator:
         self, signals: NDArray[np.float64], sets: NDArray[np.float64], intervals: NDArray[np.int64]
     ) -> None:
         """Write the states of the warm-up."""
-        if self._states is not None:
-            signals[self._block.outputs : self._block.computed, self._warm_up - 1] = self._states[intervals].T
+        if self.states is not None:
+            signals[self._block.outputs : self._block.computed, self._warm_up - 1] = self.states[intervals].T
             return
         named = dict(zip(self._block.parameters, sets, strict=True))
         first = signals[:, : self._warm_up]
@@ -162,10 +170,34 @@ class BlockSimulator:
 def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, warm_up: int) -> BlockSimulator:
     """Return the simulator of the block of a model on the intervals of a record.
 
+    The initial states of a `LatentModel` are those that its parameters estimate from the warm-up.
+
     Parameters
     ----------
     model : DynamicModel or CoupledModel
-        The initial states of a `LatentModel` are those that its parameters estimate from the warm-up.
+    record, interval, warm_up
+        As for `make_block_simulator`.
+
+    Raises
+    ------
+    RecordError, SettingsError
+        As in `make_block_simulator`; or a latent model diverges in the warm-up.
+    """
+    made = make_block_simulator(model.block(), record, interval, warm_up)
+    if isinstance(model, LatentModel):
+        assert isinstance(record, Dataset), "the record matches the model"
+        made.states = estimate_initial_states(model, record, made.start, warm_up)
+    return made
+
+
+def make_block_simulator(
+    block: Block, record: AnyRecord, interval: int | None, warm_up: int
+) -> BlockSimulator:
+    """Return the simulator of a block on the intervals of a record.
+
+    Parameters
+    ----------
+    block : Block
     record : Dataset or CoupledRecord
         Signals of the block.
     interval : int or None
@@ -185,16 +217,11 @@ def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, war
     """
     if interval is not None and interval < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
-    block = model.block()
     start, length = find_intervals(record, warm_up, interval if block.restarts_from_outputs else None)
     outputs = np.atleast_2d(record.y.T)
     for y in outputs:
         check_warm_up(y, start, warm_up)
-    states = None
-    if isinstance(model, LatentModel):
-        assert isinstance(record, Dataset), "the record matches the model"
-        states = estimate_initial_states(model, record, start, warm_up)
-    return BlockSimulator(block, outputs, record.u.T, start, length, warm_up, states)
+    return BlockSimulator(block, outputs, record.u.T, start, length, warm_up)
 
 
 def _make_groups(runs: Sequence[tuple[int, int]]) -> Iterator[Sequence[tuple[int, int]]]:
