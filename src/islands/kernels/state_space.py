@@ -73,6 +73,37 @@ def _evaluate_units(theta, at_w, at_b, codes, signals, h, slope):
         h[unit], slope[unit] = evaluate_unit(codes[unit], s)
 
 
+@kernel(forceinline=True)
+def _compute_output(theta, n, signals, h):
+    """Return the output of a row."""
+    _, at_c, _, _, at_f, _, _, _, at_level = _place(n, signals.size - n, h.size)
+    y = theta[at_level]
+    for j in range(signals.size):
+        y += theta[at_c + j] * signals[j]
+    for unit in range(h.size):
+        y += theta[at_f + unit] * h[unit]
+    return y
+
+
+@kernel(forceinline=True)
+def _advance(theta, n, signals, h, after):
+    """Write the states at the next row; return whether they are bounded."""
+    units, inputs = h.size, signals.size - n
+    at_b, _, _, at_e, _, _, _, at_drift, _ = _place(n, inputs, units)
+    for i in range(n):
+        found = theta[at_drift + i]
+        for j in range(n):
+            found += theta[i * n + j] * signals[j]
+        for j in range(inputs):
+            found += theta[at_b + i * inputs + j] * signals[n + j]
+        for unit in range(units):
+            found += theta[at_e + i * units + unit] * h[unit]
+        after[i] = found
+        if not abs(found) <= BOUND:
+            return False
+    return True
+
+
 @kernel
 def simulate_state_space(
     theta,
@@ -83,29 +114,16 @@ def simulate_state_space(
 ):
     """Simulate the rows; return the number of rows before a divergence."""
     n, inputs, units = x.size, u.shape[1], codes.size
-    at_b, at_c, _, at_e, at_f, at_w, at_bias, at_drift, at_level = _place(n, inputs, units)
+    _, _, _, _, _, at_w, at_bias, _, _ = _place(n, inputs, units)
     signals, after = np.empty(n + inputs), np.empty(n)
     h, slope = np.empty(units), np.empty(units)
     signals[:n] = x
     for k in range(u.shape[0]):
         signals[n:] = u[k]
         _evaluate_units(theta, at_w, at_bias, codes, signals, h, slope)
-        y[k] = theta[at_level]
-        for j in range(n + inputs):
-            y[k] += theta[at_c + j] * signals[j]
-        for unit in range(units):
-            y[k] += theta[at_f + unit] * h[unit]
-        for i in range(n):
-            found = theta[at_drift + i]
-            for j in range(n):
-                found += theta[i * n + j] * signals[j]
-            for j in range(inputs):
-                found += theta[at_b + i * inputs + j] * signals[n + j]
-            for unit in range(units):
-                found += theta[at_e + i * units + unit] * h[unit]
-            after[i] = found
-            if not abs(found) <= BOUND:
-                return k
+        y[k] = _compute_output(theta, n, signals, h)
+        if not _advance(theta, n, signals, h, after):
+            return k
         signals[:n] = after
     x[:] = signals[:n]
     return u.shape[0]
@@ -131,7 +149,7 @@ def _multiply_rows(matrix, rows, columns, slopes, width, out):
 
 @kernel(forceinline=True)
 def _differentiate_output(theta, places, n, signals, h, slope, states, width, gain, out):
-    """Write the derivatives of the output at one row; return the output."""
+    """Write the derivatives of the output at one row."""
     units, inputs = h.size, signals.size - n
     _, at_c, _, _, at_f, at_w, at_bias, _, at_level = _place(n, inputs, units)
     for j in range(n):
@@ -140,41 +158,28 @@ def _differentiate_output(theta, places, n, signals, h, slope, states, width, ga
             found += theta[at_f + unit] * slope[unit] * theta[at_w + unit * signals.size + j]
         gain[0, j] = found
     _multiply_rows(gain, 1, n, states, width, out)
-    y = theta[at_level]
     _add(out, 0, places[at_level], 1.0)
     for j in range(signals.size):
-        y += theta[at_c + j] * signals[j]
         _add(out, 0, places[at_c + j], signals[j])
     for unit in range(units):
-        y += theta[at_f + unit] * h[unit]
         _add(out, 0, places[at_f + unit], h[unit])
         factor = theta[at_f + unit] * slope[unit]
         _add(out, 0, places[at_bias + unit], factor)
         for j in range(signals.size):
             _add(out, 0, places[at_w + unit * signals.size + j], factor * signals[j])
-    return y
 
 
 @kernel(forceinline=True)
-def _advance_states(theta, places, n, signals, h, slope, states, width, jacobian, after, out):
-    """Write the states at the next row and their derivatives; return whether they are bounded."""
+def _differentiate_states(theta, places, n, signals, h, slope, states, width, jacobian, out):
+    """Write the derivatives of the states at the next row."""
     units, inputs = h.size, signals.size - n
     at_b, _, _, at_e, _, at_w, at_bias, at_drift, _ = _place(n, inputs, units)
     for i in range(n):
-        found = theta[at_drift + i]
         for j in range(n):
-            found += theta[i * n + j] * signals[j]
             total = theta[i * n + j]
             for unit in range(units):
                 total += theta[at_e + i * units + unit] * slope[unit] * theta[at_w + unit * signals.size + j]
             jacobian[i, j] = total
-        for j in range(inputs):
-            found += theta[at_b + i * inputs + j] * signals[n + j]
-        for unit in range(units):
-            found += theta[at_e + i * units + unit] * h[unit]
-        after[i] = found
-        if not abs(found) <= BOUND:
-            return False
     _multiply_rows(jacobian, n, n, states, width, out)
     for i in range(n):
         at = i * width
@@ -190,7 +195,6 @@ def _advance_states(theta, places, n, signals, h, slope, states, width, jacobian
                 _add(out, at, places[at_bias + unit], factor)
                 for j in range(signals.size):
                     _add(out, at, places[at_w + unit * signals.size + j], factor * signals[j])
-    return True
 
 
 @kernel
@@ -228,17 +232,18 @@ def accumulate_products(
     for k in range(u.shape[0]):
         signals[n:] = u[k]
         _evaluate_units(theta, at_w, at_bias, codes, signals, h, slope)
-        simulated = _differentiate_output(theta, places, n, signals, h, slope, now, width, gain, slopes)
         if not math.isnan(y[k]):
+            _differentiate_output(theta, places, n, signals, h, slope, now, width, gain, slopes)
             for p in range(free):
                 chunk[p * CHUNK + filled] = slopes[p]
-            chunk[free * CHUNK + filled] = y[k] - simulated
+            chunk[free * CHUNK + filled] = y[k] - _compute_output(theta, n, signals, h)
             filled += 1
             if filled == CHUNK:
                 add_tiles(chunk, blocks, 0, tiles, running)
                 filled = 0
-        if not _advance_states(theta, places, n, signals, h, slope, now, width, jacobian, after, later):
+        if not _advance(theta, n, signals, h, after):
             return k
+        _differentiate_states(theta, places, n, signals, h, slope, now, width, jacobian, later)
         signals[:n] = after
         now, later = later, now
     for p in range(free + 1):
