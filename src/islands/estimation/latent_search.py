@@ -10,6 +10,7 @@ Parameters that the held-out error does not need are removed in the end.
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import isfinite, log
 
@@ -18,11 +19,11 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_all_inputs
-from islands.estimation.linear_state_space import fit_linear_state_space
+from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
 from islands.estimation.modal_form import find_modal_form
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.kernels.state_space import simulate_state_space
-from islands.models.latent import LatentModel, StateSpaceLayout, find_codes
+from islands.models.latent import LatentModel, StateSpaceLayout, find_codes, read_at_once
 from islands.progress import Steps
 from islands.simulation.initial_states import Segment, estimate_states
 
@@ -105,6 +106,12 @@ class _Candidate:
         """Number of free parameters."""
         return int(np.count_nonzero(self.fit.places >= 0))
 
+    @property
+    def reads_at_once(self) -> bool:
+        """Whether the output reads an input at the same row."""
+        named = zip(self.layout.names, self.fit.theta, strict=True)
+        return read_at_once([name for name, value in named if value != 0.0])
+
     def advance(self, steps: int, data: _Data, stop: Steps) -> "_Candidate":
         """Return the candidate after some steps."""
         self.fit.advance(steps, lambda: stop.skip("refinement of parameters"))
@@ -156,19 +163,17 @@ def search_latent_models(record: Dataset, seed: int, steps: Steps) -> list[Laten
             ranked = sorted(candidates, key=lambda each: each.order)
             kept = {id(each): each for each in (*ranked[:most], *front)}
             racing = [each for each in kept.values() if each.units]
-            moved = threads.map(lambda each: each.advance(count, data, steps), racing)  # noqa: B023
+            moved = threads.map(partial(_Candidate.advance, steps=count, data=data, stop=steps), racing)
             candidates = [each for each in candidates if not each.units] + list(moved)
         steps.report("final estimation of state spaces", 0.7)
         front = _find_front(candidates)
-        best = _make_model(
-            _remove_blocks(front[-1], data, True).fit, front[-1].layout, front[-1].units, advanced
-        )
+        best = _remove_blocks(front[-1], data, direct=True)
         direct = best.reads_at_once
-
-        def finish(each: _Candidate) -> LatentModel | None:
-            return _finish(each, data, direct, advanced, steps)
-
-        models = [each for each in threads.map(finish, front) if each is not None]
+        left = front[:-1] if direct else front
+        reduced = list(threads.map(partial(_remove_blocks, data=data, direct=direct), left))
+        reduced += [best] if direct else []
+        found = threads.map(partial(_finish, data=data, record=advanced, steps=steps), reduced)
+        models = [each for each in found if each is not None]
     return models if direct else [replace(each, input_names=record.input_names) for each in models]
 
 
@@ -223,17 +228,15 @@ def _fit_linear(data: _Data, steps: Steps) -> list[_Candidate]:
         model = fit_linear_state_space(data.record[: _BLOCKS * _LARGEST_BLOCK], order)
         if model is None:
             continue
-        fit = _make_fit(model.theta, model.layout, (), data.used)
+        fit = _make_linear_fit(model.theta, order, data.used)
         fit.advance(_TRIAL_STEPS)
         found.append(_Candidate(model.layout, (), 0, fit, _measure(fit, data.held_out)))
     return [each for each in found if isfinite(each.error)]
 
 
-def _make_fit(
-    theta: NDArray[np.float64], layout: StateSpaceLayout, units: tuple[str, ...], segments: Sequence[Segment]
-) -> StateSpaceFit:
-    codes = find_codes(units)
-    states = [_estimate_start(theta, codes, each, layout.order) for each in segments]
+def _make_linear_fit(theta: NDArray[np.float64], order: int, segments: Sequence[Segment]) -> StateSpaceFit:
+    codes = find_codes(())
+    states = [_estimate_start(theta, codes, each, order) for each in segments]
     return StateSpaceFit(theta, np.arange(theta.size), codes, segments, np.array(states))
 
 
@@ -268,9 +271,7 @@ def _begin(
     """Add units to a linear model and estimate."""
     order, inputs, count = linear.layout.order, linear.layout.inputs, len(units)
     layout = StateSpaceLayout(order, inputs, count)
-    rng = np.random.default_rng(
-        np.random.SeedSequence(seed, spawn_key=(order, list(_UNITS).index(units), start))
-    )
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(order, _UNITS.index(units), start)))
     theta, slices, given = np.zeros(len(layout.names)), layout.find_slices(), linear.layout.find_slices()
     for block in ("A", "B", "C", "D", "o", "level"):
         theta[slices[block]] = linear.fit.theta[given[block]]
@@ -332,11 +333,9 @@ def _fit_without(candidate: _Candidate, block: NDArray[np.int64], data: _Data) -
     return replace(candidate, fit=fit, error=_measure(fit, data.held_out))
 
 
-def _finish(
-    candidate: _Candidate, data: _Data, direct: bool, record: Dataset, steps: Steps
-) -> LatentModel | None:
-    """Remove parameters that are not needed, estimate on all blocks and return the model of the record."""
-    fit = _remove_blocks(candidate, data, direct).fit
+def _finish(candidate: _Candidate, data: _Data, record: Dataset, steps: Steps) -> LatentModel | None:
+    """Estimate on all blocks and return the model of the record."""
+    fit = candidate.fit
     final = StateSpaceFit(fit.theta, fit.places, fit.codes, data.whole, fit.states)
     final.advance(_ROUNDS[-1][0], lambda: steps.skip("refinement of parameters"))
     if not isfinite(final.mean_square):
@@ -344,7 +343,7 @@ def _finish(
     return _make_model(final, candidate.layout, candidate.units, record)
 
 
-def _write_in_modes(fit: StateSpaceFit, layout: StateSpaceLayout, segment: Segment) -> NDArray[np.float64]:
+def _write_in_modes(fit: StateSpaceFit, layout: StateSpaceLayout) -> NDArray[np.float64]:
     """Return the parameters with one or two states for each mode, of the standard deviation 1."""
     theta, slices = fit.theta.copy(), layout.find_slices()
     order = layout.order
@@ -354,7 +353,10 @@ def _write_in_modes(fit: StateSpaceFit, layout: StateSpaceLayout, segment: Segme
     blocks, forward = found
     modal = _transform(theta, layout, forward)
     modal[slices["A"]] = blocks.ravel()
-    scales = _measure_states(modal, fit.codes, layout, np.linalg.solve(forward, fit.states[0]), segment)
+    start = np.linalg.solve(forward, fit.states[0])
+    scales = measure_deviations(modal, fit.codes, layout, fit.segments[0].u, start)
+    if scales is None:
+        return theta
     for state, next_state in pairwise(range(order)):
         if blocks[state, next_state]:  # both states of a pair have one scale
             scales[[state, next_state]] = np.hypot(*scales[[state, next_state]])
@@ -379,29 +381,11 @@ def _transform(
     return found
 
 
-def _measure_states(
-    theta: NDArray[np.float64],
-    codes: NDArray[np.int64],
-    layout: StateSpaceLayout,
-    start: NDArray[np.float64],
-    segment: Segment,
-) -> NDArray[np.float64]:
-    """Return the standard deviations of the states, 1 of a state that does not move."""
-    slices, scales = layout.find_slices(), np.ones(layout.order)
-    for state in range(layout.order):
-        probe, y = theta.copy(), np.empty(len(segment.y))
-        probe[slices["C"]], probe[slices["D"]] = np.eye(layout.order)[state], 0.0
-        probe[slices["F"]] = 0.0
-        simulate_state_space(probe, codes, segment.u, start.copy(), y)
-        scales[state] = _deviation(y)
-    return scales
-
-
 def _make_model(
     fit: StateSpaceFit, layout: StateSpaceLayout, units: tuple[str, ...], record: Dataset
 ) -> LatentModel:
     """Return the model in the units of a record."""
-    theta, slices = _write_in_modes(fit, layout, fit.segments[0]), layout.find_slices()
+    theta, slices = _write_in_modes(fit, layout), layout.find_slices()
     mean, scale = record.u.mean(axis=0), _deviation(record.u)
     level, height = float(record.y.mean()), float(_deviation(record.y))
     b = theta[slices["B"]].reshape(layout.order, layout.inputs) / scale

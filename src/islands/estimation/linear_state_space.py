@@ -119,17 +119,48 @@ def _balance(
 
 def _normalise(model: LinearStateSpace, record: Dataset) -> LinearStateSpace | None:
     """Return the model with states of the standard deviation 1 for the inputs of a record."""
-    slices, theta = model.layout.find_slices(), model.theta
-    order, scales = len(model.a), []
     # An input that is read one sample early only shifts the states.
-    for state in range(order):
-        probe, y = theta.copy(), np.empty(record.samples)
-        probe[slices["C"]], probe[slices["D"]] = np.eye(order)[state], 0.0
-        rows = simulate_state_space(probe, np.zeros(0, np.int64), record.u, np.zeros(order), y)
-        if rows < record.samples:
-            return None
-        scales.append(float(y[record.samples // 10 :].std()) or 1.0)
-    by = np.array(scales)
+    first, none = record.samples // 10, np.zeros(0, np.int64)
+    by = measure_deviations(model.theta, none, model.layout, record.u, np.zeros(len(model.a)), first)
+    if by is None:
+        return None
     return LinearStateSpace(
         model.a * by / by[:, None], model.b / by[:, None], model.c * by, model.d, model.level
     )
+
+
+def measure_deviations(
+    theta: NDArray[np.float64],
+    codes: NDArray[np.int64],
+    layout: StateSpaceLayout,
+    u: NDArray[np.float64],
+    start: NDArray[np.float64],
+    first: int = 0,
+) -> NDArray[np.float64] | None:
+    """Return the standard deviation of each state for an input, 1 of a state that does not move.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (parameters,)
+        Parameters in the order of the kernel.
+    codes : ndarray of int64, shape (units,)
+    layout : StateSpaceLayout
+    u : ndarray, shape (rows, inputs)
+    start : ndarray, shape (states,)
+        States at the first row.
+    first : int
+        First row that counts.
+
+    Returns
+    -------
+    ndarray, shape (states,), or None
+        None after a divergence.
+    """
+    slices, found = layout.find_slices(), []
+    for output in np.eye(layout.order):
+        probe, y = theta.copy(), np.empty(len(u))
+        probe[slices["C"]], probe[slices["D"]], probe[slices["F"]] = output, 0.0, 0.0
+        if simulate_state_space(probe, codes, u, start.copy(), y) < len(u):
+            return None
+        found.append(float(y[first:].std()) or 1.0)
+    return np.array(found)

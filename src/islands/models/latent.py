@@ -209,10 +209,7 @@ class LatentModel(ParametricModel):
     @property
     def reads_at_once(self) -> bool:
         """Whether the output reads an input at sample k, itself or through a unit."""
-        units = {name[1:] for name in self.names if name[0] == "f"}
-        return any(
-            name[0] == "d" or (name[0] == "v" and name[1:].split("_")[0] in units) for name in self.names
-        )
+        return read_at_once(self.names)
 
     @property
     def theta(self) -> NDArray[np.float64]:
@@ -321,6 +318,12 @@ class LatentModel(ParametricModel):
             "operating_inputs": tuple(map(float, document["operating_inputs"])),
             "wiring": tuple(str(entry["name"]) for entry in document["parameters"]),
         }
+
+
+def read_at_once(names: Sequence[str]) -> bool:
+    """Return whether the output reads an input at sample k if these parameters are not zero."""
+    units = {name[1:] for name in names if name[0] == "f"}
+    return any(name[0] == "d" or (name[0] == "v" and name[1:].split("_")[0] in units) for name in names)
 
 
 def find_codes(units: Sequence[str]) -> NDArray[np.int64]:

@@ -35,11 +35,6 @@ class Segment:
     u: NDArray[np.float64]
     y: NDArray[np.float64]
 
-    @property
-    def known(self) -> int:
-        """Number of measured outputs."""
-        return int(np.count_nonzero(~np.isnan(self.y)))
-
 
 def estimate_states(
     theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, rest: NDArray[np.float64]
