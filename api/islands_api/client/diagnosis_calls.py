@@ -73,12 +73,7 @@ def diagnose(
         A model file cannot be read.
     """
     given = {
-        "dataset": get_id(dataset),
-        "input": input,
-        "output": output,
-        "channels": as_list(channels) or None,
-        "simulation": parse_simulation(simulation) if isinstance(simulation, str) else simulation,
-        "tolerance": dict(tolerance or {}) or None,
+        **_describe_simulated(dataset, input, output, channels, simulation, tolerance),
         "seed": seed,
         "dt": dt,
         "rows": rows,
@@ -159,18 +154,32 @@ def preview(
         As for `diagnose`.
     """
     given = {
-        "dataset": get_id(dataset),
-        "input": input,
-        "output": output,
-        "channels": as_list(channels) or None,
-        "simulation": parse_simulation(simulation) if isinstance(simulation, str) else simulation,
-        "tolerance": dict(tolerance or {}) or None,
+        **_describe_simulated(dataset, input, output, channels, simulation, tolerance),
         "dt": dt,
         "rows": rows,
         "points": points,
     }
     body = {name: value for name, value in given.items() if value is not None}
     return RequestSpec("POST", "/v1/simulations/preview", read_as(SimulationPreview), json=body)
+
+
+def _describe_simulated(
+    dataset: DatasetRef,
+    input: str,  # noqa: A002 - the name in the request body
+    output: str,
+    channels: str | Sequence[str],
+    simulation: str | Mapping[str, Any],
+    tolerance: Mapping[str, float] | None,
+) -> dict[str, Any]:
+    """Return the fields that a diagnosis and its preview have in common."""
+    return {
+        "dataset": get_id(dataset),
+        "input": input,
+        "output": output,
+        "channels": as_list(channels) or None,
+        "simulation": parse_simulation(simulation) if isinstance(simulation, str) else simulation,
+        "tolerance": dict(tolerance or {}) or None,
+    }
 
 
 def parse_simulation(text: str) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from typing import Annotated, Any, ClassVar
 from fastapi import Header, Query, Request, Response
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
+from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope
 
@@ -149,6 +150,21 @@ class FormRoute(BodyRoute):
                 body = BodyReader(request.receive, settings.body_timeout, settings.body_rate, room)
                 fields = [field.alias for field in self.dependant.body_params]
                 yield UploadRequest(request.scope, body.receive, target, fields, self.path)
+
+
+def describe_upload(view: type[BaseModel], noun: str) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI descriptions of the answers to an upload.
+
+    Parameters
+    ----------
+    view : type
+        Model of the answer.
+    noun : str
+        What is uploaded, as ``data set``.
+    """
+    headers = {"Location": {"description": f"Path of the {noun}.", "schema": {"type": "string"}}}
+    again = {"model": view, "description": "The same bytes were uploaded before.", "headers": headers}
+    return {200: again, 201: {"description": "Stored.", "headers": headers}}
 
 
 class _StrictRequest(Request):

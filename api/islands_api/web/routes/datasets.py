@@ -27,6 +27,7 @@ from islands_api.web.requests import (
     StartRow,
     StopRow,
     decode_cursor,
+    describe_upload,
     encode_cursor,
     matches_etag,
 )
@@ -45,15 +46,7 @@ fetching = APIRouter(prefix=router.prefix, tags=["data sets"], responses=RESPONS
 
 _READING = TypeAdapter(ReadingOptions)
 
-_LOCATION_HEADER = {"Location": {"description": "Path of the data set.", "schema": {"type": "string"}}}
-_UPLOAD_RESPONSES: dict[int | str, dict[str, Any]] = {
-    200: {
-        "model": DatasetView,
-        "description": "The same bytes were uploaded before.",
-        "headers": _LOCATION_HEADER,
-    },
-    201: {"description": "Stored.", "headers": _LOCATION_HEADER},
-}
+_UPLOAD_RESPONSES = describe_upload(DatasetView, "data set")
 
 Id = Annotated[
     str,

@@ -10,7 +10,14 @@ from islands_api.fmu_schemas import FmuPage, FmuView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppStateDep
 from islands_api.web.problems import RESPONSES
-from islands_api.web.requests import Cursor, FormRoute, Limit, decode_cursor, encode_cursor
+from islands_api.web.requests import (
+    Cursor,
+    FormRoute,
+    Limit,
+    decode_cursor,
+    describe_upload,
+    encode_cursor,
+)
 from islands_api.web.responses import JSONDocument, dataset_document
 from islands_api.web.uploads.dataset_storage import store_fmu
 from islands_api.web.uploads.uploaded_file import parse_fmu_name
@@ -27,15 +34,7 @@ class FmuRoute(FormRoute):
 
 router = APIRouter(prefix="/v1/fmus", tags=["FMUs"], responses=RESPONSES, route_class=FmuRoute)
 
-_LOCATION_HEADER = {"Location": {"description": "Path of the FMU.", "schema": {"type": "string"}}}
-_UPLOAD_RESPONSES: dict[int | str, dict[str, Any]] = {
-    200: {
-        "model": FmuView,
-        "description": "The same bytes were uploaded before.",
-        "headers": _LOCATION_HEADER,
-    },
-    201: {"description": "Stored.", "headers": _LOCATION_HEADER},
-}
+_UPLOAD_RESPONSES = describe_upload(FmuView, "FMU")
 
 Id = Annotated[
     str,

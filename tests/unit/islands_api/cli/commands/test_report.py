@@ -32,18 +32,24 @@ def test_report_of_a_folder_is_written_into_it_or_where_it_is_asked_for(
     assert expected.read_bytes() == report_saved_result(folder)
 
 
+class Answering:
+    """Client of a service that answers with the request."""
+
+    def __enter__(self) -> "Answering":
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def report(self, job: str) -> bytes:
+        return f"report of {job}".encode()
+
+    def comparison_report(self, models: list[str | tuple[str, int]]) -> bytes:
+        return repr(models).encode()
+
+
 def test_report_of_a_job_is_that_of_the_service(
     command_line: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    class Answering:
-        def __enter__(self) -> "Answering":
-            return self
-
-        def __exit__(self, *_: object) -> None: ...
-
-        def report(self, job: str) -> bytes:
-            return f"report of {job}".encode()
-
     asked = []
     monkeypatch.setattr(command, "open_client", lambda *given: asked.append(given) or Answering())
     code, out, _ = command_line("report", JOB, "--url", "http://there", "--key", "secret")
@@ -55,15 +61,6 @@ def test_report_of_a_job_is_that_of_the_service(
 def test_several_jobs_are_compared_by_the_recommended_model_or_that_of_a_rank(
     command_line: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    class Answering:
-        def __enter__(self) -> "Answering":
-            return self
-
-        def __exit__(self, *_: object) -> None: ...
-
-        def comparison_report(self, models: list[str | tuple[str, int]]) -> bytes:
-            return repr(models).encode()
-
     monkeypatch.setattr(command, "open_client", lambda *_: Answering())
     code, out, _ = command_line("report", JOB, f"{JOB}:12")
     assert (code, out.strip()) == (0, "comparison.html")
