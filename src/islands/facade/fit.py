@@ -48,7 +48,7 @@ def fit(
     delays: Sequence[int] | None = None,
     max_terms: int = 10,
     constraints: str | None = None,
-    estimator: str = "least-squares",
+    estimator: str = "",
     average: int | str = AUTO,
     feedthrough: str = AUTO,
     shooting: int | None = None,
@@ -93,7 +93,8 @@ def fit(
         ``hysteresis``, ``none`` or statements such as ``odd; gain = 2.5``; None takes the default of the
         library.
     estimator : str
-        An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures.
+        An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures. By default,
+        they are those of least squares or, if the validation data prefer it, of the error of the free run.
     average : int or str
         Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
         oversampled record if small models are clearly better on the validation data. Models then have the

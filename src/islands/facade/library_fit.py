@@ -37,13 +37,13 @@ from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
     mark_stopped,
-    rank_models,
     with_average,
     with_bands,
 )
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.facade.final_models import screen
+from islands.facade.free_run_refinement import keep_best_of_sizes, refine_models
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
@@ -89,14 +89,14 @@ class FitSettings:
     """Settings of `fit_library`, as the parameters of `fit`."""
 
     max_terms: int = 10
-    estimator: str = "least-squares"
+    estimator: str = ""
     average: int | str = AUTO
     feedthrough: str = AUTO
     shooting: int | None = None
     certificate: int = 10_000
 
     def __post_init__(self) -> None:
-        lookup(ESTIMATORS, self.estimator, "estimator")
+        lookup(ESTIMATORS, self.selecting_estimator, "estimator")
         check_integers(max_terms=self.max_terms, certificate=self.certificate, shooting=self.shooting)
         if self.max_terms < 1:
             raise SettingsError(f"a model has at least one term, got max_terms = {self.max_terms}")
@@ -104,6 +104,11 @@ class FitSettings:
             raise SettingsError(f"a search has at least 0 nodes, got certificate = {self.certificate}")
         if self.shooting is not None and self.shooting < 1:
             raise SettingsError(f"a shooting interval has at least 1 sample, got {self.shooting}")
+
+    @property
+    def selecting_estimator(self) -> str:
+        """Estimator of all structures; without a choice, the validation data decide on a refinement."""
+        return self.estimator or "least-squares"
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,9 +235,6 @@ def fit_library(
     simulated = _fit_simulations(split, rated, settings, swaps, warm_up, steps)
     models += simulated
     outcomes["ok"] += len(simulated)
-    best_of_size: dict[int, Assessment] = {}
-    for ranked in rank_models(models):
-        best_of_size.setdefault(ranked.model.size, ranked)
     rows = sum(max(0, length - warm_up) for length in split.estimation.segments)
     count = full_set(library.degree, library.lags, library.lags, record.inputs)
     search = SearchStatistics(
@@ -250,7 +252,10 @@ def fit_library(
         **asdict(settings),
         "shooting": shooting,
     }
-    result = SearchResult(record, split, seed, described, search, tuple(best_of_size.values()))
+    result = SearchResult(record, split, seed, described, search, keep_best_of_sizes(models))
+    if not settings.estimator:
+        result, refined = refine_models(result, interval, warm_up, library.constraints, steps)
+        models += refined
     estimates = [_as_candidate(entry) for entry in models]
 
     def report_again(text: str, _fraction: float | None = None, /) -> None:
@@ -278,7 +283,7 @@ def _estimate(
     Once a stop is requested, only the last structure of every size that has no model is estimated.
     """
     constraints, interval = swaps.constraints, swaps.shooting
-    criterion = make_criterion(settings.estimator, interval)
+    criterion = make_criterion(settings.selecting_estimator, interval)
     found: list[Assessment | EvaluationOutcome | None] = [None] * len(structures)
     by_size: dict[int, list[int]] = {}
     for place, (structure, _) in enumerate(structures):
@@ -295,7 +300,7 @@ def _estimate(
             estimated = estimate_deviations(structure, offsets, split.estimation, constraints, warm_up)
             if not isinstance(estimated, EvaluationOutcome):
                 estimated = estimate_with(
-                    settings.estimator, estimated, split.estimation, constraints, warm_up, interval
+                    settings.selecting_estimator, estimated, split.estimation, constraints, warm_up, interval
                 )
             if isinstance(estimated, EvaluationOutcome):
                 found[place] = estimated
@@ -327,7 +332,7 @@ def _fit_simulations(
 
     Measurement noise hides slow modes from the one-step-ahead error, by which structures are selected.
     """
-    if not library.has_simulations or settings.estimator not in _SIMULATING:
+    if not library.has_simulations or settings.selecting_estimator not in _SIMULATING:
         return []
     steps.report("linear models of the free run", None)
     if steps.skip("linear models of the free run"):

@@ -6,14 +6,15 @@ Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984,
 differences. Blocks of the validation data take the correlation of the errors into account. Models with
 different warm-ups are compared over the samples that both predict. Decision 0017 compares rules.
 
-A model may be good on the validation data by chance. Its error on the estimation data is then large.
+A model may be good on the validation data by chance. Its error on the estimation data is then large, or no
+smaller than that of a smaller model.
 
 The setting ``select`` can replace this rule by the paper's choice of Appendix A: the least training error.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isnan, sqrt
+from math import inf, isinf, isnan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ LARGEST_EXCESS = 0.2
 
 #: Excess of an RMSE over the least, as a fraction, that never justifies another term.
 NEGLIGIBLE_EXCESS = 0.01
+
+#: Excess of an RMSE over the least, as a fraction, of a model that is as good on the estimation data.
+_EXCESS_BY_CHANCE = 0.5
 
 #: RMSE as a fraction of the output range below which errors count as equal.
 ROUNDING = 1e-6
@@ -70,8 +74,10 @@ def recommend(
     holds. Of these, the one with the least RMSE is the reference. A model is as good as the reference if its
     RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds
     it by at most 20 % and the mean squared errors differ by at most three standard errors. The standard error
-    is that of the mean difference over blocks of the validation data. Of these models, those whose free-run
-    error on the estimation data exceeds 1.5 times the least of them are passed over.
+    is that of the mean difference over blocks of the validation data. A model is also as good if its RMSE on
+    the estimation data exceeds that of the reference by at most 1 %, and that on the validation data by at
+    most 50 %. Of these models, those whose free-run error on the estimation data exceeds 1.5 times the least
+    of them are passed over.
 
     Parameters
     ----------
@@ -92,7 +98,12 @@ def recommend(
     sound = [at for at in bounded if is_sound(assessments[at].physics, hysteresis)]
     candidates = sound or bounded
     best = min(candidates, key=lambda at: (_rmse(assessments[at]), at))
-    equal = [at for at in candidates if _is_as_good(assessments[at], assessments[best])]
+    equal = [
+        at
+        for at in candidates
+        if _is_as_good(assessments[at], assessments[best])
+        or _is_as_good_in_estimation(assessments[at], assessments[best])
+    ]
     kept = _pass_over(equal, assessments)
     chosen = min(kept, key=lambda at: (sizes[at], at))
     return Recommendation(
@@ -142,6 +153,7 @@ def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
 
 
 def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
+    """Return whether the error on the validation data does not differ significantly from the reference."""
     blocks = compare_blocks(entry.squared_errors, reference.squared_errors)
     if not blocks.size:
         return False
@@ -153,6 +165,17 @@ def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
         excess = blocks[0] - blocks[1]
         uncertainty = STANDARD_ERRORS * excess.std(ddof=1) / sqrt(len(excess)) if len(excess) > 1 else 0.0
         return bool(error <= (1.0 + LARGEST_EXCESS) * smallest and excess.mean() <= uncertainty)
+
+
+def _is_as_good_in_estimation(entry: Assessment, reference: Assessment) -> bool:
+    """Return whether the error on the estimation data is no larger, and that on the validation data similar.
+
+    The reference may have the least error on the validation data by chance.
+    """
+    error, smallest = _estimation_error(entry), _estimation_error(reference)
+    if isinf(error) or error > (1.0 + NEGLIGIBLE_EXCESS) * smallest:
+        return False
+    return _rmse(entry) <= (1.0 + _EXCESS_BY_CHANCE) * _rmse(reference)
 
 
 def _pass_over(equal: Sequence[int], assessments: Sequence[Assessment]) -> list[int]:
@@ -213,9 +236,16 @@ def _describe_choice(
         f", without {equal - kept} with more than {LARGEST_ESTIMATION_RATIO:g} times the least error of these"
         " on the estimation data"
     )
+    exception = exception if kept < equal else ""
+    if _is_as_good(assessments[chosen], assessments[best]):
+        return (
+            f"smallest of {equal} models whose free-run errors on the validation data do not differ "
+            f"significantly from the least{exception}: RMSE {error}, least {least}"
+        )
     return (
-        f"smallest of {equal} models whose free-run errors on the validation data do not differ "
-        f"significantly from the least{exception if kept < equal else ''}: RMSE {error}, least {least}"
+        f"smallest of {equal} models as good as that with the least free-run error on the validation data"
+        f"{exception}: its error on the estimation data is no larger, that on the validation data is RMSE "
+        f"{error}, least {least}"
     )
 
 

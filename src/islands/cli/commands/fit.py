@@ -78,7 +78,9 @@ def fit(
             "By default those of the library.",
         ),
     ] = None,
-    estimator: Annotated[str, typer.Option("--estimator", help=", ".join(ESTIMATORS))] = "least-squares",
+    estimator: Annotated[
+        str, typer.Option("--estimator", help=f"{', '.join(ESTIMATORS)}; by default validation selects.")
+    ] = "",
     average: Annotated[
         str, typer.Option("--average", help="Samples of a mean that becomes one sample, or auto.")
     ] = AUTO,

@@ -212,7 +212,7 @@ def test_result_has_the_values_of_default_settings():
         "delays": (),
         "max_terms": 2,
         "constraints": "none",
-        "estimator": "least-squares",
+        "estimator": "",
         "average": "auto",
         "feedthrough": "auto",
         "shooting": 30,

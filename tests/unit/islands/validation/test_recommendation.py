@@ -19,6 +19,9 @@ LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 #: Squared errors of noise with an RMSE of 1 %, in 20 blocks.
 NOISE = 1e-4 * (1.0 + 0.2 * np.random.default_rng(0).standard_normal(20))
 
+#: Error on the estimation data that is 10 % less than that of a `Candidate` by default.
+BETTER = 0.009
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -77,7 +80,7 @@ def test_a_larger_model_that_is_better_by_chance_is_not_recommended():
 
 
 def test_a_larger_model_that_is_better_in_every_block_is_recommended():
-    assert chosen(Candidate(3, NOISE), Candidate(4, 0.9 * NOISE)) == 4
+    assert chosen(Candidate(3, NOISE), Candidate(4, 0.9 * NOISE, estimated=BETTER)) == 4
 
 
 def test_the_smallest_of_several_equal_models_is_recommended():
@@ -86,7 +89,7 @@ def test_the_smallest_of_several_equal_models_is_recommended():
 
 @pytest.mark.parametrize(("excess", "size"), [(0.0099, 3), (0.011, 9)])
 def test_an_excess_of_one_per_cent_never_justifies_a_term(excess, size):
-    assert chosen(Candidate(3, NOISE * (1 + excess) ** 2), Candidate(9, NOISE)) == size
+    assert chosen(Candidate(3, NOISE * (1 + excess) ** 2), Candidate(9, NOISE, estimated=BETTER)) == size
 
 
 @pytest.mark.parametrize(("excess", "size"), [(0.19, 3), (0.21, 9)])
@@ -94,7 +97,25 @@ def test_an_uncertain_excess_of_twenty_per_cent_justifies_a_term(excess, size):
     # One block has the whole difference, so two standard errors exceed it.
     blocks = NOISE.copy()
     blocks[4] += ((1 + excess) ** 2 - 1) * NOISE.sum()
-    assert chosen(Candidate(3, blocks), Candidate(9, NOISE)) == size
+    assert chosen(Candidate(3, blocks), Candidate(9, NOISE, estimated=BETTER)) == size
+
+
+@pytest.mark.parametrize(
+    ("excess", "estimated", "size"), [(0.49, 0.01, 3), (0.49, 0.0098, 9), (0.51, 0.01, 9), (0.49, nan, 3)]
+)
+def test_a_term_without_effect_on_the_estimation_data_is_not_justified(excess, estimated, size):
+    small = Candidate(3, NOISE * (1 + excess) ** 2)
+    assert chosen(small, Candidate(9, NOISE, estimated=estimated)) == size
+
+
+def test_the_reason_states_that_the_estimation_data_decide():
+    entries = [Candidate(9, NOISE).assessment(), Candidate(3, 1.5 * NOISE).assessment()]
+    error, least = (sqrt(factor * np.mean(NOISE)) for factor in (1.5, 1.0))
+    assert recommend([9, 3], entries, False, "um").reasons[0] == (
+        "smallest of 2 models as good as that with the least free-run error on the validation data: its "
+        "error on the estimation data is no larger, that on the validation data is RMSE "
+        f"{error:.4g} um, least {least:.4g} um"
+    )
 
 
 @pytest.mark.parametrize(("estimated", "size"), [(0.0149, 3), (0.0151, 4), (0.2, 4), (nan, 4)])
@@ -171,7 +192,7 @@ def test_the_best_model_is_not_compared_with_itself():
 
 
 def test_a_single_block_has_no_standard_error():
-    assert chosen(Candidate(3, NOISE[:1] * 1.03), Candidate(9, NOISE[:1])) == 9
+    assert chosen(Candidate(3, NOISE[:1] * 1.03), Candidate(9, NOISE[:1], estimated=BETTER)) == 9
 
 
 def from_sample(first, errors):

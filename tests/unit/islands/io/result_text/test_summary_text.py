@@ -233,13 +233,13 @@ def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
         y[k] = 0.9 * y[k - 1] + 0.2 * u[k - 1] + 0.2 * u[k - 1] ** 2
     data = Dataset(u, y + 0.02 * rng.standard_normal(1200), 0.1)
     settings = {"library": "polynomial", "degree": 2, "lags": 2, "certificate": 0, "average": 1}
-    biased = islands.fit(data, **settings)
+    biased = islands.fit(data, estimator="least-squares", **settings)
     assert 'Next: estimate with estimator="free-run":' in " ".join(str(biased).split())
     with command_line_names():
         assert "Next: estimate with --estimator free-run:" in " ".join(str(biased).split())
-    unbiased = islands.fit(data, estimator="free-run", **settings)
-    assert unbiased.best.model.parameter_names == ("y(k-1)", "u1(k-1)", "u1(k-1)^2")
-    assert "estimator=" not in str(unbiased)
+    for unbiased in (islands.fit(data, **settings), islands.fit(data, estimator="free-run", **settings)):
+        assert unbiased.best.model.parameter_names == ("y(k-1)", "u1(k-1)", "u1(k-1)^2")
+        assert "estimator=" not in str(unbiased)
     linear = islands.fit(replace(data, y=y_of_a_lag(u) + 0.02 * rng.standard_normal(1200)), **settings)
     assert linear.best.model.parameter_names == ("y(k-1)", "u1(k-1)")
     assert "estimator=" not in str(linear)
