@@ -23,11 +23,15 @@ from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
+from islands.validation.linear_comparison import fit_linear_comparison, is_linear
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend, recommend_fittest
 
 #: Name of the step that makes the ensemble and the prediction bands.
 BANDS = "prediction bands"
+
+#: Name of the step that fits a linear model of the same data.
+COMPARISON = "linear model for comparison"
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +110,8 @@ class SearchResult:
     average : int
         Number of samples of the record whose mean is one sample of the estimation data and of the validation
         data.
+    linear : Assessment or None
+        Linear model of the same data, for comparison. None if the recommended model is linear.
     """
 
     record: Dataset
@@ -116,6 +122,7 @@ class SearchResult:
     models: tuple[Assessment, ...]
     ensemble: Ensemble | None = None
     average: int = 1
+    linear: Assessment | None = None
 
     @property
     def shooting_interval(self) -> int:
@@ -154,6 +161,26 @@ class SearchResult:
         return self.models[self.recommendation.rank - 1]
 
 
+def with_linear_comparison(
+    found: SearchResult, delays: Sequence[int], shooting: int, steps: Steps
+) -> SearchResult:
+    """Return a search result with a linear model of the same data, unless the recommended model is linear.
+
+    Parameters
+    ----------
+    found : SearchResult
+    delays : sequence of int
+        Dead time of each input in samples of the split; none if empty.
+    shooting : int
+        Length of a multiple-shooting interval in samples of the split.
+    steps : Steps
+        The comparison is an optional step.
+    """
+    if is_linear(found.recommended.model) or steps.skip(COMPARISON):
+        return found
+    return replace(found, linear=fit_linear_comparison(found.split, delays, shooting))
+
+
 def with_bands(
     found: SearchResult,
     candidates: Sequence[ValidatedModel[DynamicModel]],
@@ -187,8 +214,13 @@ def mark_stopped(found: SearchResult, steps: Steps) -> SearchResult:
 
 def with_average(found: SearchResult, average: int) -> SearchResult:
     """Return a search result on means of samples; its models state the number of samples of a mean."""
-    models = tuple(replace(entry, model=replace(entry.model, average=average)) for entry in found.models)
-    return replace(found, models=models, average=average)
+    models = tuple(_average(entry, average) for entry in found.models)
+    linear = None if found.linear is None else _average(found.linear, average)
+    return replace(found, models=models, average=average, linear=linear)
+
+
+def _average(entry: Assessment, average: int) -> Assessment:
+    return replace(entry, model=replace(entry.model, average=average))
 
 
 def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:

@@ -10,7 +10,13 @@ from islands.errors import SettingsError, lookup
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.latent_search import search_latent_models
 from islands.estimation.refinement import refine
-from islands.evolution.search_result import SearchResult, SearchStatistics, rank_models, with_bands
+from islands.evolution.search_result import (
+    SearchResult,
+    SearchStatistics,
+    rank_models,
+    with_bands,
+    with_linear_comparison,
+)
 from islands.facade.results.model_simulation import SHOOTING
 from islands.io.models import MODEL_CLASSES, NARX
 from islands.models.latent import LatentModel
@@ -79,6 +85,7 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
         for model in models
     ]
     warm_up = max(model.maximum_lag for model in models)
+    result = with_linear_comparison(result, (), interval, steps)
     return with_bands(result, validated, "none", warm_up, steps)
 
 

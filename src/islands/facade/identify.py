@@ -25,7 +25,13 @@ from islands.evolution.engine import Engine
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with_tuples
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
+from islands.evolution.search_result import (
+    SearchResult,
+    SearchStatistics,
+    with_average,
+    with_bands,
+    with_linear_comparison,
+)
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
 from islands.expressions.primitives import PRIMITIVES
@@ -244,6 +250,7 @@ def identify_record(
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
+    found = with_linear_comparison(found, scaled.library_delays, scaled.shooting, steps)
     banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
     return Result.from_search(with_average(banded, count))
 

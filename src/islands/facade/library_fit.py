@@ -39,6 +39,7 @@ from islands.evolution.search_result import (
     mark_stopped,
     with_average,
     with_bands,
+    with_linear_comparison,
 )
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
@@ -165,6 +166,9 @@ class LibraryFit:
         fit = self if subsets == known else self._fit_again(subsets)
         certificates = {each.terms: each for each in (reduce(combine_certificates, tables) if tables else ())}
         found = replace(fit.found, search=replace(fit.found.search, certificates=certificates))
+        delays = [delay // fit.average for delay in settings["delays"]]
+        shooting = count_means(settings["shooting"], fit.average)
+        found = with_linear_comparison(found, delays, shooting, self.steps)
         banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, fit.steps)
         return with_average(banded, fit.average)
 

@@ -84,6 +84,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             for rank, entry in enumerate(found.models, start=1)
         ],
         "ensemble": ensemble_document(found.ensemble),
+        "linear": None if found.linear is None else _comparison_document(found.linear),
     }
     described: dict[str, Any] = finite(document)
     return described
@@ -139,17 +140,10 @@ def _model_document(
         "named_signals": named_signals(model),
         "terms": terms_in_result(model, ensemble),
         "bands": bands_document(assessment.bands),
-        "metrics": {
-            part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
-        },
-        "outcomes": {
-            part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
-        },
         "recordings": {
             part: {name: asdict(value) for name, value in by_name.items()}
             for part, by_name in assessment.recordings.items()
         },
-        "criterion": criterion_document(assessment.criterion),
         "warm_up": assessment.warm_up,
         "estimated_start": assessment.has_estimated_start,
         "information": asdict(assessment.information),
@@ -157,6 +151,30 @@ def _model_document(
             {**asdict(entry), "named": named_statement(entry.text, require_narx(model))}
             for entry in assessment.constraints
         ],
+        **_assessment_document(assessment),
+    }
+
+
+def _comparison_document(assessment: Assessment) -> dict[str, Any]:
+    """Return the linear model with which the models are compared as JSON values."""
+    written = assessment.model.equation()
+    return {
+        "size": assessment.model.size,
+        "equation": written.line,
+        "named_equation": written.named,
+        **_assessment_document(assessment),
+    }
+
+
+def _assessment_document(assessment: Assessment) -> dict[str, Any]:
+    return {
+        "criterion": criterion_document(assessment.criterion),
+        "metrics": {
+            part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
+        },
+        "outcomes": {
+            part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
+        },
         "physics": physics_document(assessment.physics),
         "residual_tests": residual_tests_document(assessment.residual_tests)
         | residual_structure_document(assessment.residual_structure),

@@ -12,8 +12,10 @@ _HYSTERESIS_COLUMNS = ("drift %", "Property 1")
 
 
 def table(document: Document) -> list[str]:
-    """Return the table of models as lines of equal width. Errors are those of the free run."""
-    lines = [columns(document), *rows(document)]
+    """Return the table of models and of the linear one as lines of equal width, with free-run errors."""
+    hysteresis = ResultFacts(document).claims_hysteresis
+    linear = [_row("lin.", document["linear"], hysteresis)] if document.get("linear") else []
+    lines = [columns(document), *rows(document), *linear]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
 
@@ -37,23 +39,24 @@ def rows(document: Document) -> list[tuple[str, ...]]:
 
 
 def _row(rank: str, entry: Document, hysteresis: bool) -> tuple[str, ...]:
-    metrics, physics = entry["metrics"], entry["physics"]
+    metrics = entry["metrics"]
     estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
     estimated, validated = (entry["outcomes"][part]["free_run"] == "ok" for part in PARTS)
-    holds_bounded = all(hold["bounded"] for hold in physics["holds"])
-    claims = (
-        number(physics["hold_drift_percent"], "{:.3f}", holds_bounded),
-        "yes" if physics["property_1"] else "no",
-    )
     return (
         rank,
         str(entry["size"]),
         number(estimation["mape"], "{:.4f}", estimated),
         number(validation["mape"], "{:.4f}", validated),
         number(validation["r2"], "{:.5f}", validated),
-        *(claims if hysteresis else ()),
+        *(_describe_claims(entry["physics"]) if hysteresis else ()),
         entry["residual_tests"]["verdict"],
     )
+
+
+def _describe_claims(physics: Document) -> tuple[str, str]:
+    bounded = all(hold["bounded"] for hold in physics["holds"])
+    drift = number(physics["hold_drift_percent"], "{:.3f}", bounded)
+    return drift, "yes" if physics["property_1"] else "no"
 
 
 def number(value: float | None, form: str, bounded: bool) -> str:

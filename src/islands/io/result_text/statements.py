@@ -48,6 +48,9 @@ _LEAST_COVERAGE = 0.75
 #: Standard errors below which a parameter is not significant.
 _SIGNIFICANT = 2.0
 
+#: Error of a linear model relative to that of the model below which the model is no better.
+_BETTER_THAN_LINEAR = 1.05
+
 #: Inclusion probability from which a term is certain.
 _CERTAIN = 0.9
 
@@ -311,6 +314,19 @@ class ResultFacts(RunFacts):
         return self.model.get("criterion") or {}
 
     @property
+    def linear(self) -> Document:
+        """Linear model of the same data. Empty if the model is linear, and in results of earlier versions."""
+        return self.document.get("linear") or {}
+
+    @property
+    def linear_ratio(self) -> float | None:
+        """Error of the linear model relative to that of the model; None if that is unknown or exact."""
+        own = self.error()["rmse"]
+        if not self.linear or not own or self.is_rounding(own):
+            return None
+        return float(self.linear["metrics"]["validation"]["free_run"]["rmse"] / own)
+
+    @property
     def has_output_noise(self) -> bool:
         """Whether least squares is biased by noise of the measured output.
 
@@ -565,6 +581,13 @@ def _describe_error(facts: ResultFacts) -> str:
     start = "and initial outputs estimated from its first samples" if estimated else "alone"
     head = f"Error: free run on the validation data, from the inputs {start}, {', '.join(parts)}"
     return f"{head}; one step ahead {_describe_one_step(facts)}."
+
+
+def _describe_linear_model(facts: ResultFacts) -> str:
+    error = facts.linear["metrics"]["validation"]["free_run"]["rmse"]
+    text = f"Linear model: RMSE {facts.write_amount(error)} with {facts.linear['size']} terms"
+    ratio = facts.linear_ratio
+    return f"{text}." if ratio is None else f"{text}, {ratio:.3g} times the error of this model."
 
 
 def _describe_one_step(facts: ResultFacts) -> str:
@@ -877,6 +900,7 @@ MEASURES: Final[tuple[Statement[ResultFacts], ...]] = (
             f"{_describe_one_step(facts)}."
         ),
     ),
+    Statement("linear-model", lambda facts: facts.linear, _describe_linear_model),
     Statement(
         "recordings",
         lambda facts: facts.model.get("recordings", {}).get("validation"),
@@ -976,6 +1000,11 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
         lambda facts: f"diverges in {facts.lost_holds} of {len(facts.physics['holds'])} holds of the inputs",
     ),
     Statement("implausible-extremes", lambda facts: facts.implausible, _describe_implausible),
+    Statement(
+        "no-better-than-linear",
+        lambda facts: facts.linear_ratio is not None and facts.linear_ratio < _BETTER_THAN_LINEAR,
+        lambda facts: f"no better than a linear model of {facts.linear['size']} terms",
+    ),
     Statement(
         "drift",
         lambda facts: (

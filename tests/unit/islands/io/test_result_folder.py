@@ -57,7 +57,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
     assert list(result) == [
         *("schema", "record", "preprocessing", "seed", "settings", "search", "data", "loop"),
-        *("recommended", "models", "ensemble"),
+        *("recommended", "models", "ensemble", "linear"),
     ]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == [
@@ -70,17 +70,8 @@ def test_a_result_has_every_field_of_the_contract(findings):
     for model in result["models"]:
         assert list(model) == [
             *("rank", "recommended", "size", "equation", "latex", "signals", "named_equation"),
-            *("named_signals", "terms", "bands", "metrics"),
-            *(
-                "outcomes",
-                "recordings",
-                "criterion",
-                "warm_up",
-                "estimated_start",
-                "information",
-                "constraints",
-                "physics",
-            ),
+            *("named_signals", "terms", "bands", "recordings", "warm_up", "estimated_start", "information"),
+            *("constraints", "criterion", "metrics", "outcomes", "physics"),
             "residual_tests",
         ]
         for term in model["terms"]:

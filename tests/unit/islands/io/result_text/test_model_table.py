@@ -42,7 +42,8 @@ def first_cells(findings, **changes):
 def test_the_table_has_a_row_per_model_and_aligned_columns(findings):
     head, *lines = model_table.table(result_document(findings))
     assert head.split("  ")[0] == "rank"
-    assert len(lines) == len(findings.models)
+    assert len(lines) == len(findings.models) + 1
+    assert lines[-1].split()[:2] == ["lin.", str(findings.linear.model.size)]
     assert len({len(line) for line in (head, *lines)}) == 1
     first = findings.models[0]
     cells = first_cells(findings)

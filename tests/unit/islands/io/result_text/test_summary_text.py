@@ -68,7 +68,7 @@ def test_the_summary_begins_with_sentences_and_contains_the_table(findings):
     first, _equation, *sentences = describe(findings)
     for sentence in (first, *sentences):
         assert sentence.strip() in " ".join(text.split())
-    assert lines[-6:-1] == table(result_document(findings))
+    assert lines[-7:-1] == table(result_document(findings))
     assert lines[-1].startswith("* recommended; ranked by")
     assert max(map(len, lines)) <= 80
 
