@@ -1,5 +1,6 @@
 /** Plot of the output over an input on a canvas: a loop, whose abscissas do not increase. */
 
+import { clearCanvas, theme } from "../lib/canvas.js";
 import { el } from "../lib/dom.js";
 import { formatNumber, formatShort } from "../lib/numbers.js";
 import { makeScale } from "../lib/scale.js";
@@ -26,10 +27,7 @@ export function makeLoopPlot(title, signal) {
   function render() {
     const width = plot.clientWidth;
     if (!width || axes === null) return;
-    const ratio = devicePixelRatio || 1;
-    [canvas.width, canvas.height] = [width * ratio, HEIGHT * ratio];
-    const pen = canvas.getContext("2d");
-    pen.scale(ratio, ratio);
+    const pen = clearCanvas(canvas, [width, HEIGHT]);
     const style = getComputedStyle(plot);
     const colour = (name) => style.getPropertyValue(name);
     pen.font = `11.5px ${style.fontFamily}`;
@@ -81,7 +79,7 @@ export function makeLoopPlot(title, signal) {
     `${label} from ${limits.map((each) => formatNumber(each)).join(" to ")}`;
   const observer = new ResizeObserver(render);
   observer.observe(plot);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", render, { signal });
+  theme.addEventListener("change", render, { signal });
   signal.addEventListener("abort", () => observer.disconnect(), { once: true });
   return {
     node: el("figure", { class: "chart" }, el("figcaption", {}, el("h3", {}, title)), plot),

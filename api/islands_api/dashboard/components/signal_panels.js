@@ -1,5 +1,6 @@
 /** Drawing of a signal plot on a canvas: its panels, with marked ranges and rows behind them. */
 
+import { clearCanvas } from "../lib/canvas.js";
 import { formatShort } from "../lib/numbers.js";
 import { makeScale } from "../lib/scale.js";
 import { drawEnvelope, drawNames, strokeLine } from "./signal_lines.js";
@@ -93,17 +94,6 @@ export const readColours = (style) => ({
   ...Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`)])),
   font: `11.5px ${style.fontFamily}`,
 });
-
-/** Return the pen of a canvas of a size, which is empty. A new size is a new memory of pixels. */
-function clearCanvas(canvas, size) {
-  const ratio = devicePixelRatio || 1;
-  const [width, height] = size.map((each) => Math.round(each * ratio));
-  const pen = canvas.getContext("2d");
-  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-  else pen.reset();
-  pen.scale(ratio, ratio);
-  return pen;
-}
 
 /**
  * Draw a plot. `view` has its `panels`, the `range` of rows, the sampling time `dt`, the `answers` that show

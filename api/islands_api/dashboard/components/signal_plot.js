@@ -6,6 +6,7 @@
  * before a frame of the screen are one drawing; a drawing reads nothing that needs a new layout.
  */
 
+import { theme } from "../lib/canvas.js";
 import { el, setText } from "../lib/dom.js";
 import { formatCount, formatNumber, formatShort } from "../lib/numbers.js";
 import { LEFT, RIGHT, drawSignals, makeRowScale, readColours } from "./signal_panels.js";
@@ -209,7 +210,6 @@ export function makeSignalPlot({ samples, dt, ask, label = "Record" }, ranges, s
     load();
   });
   observer.observe(plot);
-  const theme = matchMedia("(prefers-color-scheme: dark)");
   theme.addEventListener("change", () => {
     colours = null;
     draw();

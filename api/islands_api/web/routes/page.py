@@ -92,6 +92,7 @@ FILES = {
     "components/try_model.js": _SCRIPT,
     "components/size_front.js": _SCRIPT,
     "lib/api.js": _SCRIPT,
+    "lib/canvas.js": _SCRIPT,
     "lib/clock.js": _SCRIPT,
     "lib/dom.js": _SCRIPT,
     "lib/numbers.js": _SCRIPT,
