@@ -1,23 +1,27 @@
 """Charts, scales and number formats, tested in the browser."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
+from support.canvas import DRAWN, count_segments, get_drawn, get_faint_lines, get_lines
+from support.processes import eventually
 from support.screen import Screen
 from support.service_processes import Service
 
 pytestmark = pytest.mark.ci
 
-CHART = """async ({ options, series }) => {
+CHART = """async ({ options, series, events }) => {
   const { makeLineChart } = await import("/dashboard/components/chart.js");
   const labels = { title: "Errors", x: { label: "generation" }, y: { label: "RMS error" } };
-  const chart = makeLineChart({ ...labels, ...options });
+  window.leave?.abort();
+  window.leave = new AbortController();
+  window.chart = makeLineChart({ ...labels, ...options }, leave.signal);
   document.getElementById("main").replaceChildren(chart.node);
-  chart.draw(series);
+  chart.draw(series, events);
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }"""
 
@@ -39,23 +43,30 @@ def call(page: Any, module: str, name: str, *arguments: Any) -> Any:
     return page.evaluate(script, [module, name, arguments])
 
 
-def draw(page: Any, series: list[dict[str, Any]], **options: Any) -> Any:
-    page.evaluate(CHART, {"options": options, "series": series})
+def make_series(name: str, points: Sequence[Sequence[float | None]], **more: Any) -> dict[str, Any]:
+    x, y = zip(*points, strict=True) if points else ([], [])
+    return {"name": name, "x": x, "y": y, **more}
+
+
+def draw(
+    page: Any, series: list[dict[str, Any]], events: Sequence[dict[str, Any]] = (), **options: Any
+) -> Any:
+    page.evaluate(CHART, {"options": options, "series": series, "events": events})
     return page.locator("figure.chart")
 
 
 def heights(chart: Any, name: str) -> list[float]:
-    """Return the ordinates of the path of a line."""
-    path = chart.locator(f"path[data-name='{name}']").get_attribute("d")
-    return [float(point.split()[1]) for point in path.replace("M", "L").split("L")[1:]]
+    """Return the ordinates of a line."""
+    return [y for part in get_lines(chart)[name] for _, y in part]
 
 
 def test_long_tick_labels_do_not_cover_the_title_of_the_axis(page: Any) -> None:
-    chart = draw(page, [{"name": "a", "points": [[0, 1.02345e-4], [1, 1.02346e-4]]}])
-    assert max(map(len, chart.locator("text.tick.end").all_text_contents())) > 8
-    title = chart.get_by_text("RMS error").bounding_box()
-    for tick in chart.locator("text.tick.end").all():
-        assert tick.bounding_box()["x"] > title["x"] + title["width"]
+    chart = draw(page, [make_series("a", [[0, 1.02345e-4], [1, 1.02346e-4]])])
+    texts = get_drawn(chart)["texts"]
+    ticks = [each for each in texts if each["align"] == "end"]
+    assert max(len(each["text"]) for each in ticks) > 8
+    (title,) = [each for each in texts if each["text"] == "RMS error"]
+    assert 0 <= title["left"] < title["right"] < min(each["left"] for each in ticks)
 
 
 @pytest.mark.parametrize(
@@ -76,16 +87,20 @@ def test_an_interval_has_two_digits_and_its_value_as_many_decimals(
 
 def test_equal_ratios_are_equal_distances_on_a_logarithmic_axis(page: Any) -> None:
     points = [[at, 10.0**-at] for at in range(5)]
-    drawn = heights(draw(page, [{"name": "a", "points": points}], **LOG), "a")
+    drawn = heights(draw(page, [make_series("a", points)], **LOG), "a")
     steps = [below - above for above, below in pairwise(drawn)]
     assert len(steps) == 4
     assert all(math.isclose(step, steps[0], abs_tol=0.11) and step > 20 for step in steps)
 
 
 def test_every_series_has_its_line_and_its_last_value_in_the_legend(page: Any) -> None:
-    series = [{"name": f"island {i}", "points": [[0, 1.0 * i], [5, 0.5 * i]]} for i in (1, 2, 3)]
+    series = [make_series(f"island {i}", [[0, 1.0 * i], [5, 0.5 * i]]) for i in (1, 2, 3)]
     chart = draw(page, series, **LOG)
-    assert chart.locator("path.line[data-name]").count() == 3
+    assert [count_segments(parts) for parts in get_lines(chart).values()] == [1, 1, 1]
+    assert chart.locator("canvas").evaluate(DRAWN) > 100
+    # On a logarithmic axis, lines through multiples of the same values are parallel.
+    drops = [heights(chart, f"island {i}")[1] - heights(chart, f"island {i}")[0] for i in (1, 2, 3)]
+    assert drops == pytest.approx([drops[0]] * 3)
     assert chart.locator(".legend li").all_text_contents() == [
         "island 1 0.500",
         "island 2 1.00",
@@ -96,34 +111,33 @@ def test_every_series_has_its_line_and_its_last_value_in_the_legend(page: Any) -
 
 def test_faint_series_are_drawn_without_an_entry_in_the_legend(page: Any) -> None:
     points = [[0, 1.0], [1, 0.5]]
-    chart = draw(page, [{"name": "one", "points": points, "faint": True}, {"name": "best", "points": points}])
-    assert chart.locator("path.faint").count() == 1
+    chart = draw(page, [make_series("one", points, faint=True), make_series("best", points)])
+    assert get_faint_lines(chart) == get_lines(chart)["best"]
     assert chart.locator(".legend li").all_text_contents() == ["best 0.500"]
 
 
 def test_a_line_is_interrupted_at_missing_or_nonpositive_values(page: Any) -> None:
     points = [[0, 1.0], [1, None], [2, 0.1], [3, 0.0], [4, 0.01], [5, -1.0]]
-    path = draw(page, [{"name": "a", "points": points}], **LOG).locator("path[data-name]").get_attribute("d")
-    assert (path.count("M"), path.count("L")) == (3, 0)
-    assert "NaN" not in path
-    assert "Infinity" not in path
+    parts = get_lines(draw(page, [make_series("a", points)], **LOG))["a"]
+    assert [len(part) for part in parts] == [1, 1, 1]
+    assert all(math.isfinite(each) for part in parts for point in part for each in point)
 
 
 def test_a_chart_without_data_is_hidden(page: Any) -> None:
     for points in ([], [[0, None]], [[0, 0.0]]):
-        assert draw(page, [{"name": "a", "points": points}], **LOG).is_hidden()
+        assert draw(page, [make_series("a", points)], **LOG).is_hidden()
 
 
 def test_a_single_point_and_a_constant_are_drawn(page: Any) -> None:
     for points in ([[3, 0.2]], [[0, 0.2], [1, 0.2]]):
         for options in (LOG, {}):
-            drawn = heights(draw(page, [{"name": "a", "points": points}], **options), "a")
+            drawn = heights(draw(page, [make_series("a", points)], **options), "a")
             assert len(drawn) == len(points)
             assert all(10 <= height <= 214 for height in drawn)
 
 
 def test_arrow_keys_move_the_pointer_and_announce_the_values(page: Any) -> None:
-    series = [{"name": "a", "points": [[at, 1.0 / (at + 1)] for at in range(0, 50, 5)]}]
+    series = [make_series("a", [[at, 1.0 / (at + 1)] for at in range(0, 50, 5)])]
     plot = draw(page, series, **LOG).get_by_role("slider", name="Errors")
     plot.focus()
     for key, said in {
@@ -138,7 +152,7 @@ def test_arrow_keys_move_the_pointer_and_announce_the_values(page: Any) -> None:
 
 
 def test_the_mouse_shows_the_value_under_it_until_it_leaves(page: Any) -> None:
-    chart = draw(page, [{"name": "a", "points": [[at, float(at + 1)] for at in range(11)]}])
+    chart = draw(page, [make_series("a", [[at, float(at + 1)] for at in range(11)])])
     box = chart.locator(".plot").bounding_box()
     page.mouse.move(box["x"] + 58 + 1, box["y"] + 50)
     assert chart.locator(".legend").text_content() == "a 1.00"
@@ -146,29 +160,89 @@ def test_the_mouse_shows_the_value_under_it_until_it_leaves(page: Any) -> None:
     assert chart.locator(".legend").text_content() == "a 11.0"
 
 
+#: Draws a line of one more point in each of 40 frames, twice; returns the number of drawings, the texts of
+#: the position and the seconds.
+STREAM = """async () => {
+  const chart = document.querySelector("figure.chart");
+  const [canvas, position] = ["canvas", ".position"].map((each) => chart.querySelector(each));
+  const nextFrame = () => new Promise((done) => requestAnimationFrame(done));
+  const [drawings, begin, texts] = [canvas.drawings, performance.now(), []];
+  new MutationObserver(() => texts.push(position.textContent)).observe(position, { childList: true });
+  const x = [0];
+  for (let frame = 1; frame <= 40; frame += 1) {
+    for (const part of [0, 0.5]) {
+      x.push(frame + part);
+      window.chart.draw([{ name: "a", x, y: x }]);
+    }
+    await nextFrame();
+  }
+  const seconds = (performance.now() - begin) / 1000;
+  await nextFrame();
+  return [canvas.drawings - drawings, texts, seconds];
+}"""
+
+
+def test_changes_before_a_frame_are_one_drawing_and_texts_can_be_read(page: Any, expect: Any) -> None:
+    chart = draw(page, [make_series("a", [[0, 0.0]])])
+    drawings, texts, seconds = page.evaluate(STREAM)
+    assert 35 <= drawings <= 42
+    assert 1 <= len(texts) <= seconds / 0.25 + 1
+    expect(chart.locator(".position")).to_have_text("generation 40.5")
+    expect(chart.locator(".legend")).to_have_text("a 40.5")
+    assert count_segments(get_lines(chart)["a"]) == 80
+
+
+@pytest.mark.parametrize("change", [{"color_scheme": "dark"}, {"forced_colors": "active"}])
+def test_a_change_of_the_theme_changes_the_colours_of_a_chart(page: Any, change: dict[str, str]) -> None:
+    chart = draw(page, [make_series("a", [[0, 1.0], [1, 2.0]])])
+    before = {each["colour"] for each in get_drawn(chart)["texts"]}
+    page.emulate_media(**change)
+    try:
+        eventually(lambda: {each["colour"] for each in get_drawn(chart)["texts"]}.isdisjoint(before))
+        # The line has the colour of its swatch in the legend, and texts that of `--soft`.
+        assert count_segments(get_lines(chart)["a"]) == 1
+        soft = """(node) => {
+          const pen = document.createElement("canvas").getContext("2d");
+          pen.fillStyle = getComputedStyle(node).color;
+          return pen.fillStyle;
+        }"""
+        colours = {each["colour"] for each in get_drawn(chart)["texts"]}
+        assert colours == {chart.locator(".position").evaluate(soft)}
+    finally:
+        page.emulate_media(color_scheme="light", forced_colors="none")
+
+
+def test_an_event_is_a_line_over_the_series_or_a_band_behind_them(page: Any) -> None:
+    events = [{"kind": "alarm", "at": 2}, {"kind": "training", "from": 0, "to": 1}]
+    chart = draw(page, [make_series("a", [[0, 1.0], [1, 2.0], [2, 1.5]])], events)
+    (line,) = get_lines(chart)["a"]
+    drawn = get_drawn(chart)
+    (band,) = drawn["bands"]
+    assert (band["x"], band["width"]) == pytest.approx((line[0][0] - 3, line[1][0] - line[0][0] + 6))
+    assert {at for at, _ in drawn["lines"][-1]["parts"][0]} == {line[2][0]}
+
+
 def test_the_name_of_a_series_is_not_interpreted_as_markup(page: Any) -> None:
     name = "<img src=x onerror=alert(1)>"
-    chart = draw(page, [{"name": name, "points": [[0, 1.0], [1, 2.0]]}])
+    chart = draw(page, [make_series(name, [[0, 1.0], [1, 2.0]])])
     assert chart.locator(".legend li").text_content() == f"{name} 2.00"
     assert page.locator("img[src=x]").count() == 0
 
 
 def test_downsampling_keeps_the_ends_and_the_extremes(page: Any) -> None:
-    points = [[at, math.sin(at / 300)] for at in range(10_000)]
-    points[4321][1], points[8765][1] = 50.0, -50.0
-    thin = call(page, "components/chart.js", "downsample", points, 100)
-    assert len(thin) <= 2 * 100 + 2
-    assert thin[0] == points[0]
-    assert thin[-1] == points[-1]
-    assert points[4321] in thin
-    assert points[8765] in thin
-    assert [point[0] for point in thin] == sorted({point[0] for point in thin})
+    values = [math.sin(at / 300) for at in range(10_000)]
+    values[4321], values[8765] = 50.0, -50.0
+    places = call(page, "components/chart_drawing.js", "downsample", values, 100)
+    assert len(places) <= 2 * 100 + 2
+    assert {0, 4321, 8765, 9999} <= set(places)
+    assert places == sorted(set(places))
 
 
 def test_the_nearest_point_matches_an_exhaustive_search(page: Any) -> None:
-    points = [[0, 1], [2, 2], [10, 3]]
-    for x, expected in ((-5, 0), (0.9, 0), (1.1, 2), (5.9, 2), (6.1, 10), (99, 10)):
-        assert call(page, "components/chart.js", "findNearest", points, x)[0] == expected
+    abscissas = [0, 2, 10]
+    for x, expected in ((-5, 0), (0.9, 0), (1.1, 1), (5.9, 1), (6.1, 2), (99, 2)):
+        assert call(page, "components/chart.js", "findNearest", abscissas, x) == expected
+    assert call(page, "components/chart.js", "findNearest", [], 1) == -1
 
 
 @pytest.mark.parametrize(
@@ -228,17 +302,40 @@ def test_durations_are_formatted_with_their_largest_units(page: Any, seconds: fl
     assert call(page, "lib/numbers.js", "formatDuration", seconds) == written
 
 
+def list_island_errors(page: Any, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the series of errors that arrive point by point."""
+    script = """async (points) => {
+      const { makeIslandErrors } = await import("/dashboard/components/convergence.js");
+      const errors = makeIslandErrors();
+      for (const point of points) errors.add([point]);
+      return errors.list();
+    }"""
+    series: list[dict[str, Any]] = page.evaluate(script, points)
+    return series
+
+
 def test_many_islands_are_summarised_by_best_and_worst(page: Any) -> None:
     points = [{"generation": g, "islands": [4.0 ** -(i % 3) for i in range(20)]} for g in range(3)]
     points[0]["islands"][0] = None
-    series = call(page, "components/convergence.js", "makeIslandSeries", points)
-    named = [each for each in series if not each.get("faint")]
+    series = list_island_errors(page, points)
+    named = [each for each in series if not each["faint"]]
     assert len(series) == 22
-    assert [(each["name"], each["points"][-1][1]) for each in named] == [
+    assert [(each["name"], each["y"][-1]) for each in named] == [
         ("best of 20 islands", 0.25),
         ("worst of 20 islands", 1.0),
     ]
-    assert series[0]["points"][0][1] is None
+    assert series[0]["y"][0] is None
+    assert [each["x"] for each in series] == [[0, 1, 2]] * 22
+
+
+def test_the_errors_of_a_long_search_are_those_of_spread_generations(page: Any) -> None:
+    points = [{"generation": g, "islands": [1.0 + g, 4.0 + g]} for g in range(5000)]
+    series = list_island_errors(page, points)
+    assert [each["name"] for each in series] == ["island 1", "island 2"]
+    for each, first in zip(series, (1.0, 4.0), strict=True):
+        assert 300 <= len(each["x"]) <= 600
+        assert (each["x"][0], each["x"][-1]) == (0, 4999)
+        assert each["y"] == pytest.approx([math.sqrt(first + g) for g in each["x"]])
 
 
 def test_a_cached_figure_does_not_change_the_clock(page: Any) -> None:

@@ -10,8 +10,10 @@ import pytest
 from islands_service.domain.job import ProgressReport
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
+from support.canvas import count_segments, get_drawn, get_lines
 from support.coordinators import SerialCoordinator
 from support.played import advance, stored
+from support.processes import eventually
 from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
@@ -75,13 +77,13 @@ def test_the_front_grows_and_its_points_show_their_equations(
 ) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go(f"#/jobs/{job}")
-    equation, chart = page.locator(".live .equation"), page.locator(".live figure.chart")
+    equation, chart = page.locator(".live .equation"), page.locator(".live > figure.chart")
     with stored(desk) as store:
         lease = taken(store, job)
         expect(page.locator(".live")).to_be_hidden()
         for last in (40, 90):
             advance(store, lease, last - 1, last)
-            expect(chart.locator("circle.line")).to_have_count(5)
+            eventually(lambda: len(get_drawn(chart)["circles"]) == 5)
             expect(equation).to_have_text(
                 "y_um(k) = " + " + ".join(f"{last}*y_um(k-{n})" for n in range(1, 6))
             )
@@ -109,8 +111,7 @@ def test_stop_and_keep_the_best_ends_a_search_with_models(
     run = page.locator(".search-run")
     expect(run.locator(".legend li")).to_contain_text(["measured", "free run"])
     expect(run).to_contain_text(re.compile(r"\d+ terms?, generation [\d ]+, over the estimation data\."))
-    drawn = run.locator(".plot path.line").evaluate_all("(all) => all.map((each) => each.getAttribute('d'))")
-    assert [len(each) > 500 for each in drawn] == [True, True]
+    eventually(lambda: [count_segments(parts) > 50 for parts in get_lines(run).values()] == [True, True])
     # Its equation is shown, and the search still improves it.
     terms = run.locator("p.small").inner_text().split(",")[0]
     expect(page.locator(".live-model")).to_contain_text(f": {terms}, error")

@@ -11,10 +11,12 @@ from islands.diagnosis.documents.monitor_json import describe_status, monitor_do
 from islands.diagnosis.documents.monitor_state import SavedMonitor
 from islands.io.records import write_record
 from islands_service.domain.job import JobOutcome, JobState
+from support.canvas import get_drawn
 from support.monitor_updates import store_monitor
 from support.monitored_oscillator import ONSET, follow, make_records, undisturbed_monitor
 from support.monitoring_jobs import OSCILLATOR
 from support.played import stored
+from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_processes import Service
@@ -55,6 +57,12 @@ def store_states(desk: Service, monitor: str, job: str, saved: SavedMonitor) -> 
         store_monitor(store, monitor, saved)
         summary = {"status": describe_status(saved.state), "words": "analysed"}
         store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}, summary=summary))
+
+
+def get_alarms(chart: Any) -> list[Any]:
+    """Return the lines of the alarms of a chart, which differ from others in their width."""
+    lines = get_drawn(chart)["lines"]
+    return [each["parts"][0] for each in lines if round(each["width"], 2) == 1.4 and not each["dash"]]
 
 
 @pytest.fixture(scope="module")
@@ -108,12 +116,13 @@ def test_the_page_of_a_monitor_follows_its_records_and_marks_the_alarm(
     titles = [*names, "Scores of further effects", "Noise", "Test statistic"]
     expect(page.locator("figure.chart h3")).to_have_text(titles)
     for chart in page.locator("figure.chart").all():
-        assert chart.locator("line.alarm").count() == len(changed.state.alarms)
-    assert page.locator("figure.chart").first.locator("line.interval").count() == COUNT
+        eventually(lambda chart=chart: len(get_alarms(chart)) == len(changed.state.alarms))
+    first = page.locator("figure.chart").first
+    (intervals,) = [each for each in get_drawn(first)["lines"] if each["alpha"] == 0.55]
+    assert len(intervals["parts"]) == COUNT
     # The alarm is at the point of the record that raised it.
-    at = alarm["record"]["index"]
-    line, point = page.locator("line.alarm").first, page.locator("figure.chart").first.locator("circle")
-    assert line.get_attribute("x1") == point.nth(at).get_attribute("cx")
+    point = get_drawn(first)["circles"][alarm["record"]["index"]]
+    assert get_alarms(first)[-1][0][0] == point["at"][0]
     expect(page.locator(".records tbody tr")).to_have_count(25)
     page.get_by_role("button", name="Show older records").click()
     expect(page.locator(".records tbody tr")).to_have_count(COUNT)

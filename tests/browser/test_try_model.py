@@ -6,14 +6,18 @@ from typing import Any
 
 import pytest
 
+from support.canvas import count_segments, get_lines
 from support.played import run_submitted
+from support.processes import eventually
 from support.reading import unreadable
 from support.service_processes import Service
 
 pytestmark = pytest.mark.ci
 
-#: Data of the path of the response.
-DRAWN = "() => document.querySelector('.try path[data-name=y_um]').getAttribute('d')"
+
+def get_response(page: Any) -> list[Any]:
+    """Return the drawn line of the response."""
+    return get_lines(page.locator(".try figure.chart").first)["y_um"]
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +45,8 @@ def tried(opened: Callable[..., Any], finished: str, expect: Any) -> Callable[..
 def test_a_slider_changes_the_response_and_the_warning(tried: Callable[..., Any], expect: Any) -> None:
     page = tried()
     expect(page.locator(".try .warnings li")).to_have_count(0)
-    before = page.evaluate(DRAWN)
+    eventually(lambda: count_segments(get_response(page)) > 50)
+    before = get_response(page)
     slider = page.get_by_role("slider", name="Amplitude")
     value, text = page.get_by_label("Amplitude (").input_value(), slider.get_attribute("aria-valuetext")
     assert text.endswith(" V")
@@ -49,10 +54,10 @@ def test_a_slider_changes_the_response_and_the_warning(tried: Callable[..., Any]
     expect(page.locator(".try .warnings li").first).to_contain_text("in the estimation data")
     assert float(page.get_by_label("Amplitude (").input_value()) == pytest.approx(2 * float(value), rel=1e-3)
     assert slider.get_attribute("aria-valuetext") != text
-    assert page.evaluate(DRAWN) != before
+    eventually(lambda: get_response(page) != before)
     page.get_by_label("Amplitude (").fill(value)
     expect(page.locator(".try .warnings li")).to_have_count(0)
-    assert page.evaluate(DRAWN) == before
+    eventually(lambda: get_response(page) == before)
 
 
 def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect: Any) -> None:

@@ -1,18 +1,22 @@
-"""Browser page with its errors and its requests to other origins."""
+"""Browser page with its errors, its requests to other origins, and its drawings."""
 
 from typing import Any
+
+from support.canvas import RECORD_DRAWING
 
 
 class Screen:
     """Browser page of the dashboard.
 
     ``complaints`` has the errors and warnings of the page, ``foreign`` the URLs of requests to other origins.
+    What canvases show is read with `support.canvas`.
     """
 
     def __init__(self, page: Any, origin: str) -> None:
         self.page, self.origin = page, origin
         self.complaints: list[str] = []
         self.foreign: list[str] = []
+        page.add_init_script(RECORD_DRAWING)
         page.on("console", self._record_message)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("dialog", self._dismiss_dialog)

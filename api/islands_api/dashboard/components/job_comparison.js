@@ -46,8 +46,6 @@ export const listEquations = (entries) =>
     el("div", { class: "compared" }, el("h3", {}, name), el("code", {}, model.equation)),
   );
 
-const getPoints = (times, values) => times.map((time, at) => [time, values[at]]);
-
 /** Return the models by the signal that they are compared with: its times and values. */
 function groupByMeasured(entries) {
   const groups = new Map();
@@ -59,7 +57,7 @@ function groupByMeasured(entries) {
   return [...groups.values()];
 }
 
-function makeOverlay(group, isOnly) {
+function makeOverlay(group, isOnly, signal) {
   const [first] = group;
   const { output } = first.job.spec;
   const unit = getUnit(first);
@@ -68,38 +66,40 @@ function makeOverlay(group, isOnly) {
     title: isOnly ? `Measured and simulated ${output}` : `Validation data of ${names}`,
     x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
     y: { label: labelQuantity(output, unit) },
-  });
-  const { time_s: times, measured } = first.simulation;
+  }, signal);
+  const { time_s: x, measured } = first.simulation;
   chart.draw([
-    { name: "measured", points: getPoints(times, measured) },
-    ...group.map(({ name, simulation }) => ({ name, points: getPoints(times, simulation.free_run) })),
+    { name: "measured", x, y: measured },
+    ...group.map(({ name, simulation }) => ({ name, x, y: simulation.free_run })),
   ]);
   return chart.node;
 }
 
 /** Make a chart for each validation data, with the free runs of all models that have them. */
-export function makeOverlays(entries) {
+export function makeOverlays(entries, signal) {
   const groups = groupByMeasured(entries);
   if (!groups.length) return [el("p", { class: "soft" }, "Models of several outputs have no common chart.")];
-  return groups.map((group) => makeOverlay(group, groups.length === 1));
+  return groups.map((group) => makeOverlay(group, groups.length === 1, signal));
 }
 
 /** Make the chart of the errors of all models of each job against their numbers of terms. */
-export function makeFrontChart(entries) {
+export function makeFrontChart(entries, signal) {
   const chart = makeLineChart({
     title: "Validation error of all models of each job",
     x: { label: "terms", integer: true },
     y: { label: "error of the free run (%)", log: true },
     marks: true,
-  });
+  }, signal);
   const jobs = [...new Map(entries.map((entry) => [entry.job.id, entry])).values()];
   chart.draw(
-    jobs.map(({ models, jobName }) => ({
-      name: jobName,
-      points: models
-        .map((model) => [model.size, getFreeRun(model, "validation").mape ?? null])
-        .sort(([one], [other]) => one - other),
-    })),
+    jobs.map(({ models, jobName }) => {
+      const sorted = models.toSorted((one, other) => one.size - other.size);
+      return {
+        name: jobName,
+        x: sorted.map(({ size }) => size),
+        y: sorted.map((model) => getFreeRun(model, "validation").mape),
+      };
+    }),
   );
   return chart.node;
 }

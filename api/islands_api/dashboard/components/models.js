@@ -284,7 +284,7 @@ export function makeModelsPanel(job, rank, unit, signal) {
         + "not an independent test.",
     );
     const overview = makeScrollable("Models", makeModelTable(job.id, models));
-    front = makeModelFront(job, models, unit);
+    front = makeModelFront(job, models, unit, signal);
     const islands = job.progress?.islands?.length ?? 0;
     const figures = makeSearchFigures(job.id, islands, signal);
     const compare = makeCompareChoice(job, models) ?? "";

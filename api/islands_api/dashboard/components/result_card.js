@@ -20,13 +20,12 @@ function findHalfWidth({ band }) {
 }
 
 /** Make the chart of measured and simulated output, with the band as its background. */
-function drawSimulation(chart, { time_s: times, measured, free_run: free, band }) {
-  const points = (values) => times.map((time, at) => [time, values[at]]);
+function drawSimulation(chart, { time_s: x, measured, free_run: free, band }) {
   const limits = band ? [band.lower, band.upper] : [];
   chart.draw([
-    ...limits.map((values, at) => ({ name: `limit ${at}`, points: points(values), faint: true })),
-    { name: "measured", points: points(measured) },
-    { name: "free run", points: points(free) },
+    ...limits.map((y, at) => ({ name: `limit ${at}`, x, y, faint: true })),
+    { name: "measured", x, y: measured },
+    { name: "free run", x, y: free },
   ]);
 }
 
@@ -65,7 +64,7 @@ export function makeResultCard(job, unit, columns, signal) {
     title: "Free run on the validation data",
     x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
     y: { label: labelQuantity(job.spec.output, unit) },
-  });
+  }, signal);
   const note = el("p", { class: "loading" }, "Simulating the validation data…");
   showFacts(NaN);
   getJson(`${path}/simulation`, { signal }).then(

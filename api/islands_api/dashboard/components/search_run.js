@@ -7,12 +7,13 @@ import { makeLineChart } from "./chart.js";
 
 /** Return the points of a signal, with the least and the greatest value of every part. */
 function listPoints({ rows, start, dt, samples }, { minimum, maximum }) {
-  const isWhole = rows.length === samples;
-  return rows.flatMap((row, part) => {
-    const [at, low, high] = [start + row * dt, minimum[part], maximum[part]];
+  const times = rows.map((row) => start + row * dt);
+  if (rows.length === samples) return { x: times, y: minimum };
+  return {
+    x: times.flatMap((at) => [at, at]),
     // The line enters a part at one extreme and leaves it at the other.
-    return isWhole ? [[at, low]] : part % 2 ? [[at, high], [at, low]] : [[at, low], [at, high]];
-  });
+    y: minimum.flatMap((low, part) => (part % 2 ? [maximum[part], low] : [low, maximum[part]])),
+  };
 }
 
 /** Make the chart; `show(mark)` loads the free run when its mark in the progress of the job has changed. */
@@ -21,7 +22,7 @@ export function makeSearchRun(job, unit, signal) {
     title: "Free run of the best model so far",
     x: { label: "time (s)", describe: (at) => `${formatShort(at)} s` },
     y: { label: [job.spec.output, unit && `(${unit})`].filter(Boolean).join(" ") },
-  });
+  }, signal);
   const statement = el("p", { class: "soft small" });
   const node = el("div", { class: "search-run", hidden: true }, chart.node, statement);
   let [shown, wanted, isLoading] = [null, null, false];
@@ -43,11 +44,9 @@ export function makeSearchRun(job, unit, signal) {
   }
 
   function draw(found) {
-    const lines = found.outputs.map((each) => ({
-      name: each.name.replace("_", " "),
-      points: listPoints(found, each),
-    }));
-    chart.draw(lines);
+    chart.draw(
+      found.outputs.map((each) => ({ name: each.name.replace("_", " "), ...listPoints(found, each) })),
+    );
     const outcome = found.outcome === "ok" ? "" : ` (${found.outcome})`;
     setText(
       statement,

@@ -8,13 +8,13 @@ import { isEnded } from "./job_state.js";
 import { makeSearchRun } from "./search_run.js";
 
 /** Make a chart of errors by size. */
-const makeChart = (title, error, unit) =>
+const makeChart = (title, error, unit, signal) =>
   makeLineChart({
     title,
     x: { label: "terms", integer: true },
     y: { label: unit ? `${error} / ${unit}` : error, log: true },
     marks: true,
-  });
+  }, signal);
 
 /** Call `choose(x)` for a chosen point of a line chart; `chooses` says to screen readers what that does. */
 function letChoose(chart, chooses, choose) {
@@ -39,7 +39,10 @@ function getFront({ front, best_by_size: best = {} } = {}) {
   return errors.filter(({ error }) => Number.isFinite(error)).sort((a, b) => a.size - b.size);
 }
 
-/** Make the panel; `show(job)` updates it. It is hidden before the first models, and with a result. */
+/**
+ * Make the panel; `draw(job)` updates its chart, and then `show(job)` the rest. It is hidden before the first
+ * models, and with a result.
+ */
 export function makeLivePanel(job, unit, signal) {
   const equation = el("code", { class: "plain" });
   const host = makeScrollable("Equation of the best model so far", equation);
@@ -48,9 +51,10 @@ export function makeLivePanel(job, unit, signal) {
   const statement = el("p", { class: "soft small" });
   let [front, size, simulated] = [[], null, null];
   const run = makeSearchRun(job, unit, signal);
-  const chart = makeChart("Front of size against error", "RMS error", unit);
+  const chart = makeChart("Front of size against error", "RMS error", unit, signal);
   letChoose(chart, "shows the equation of a point", (at) => {
     size = at;
+    drawFront();
     showModel();
   });
   const preliminary = el(
@@ -68,10 +72,16 @@ export function makeLivePanel(job, unit, signal) {
     run.node,
   );
 
-  const findModel = (terms) => front.find((each) => each.size === terms);
+  const findSize = (terms) => front.find((each) => each.size === terms);
+  const findModel = () => findSize(size) ?? findSize(simulated) ?? front.at(-1);
+
+  function drawFront() {
+    const [x, y] = [front.map((each) => each.size), front.map((each) => each.error)];
+    chart.draw([{ name: "least error", x, y }], [{ kind: "chosen", at: findModel().size }]);
+  }
 
   function showModel() {
-    const model = findModel(size) ?? findModel(simulated) ?? front.at(-1);
+    const model = findModel();
     const text = model.equation ?? "";
     host.hidden = !text;
     if (equation.textContent !== text) equation.replaceChildren(...makeLine(text));
@@ -79,16 +89,17 @@ export function makeLivePanel(job, unit, signal) {
     if (model.size === size) which = "Chosen point";
     const error = `${formatNumber(model.error)} ${unit}`.trim();
     setText(statement, `${which}: ${formatTerms(model.size)}, error ${error}`);
-    const points = front.map((each) => [each.size, each.error]);
-    chart.draw([{ name: "least error", points }], [{ kind: "chosen", at: model.size }]);
   }
 
   return {
     node,
-    show(job) {
-      const { progress, state } = job;
+    draw({ progress }) {
       front = getFront(progress ?? {});
       simulated = progress?.free_run?.size;
+      if (front.length) drawFront();
+    },
+    show(job) {
+      const { progress, state } = job;
       node.hidden = front.length === 0 || state === "succeeded";
       preliminary.hidden = state !== "running";
       setText(heading, isEnded(job) ? "Best models when the search ended" : "Best models so far");
@@ -108,14 +119,15 @@ function makeFrontSeries(models) {
   const sorted = [...bySize.values()].sort((a, b) => a.size - b.size);
   return PARTS.map((part) => ({
     name: part,
-    points: sorted.map((model) => [model.size, model.metrics[part].free_run.rmse]),
+    x: sorted.map(({ size }) => size),
+    y: sorted.map(({ metrics }) => metrics[part].free_run.rmse),
   }));
 }
 
 /** Make the chart with the equation of a model; `show(model)` marks another model. */
-export function makeModelFront(job, models, unit) {
+export function makeModelFront(job, models, unit, signal) {
   const [statement, equation] = [el("p", {}), el("code", { class: "plain" })];
-  const chart = makeChart("Size against error", "RMSE of the free run", unit);
+  const chart = makeChart("Size against error", "RMSE of the free run", unit, signal);
   letChoose(chart, "opens the model of a point", (size) => {
     const { rank } = models.find((model) => model.size === size);
     location.hash = `#/jobs/${job.id}/models/${rank}`;

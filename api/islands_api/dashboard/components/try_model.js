@@ -45,8 +45,8 @@ function makePanel(path, output, found, signal) {
     on: { input: update },
   });
   const time = { label: "time (s)", describe: (at) => `${formatShort(Number(at.toPrecision(6)))} s` };
-  const response = makeLineChart({ title: "Response", x: time, y: { label: label(output) } });
-  const excitation = makeLineChart({ title: "Input", x: time, y: { label: "" } });
+  const response = makeLineChart({ title: "Response", x: time, y: { label: label(output) } }, signal);
+  const excitation = makeLineChart({ title: "Input", x: time, y: { label: "" } }, signal);
   const loop = makeLoopPlot("Output over input", signal);
   const status = el("p", { class: "small" });
   const warnings = el("ul", { class: "warnings" });
@@ -103,9 +103,8 @@ function makePanel(path, output, found, signal) {
     setText(start, initial);
     const moving = forms.findIndex((form) => !form.isConstant());
     const driving = names[Math.max(0, moving)];
-    const points = (values) => next.time_s.map((at, row) => [at, values[row]]);
-    response.draw([{ name: output, points: points(next.output) }]);
-    excitation.draw([{ name: label(driving), points: points(next.inputs[driving]) }]);
+    response.draw([{ name: output, x: next.time_s, y: next.output }]);
+    excitation.draw([{ name: label(driving), x: next.time_s, y: next.inputs[driving] }]);
     loop.draw(
       { label: label(driving), values: next.inputs[driving] },
       { label: label(output), values: next.output },

@@ -1,4 +1,4 @@
-/** Ages of events by the clock of the service, which may differ from that of this machine, and times left. */
+/** Ages by the clock of the service, which may differ from that of this machine, times left, and rates. */
 
 import { el, setText } from "./dom.js";
 import { formatDuration } from "./numbers.js";
@@ -10,6 +10,24 @@ let offset = 0;
 export function synchronise(response) {
   const serverTime = Date.parse(response.headers.get("date") ?? "");
   if (Number.isFinite(serverTime)) offset = serverTime - Date.now();
+}
+
+/** Seconds between two changes of a text: a reader could not follow more. */
+const READING_SECONDS = 0.25;
+
+/** Make a function that runs an action at once, or for all calls in a period together at its end. */
+export function limitRate(action, signal) {
+  let [last, timer] = [-Infinity, 0];
+  const run = () => {
+    clearTimeout(timer);
+    [last, timer] = [performance.now(), 0];
+    if (!signal.aborted) action();
+  };
+  return () => {
+    const wait = last + 1000 * READING_SECONDS - performance.now();
+    if (wait <= 0) run();
+    else timer ||= setTimeout(run, wait);
+  };
 }
 
 const UNITS = [

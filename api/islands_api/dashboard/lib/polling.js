@@ -11,6 +11,7 @@ import {
   sleep,
   streamEvents,
 } from "./api.js";
+import { limitRate } from "./clock.js";
 
 /** Seconds between two requests for a job that has ended, because another client may resume it. */
 const ENDED_POLL_SECONDS = 5;
@@ -72,11 +73,12 @@ export function poll(task, signal) {
 }
 
 /**
- * Follow a job: call `show(job)` at each change, and `lost(problem)` if the job does not exist. The time of
- * `performance.now()` at which the whole job was received is its `loaded`.
+ * Follow a job: call `show(job)` at each change of its state, and `lost(problem)` if the job does not exist.
+ * Progress calls `draw(job)` once in a frame of the screen, and `show(job)` as often as texts can be read.
+ * The time of `performance.now()` at which the whole job was received is its `loaded`.
  * Return a function that takes a newer state of the job, received as the response to another request.
  */
-export function followJob(id, { show, lost }, signal) {
+export function followJob(id, { show, draw, lost }, signal) {
   const path = getJobPath(id);
   let [current, frame] = [null, 0];
 
@@ -86,16 +88,19 @@ export function followJob(id, { show, lost }, signal) {
     show(current);
   }
 
-  /** Take a progress event; all before a frame of the screen are shown at once, if the page is visible. */
+  const showSoon = limitRate(() => show(current), signal);
+
+  function drawNow() {
+    frame = 0;
+    if (!signal.aborted) draw(current);
+  }
+
+  /** Take a progress event; all before a frame of the screen are one drawing. A hidden page has no frames. */
   function updateProgress({ id: version, data: progress }) {
     if (version < current.version) return;
     current = { ...current, version, progress };
-    const showNow = () => {
-      frame = 0;
-      if (!signal.aborted) show(current);
-    };
-    if (document.hidden) showNow();
-    else frame ||= requestAnimationFrame(showNow);
+    showSoon();
+    frame ||= requestAnimationFrame(drawNow);
   }
 
   async function check() {

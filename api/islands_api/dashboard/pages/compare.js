@@ -73,7 +73,7 @@ function makeRuns(entries, signal) {
     getJson(`${getJobPath(job.id)}/models/${model.rank}/simulation`, { signal });
   const simulated = entries.filter(({ job }) => !Array.isArray(job.spec.output));
   Promise.all(simulated.map(async (entry) => ({ ...entry, simulation: await load(entry) }))).then(
-    (found) => host.replaceChildren(...makeOverlays(found)),
+    (found) => host.replaceChildren(...makeOverlays(found, signal)),
     (error) => signal.aborted || host.replaceChildren(el("p", { class: "complaint" }, error.message)),
   );
   return host;
@@ -98,7 +98,7 @@ function makeContent(found, signal) {
       entries.length > 1 ? makeComparisonReportButtons(entries) : [],
     ),
     makeCard("Free runs on the validation data", makeRuns(entries, signal)),
-    makeCard("Error against number of terms", makeFrontChart(entries)),
+    makeCard("Error against number of terms", makeFrontChart(entries, signal)),
     makeCard("Parameters", makeScrollable("Parameters", makeTermTable(entries))),
     makeCard("Settings that differ", makeSettingTable(entries)),
   ];

@@ -216,7 +216,8 @@ export function mountJob(host, { id, rank }, signal) {
     factsHost.replaceChildren(makeJobFacts(job, unit ?? ""));
     showResult(job);
     failureHost.replaceChildren(...[makeFailureCard(job)].filter(Boolean));
-    convergence?.advance(job);
+    draw(job);
+    convergence?.show(job);
     live?.show(job);
     if (!isSearch(job)) {
       // Not replaced if present: a button in it may have the focus.
@@ -232,6 +233,12 @@ export function mountJob(host, { id, rank }, signal) {
       status.before(modelsHost);
       modelsHost.replaceChildren(models.node);
     }
+  }
+
+  /** Draw the lines that grow with the search. */
+  function draw(job) {
+    convergence?.draw(job);
+    live?.draw(job);
   }
 
   /** Show the recommended model as soon as the unit of its output is known. */
@@ -251,7 +258,7 @@ export function mountJob(host, { id, rank }, signal) {
     );
   }
 
-  const updateJob = followJob(id, { show, lost }, signal);
+  const updateJob = followJob(id, { show, draw, lost }, signal);
   const buttons = makeActions(updateJob, heading);
   host.replaceChildren(el("p", { class: "loading" }, "Loading…"));
   return {

@@ -95,7 +95,7 @@ export function mountMonitor(host, { id }, signal) {
   const status = makeStatusBadge();
   const factsHost = el("div");
   const settingsHost = el("div");
-  const [alarms, states, records] = [makeAlarmsPanel(), makeStatesPanel(), makeRecordsPanel()];
+  const [alarms, states, records] = [makeAlarmsPanel(), makeStatesPanel(signal), makeRecordsPanel()];
   const history = makeRecordHistory(path, signal);
   let current = null;
   const actions = makeActions(path, () => current);

@@ -36,6 +36,7 @@ FILES = {
     "components/added_records.js": _SCRIPT,
     "components/banner.js": _SCRIPT,
     "components/chart.js": _SCRIPT,
+    "components/chart_drawing.js": _SCRIPT,
     "components/column_choice.js": _SCRIPT,
     "components/compare_choice.js": _SCRIPT,
     "components/comparison_report.js": _SCRIPT,

@@ -46,24 +46,19 @@ export function makeEvents({ alarms, training }, records) {
 
 /** Return `[{title, label, series}]`, one for each chart. */
 export function makeStateSeries(result, records) {
-  const follow = (name, select, bare = false) => ({
-    name,
-    points: records.map((record) => [record.index + 1, ...[select(record)].flat()]),
-    bare,
-  });
+  const x = records.map(({ index }) => index + 1);
+  const follow = (name, select) => ({ name, x, y: records.map(select) });
   const parameters = result.parameters.map(({ name, unit }) => ({
     title: name,
     label: unit ? `${name} / ${unit}` : name,
     series: [
-      follow(name, ({ values }) => {
-        const { value, ci95 } = values[name];
-        return [value, (ci95[1] - ci95[0]) / 2];
-      }),
+      {
+        ...follow(name, ({ values }) => values[name].value),
+        half: records.map(({ values }) => (values[name].ci95[1] - values[name].ci95[0]) / 2),
+      },
     ],
   }));
   const effects = chooseEffects(result, records);
-  const limit = records.map(({ index, statistic }) =>
-    [index + 1, statistic === null ? null : result.threshold]);
   return [
     ...parameters,
     {
@@ -77,7 +72,7 @@ export function makeStateSeries(result, records) {
       label: "statistic / sigma",
       series: [
         follow("statistic", ({ statistic }) => statistic),
-        { name: "limit", points: limit, bare: true },
+        { ...follow("limit", ({ statistic }) => (statistic === null ? null : result.threshold)), bare: true },
       ],
     },
   ];
@@ -87,7 +82,7 @@ const explain = (kind, text) =>
   el("li", {}, el("span", { class: `key-mark ${kind}`, "aria-hidden": "true" }), text);
 
 /** Make the panel; `show(result, records)` draws the records. */
-export function makeStatesPanel() {
+export function makeStatesPanel(signal) {
   const charts = new Map();
   const host = el("div", { class: "states" });
   const key = el(
@@ -103,7 +98,7 @@ export function makeStatesPanel() {
   function makeChart({ title, label }) {
     const describe = (at) => describePlace(known[at - 1 - known[0].index]);
     const x = { label: "record", integer: true, describe };
-    return makeLineChart({ title, x, y: { label }, marks: true });
+    return makeLineChart({ title, x, y: { label }, marks: true }, signal);
   }
 
   return {
