@@ -18,16 +18,15 @@ function place(island, islands) {
   return [SIZE / 2 + RING * Math.cos(angle), SIZE / 2 + RING * Math.sin(angle)];
 }
 
-/** Make the error of an island, outside of the circle of islands, where no arrow is. */
-function makeError(error, x, y) {
+/** Make the text for the error of an island, outside of the circle of islands, where no arrow is. */
+function makeErrorText(x, y) {
   const [right, down] = [(x - SIZE / 2) / RING, y > SIZE / 2 ? 1 : -1];
-  const text = formatNumber(error);
   if (Math.abs(right) < MIDDLE) {
     const outwards = down > 0 ? NODE + 13 : -NODE - 5;
-    return svg("text", { class: "tick middle", x, y: y + outwards }, text);
+    return svg("text", { class: "tick middle", x, y: y + outwards });
   }
   const outwards = Math.sign(right) * (NODE + 5);
-  return svg("text", { class: right < 0 ? "tick end" : "tick", x: x + outwards, y: y + 4 + 4 * down }, text);
+  return svg("text", { class: right < 0 ? "tick end" : "tick", x: x + outwards, y: y + 4 + 4 * down });
 }
 
 /** Make an arrow between two islands, bent so that both directions are visible. */
@@ -80,18 +79,18 @@ export function makeIslandMap(unit) {
     drawing,
     caption,
   );
-  let drawn = "";
+  let [drawn, texts] = ["", []];
 
-  function draw(islands, sources) {
-    const ways = sources.flatMap((each, to) => each.map((from) => makeArrow(from, to, islands.length)));
-    const nodes = islands.flatMap((error, island) => {
-      const [x, y] = place(island, islands.length);
-      return [
-        svg("circle", { class: `island s${island % COLOURS}`, cx: x, cy: y, r: NODE }),
-        svg("text", { class: "tick middle number", x, y: y + 4 }, String(island + 1)),
-        makeError(error, x, y),
-      ];
-    });
+  function draw(sources) {
+    const islands = sources.length;
+    const ways = sources.flatMap((each, to) => each.map((from) => makeArrow(from, to, islands)));
+    const places = sources.map((_, island) => place(island, islands));
+    texts = places.map(([x, y]) => makeErrorText(x, y));
+    const nodes = places.flatMap(([x, y], island) => [
+      svg("circle", { class: `island s${island % COLOURS}`, cx: x, cy: y, r: NODE }),
+      svg("text", { class: "tick middle number", x, y: y + 4 }, String(island + 1)),
+      texts[island],
+    ]);
     drawing.replaceChildren(makeMarker(), ...ways, ...nodes);
     drawing.setAttribute("aria-label", `Islands that received models: ${describeWays(sources)}`);
   }
@@ -102,9 +101,9 @@ export function makeIslandMap(unit) {
       node.hidden = !migration || migration.sources.length !== islands.length;
       if (node.hidden) return;
       const { generation, emigrants, sources } = migration;
-      const errors = islands.map((each) => formatNumber(each)).join();
-      if (drawn !== errors + JSON.stringify(sources)) draw(islands, sources);
-      drawn = errors + JSON.stringify(sources);
+      if (drawn !== JSON.stringify(sources)) draw(sources);
+      drawn = JSON.stringify(sources);
+      islands.forEach((error, island) => setText(texts[island], formatNumber(error)));
       const sent = emigrants === 1 ? "1 model was sent" : `up to ${emigrants} models were sent`;
       const scale = unit ? `, in ${unit}` : "";
       setText(
