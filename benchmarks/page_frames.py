@@ -3,10 +3,10 @@
     python benchmarks/page_frames.py [MEASURE ...] [--repeat 5] [--json FILE]
 
 Measures: zoom, live; both by default. Counted are the frames of `requestAnimationFrame` around which the page
-changed, not those of an idle page. The browser renders in software, and the machine must be idle. A search of
-ten islands on this machine sends one event in a second: `live` records its events and its history, and feeds
-them to the page faster, again and again with growing generations. It needs `make .venv/ready-test` and
-Chromium.
+changed or a canvas was drawn, not those of an idle page. The browser renders in software, and the machine
+must be idle. A search of ten islands on this machine sends one event in a second: `live` records its events,
+its history and its free run, and feeds them to the page faster, again and again with growing generations. It
+needs `make .venv/ready-test` and Chromium.
 """
 
 import asyncio
@@ -56,12 +56,17 @@ MEMORY_EVENTS = (1_200, 10_200)
 #: Events of a second between both.
 MEMORY_RATE = 100
 
-#: Records the time of every frame, and whether the page changed since the frame before.
+#: Records the time of every frame, and whether the page changed or a canvas was drawn since the frame before.
 RECORD = """() => {
   window.recorded = [];
   let changed = false;
   new MutationObserver(() => { changed = true; }).observe(document.querySelector("main"),
     { subtree: true, childList: true, attributes: true, characterData: true });
+  const { stroke } = CanvasRenderingContext2D.prototype;
+  CanvasRenderingContext2D.prototype.stroke = function note(...path) {
+    changed = true;
+    stroke.apply(this, path);
+  };
   const note = (time) => {
     recorded.push([time, changed]);
     changed = false;
@@ -70,8 +75,9 @@ RECORD = """() => {
   requestAnimationFrame(note);
 }"""
 
-#: Answers requests for a job in the page: its document, its history, and a stream that `feed` fills.
-REPLAY = """([job, progress, history]) => {
+#: Answers requests for a job in the page: its document, its history, the free run of its best model, and a
+#: stream that `feed` fills.
+REPLAY = """([job, progress, history, freeRun]) => {
   const send = window.fetch;
   let [generation, stream] = [0, null];
   const encoder = new TextEncoder();
@@ -93,6 +99,7 @@ REPLAY = """([job, progress, history]) => {
       const [first, count] = [Number(after[1]) + 1, Math.min(500, generation - Number(after[1]))];
       return respond({ items: Array.from({ length: count }, (_, at) => makePoint(first + at)) });
     }
+    if (path.endsWith("/free-run")) return respond(freeRun);
     if (!path.endsWith("/events")) return respond(job);
     return new Response(new ReadableStream({ start: (opened) => { stream = opened; } }));
   };
@@ -226,8 +233,8 @@ def zoom(repeat: int) -> Iterator[Figure]:
     yield from to_figures(f"zoom and pan, {SAMPLES} samples", runs[1:])
 
 
-def record_search(service: Service) -> tuple[dict[str, Any], list[Any], list[Any]]:
-    """Return a running job of ten islands, its events with a front, and its history."""
+def record_search(service: Service) -> tuple[dict[str, Any], list[Any], list[Any], dict[str, Any]]:
+    """Return a running job of ten islands, its events with a front, its history, and its free run."""
     stopping = StopRequest()
     settings = ServiceSettings(data_dir=service.folder)
     thread = Thread(target=SerialCoordinator(settings, "me", stopping).run)
@@ -242,12 +249,13 @@ def record_search(service: Service) -> tuple[dict[str, Any], list[Any], list[Any
             if found.get("migration") and found not in progress:
                 progress.append(found)
         history = service.ask("GET", f"/v1/jobs/{job}/history?after=-1").json()["items"]
+        free_run = service.ask("GET", f"/v1/jobs/{job}/free-run").json()
         service.ask("POST", f"/v1/jobs/{job}/cancel")
         service.ended(job)
     finally:
         stopping.request()
         thread.join()
-    return document, progress, history
+    return document, progress, history, free_run
 
 
 async def measure_live(service: Service, recorded: tuple[Any, ...], memory: bool) -> dict[str, float]:
@@ -277,9 +285,9 @@ async def measure_memory(
         await asyncio.sleep(5)
         await session.send("HeapProfiler.collectGarbage")
         metrics = await read_metrics(session)
-        found.append((metrics["JSHeapUsedSize"] / 1e6, metrics["Nodes"]))
-    (first, nodes), (last, more) = found
-    return {"memory": first, "growth": last - first, "nodes": more - nodes}
+        found.append((metrics["JSHeapUsedSize"] / 1e6, metrics["Nodes"], metrics["JSEventListeners"]))
+    (first, nodes, listeners), (last, more, others) = found
+    return {"memory": first, "growth": last - first, "nodes": more - nodes, "listeners": others - listeners}
 
 
 def live(repeat: int) -> Iterator[Figure]:
@@ -297,6 +305,7 @@ def live(repeat: int) -> Iterator[Figure]:
     yield Figure("ten islands: memory of the page", "MB", None, (grown["memory"],))
     yield Figure(f"ten islands: its growth, {events}", "MB", 0.5, (grown["growth"],))
     yield Figure(f"ten islands: more nodes, {events}", "", 50.0, (grown["nodes"],))
+    yield Figure(f"ten islands: more event listeners, {events}", "", 10.0, (grown["listeners"],))
 
 
 MEASURES = {"zoom": zoom, "live": live}
