@@ -88,7 +88,7 @@ def refine_models(
                 yield entry
 
     least = min(map(_error, found.models))
-    if least <= ROUNDING * found.split.validation.output_range:
+    if least <= ROUNDING * found.split.validation.output_range or steps.skip(_REFINEMENT):
         return found, []
     steps.report(_REFINEMENT, None)
     limit = _CLOSE * least

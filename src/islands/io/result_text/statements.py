@@ -327,12 +327,17 @@ class ResultFacts(RunFacts):
         return float(self.linear["metrics"]["validation"]["free_run"]["rmse"] / own)
 
     @property
+    def has_tried_free_run(self) -> bool:
+        """Whether the validation data have chosen between least squares and the error of the free run."""
+        return self.document["settings"].get("estimator") == ""
+
+    @property
     def has_output_noise(self) -> bool:
         """Whether least squares is biased by noise of the measured output.
 
         The measured past then makes the prediction one step ahead worse than an adequate free run.
         """
-        if self.criterion.get("estimator") != "least-squares" or self.is_unrelated:
+        if self.criterion.get("estimator") != "least-squares" or self.is_unrelated or self.has_tried_free_run:
             return False
         return self.is_unpredictable and all(map(self._is_free_run_better, ("estimation", "validation")))
 
@@ -1047,7 +1052,11 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
     ),
     Statement(
         "free-run-estimate",
-        lambda facts: facts.is_unpredictable_ahead and facts.criterion.get("error", "free_run") != "free_run",
+        lambda facts: (
+            facts.is_unpredictable_ahead
+            and facts.criterion.get("error", "free_run") != "free_run"
+            and not facts.has_tried_free_run
+        ),
         lambda facts: (
             "try an estimate that minimises the error of the free run "
             f"({name_option('estimator', 'free-run')}), or measure the disturbance: one step ahead, "
