@@ -329,7 +329,7 @@ class ResultFacts(RunFacts):
     @property
     def has_tried_free_run(self) -> bool:
         """Whether the validation data have chosen between least squares and the error of the free run."""
-        return self.document["settings"].get("estimator") == ""
+        return bool(self.document["settings"].get("estimator") == "")
 
     @property
     def has_output_noise(self) -> bool:
@@ -816,6 +816,17 @@ def _suggest_terms(facts: ResultFacts) -> str:
     return f"try {_HINTS[worst['name']].format(input=name, lags=_name_lags(facts))}"
 
 
+def _suggest_free_run_estimate(facts: ResultFacts) -> str:
+    """Return the hint if only the free run has structure; the estimate is named unless it was tried."""
+    option = name_option("estimator", "free-run")
+    tried = facts.has_tried_free_run
+    estimate = "" if tried else f"try an estimate that minimises the error of the free run ({option}), or "
+    text = f"{estimate}measure the disturbance: one step ahead, "
+    if facts.is_far_ahead:
+        return f"{text}at most {write_percent(LARGEST_SHARE)} is predictable"
+    return f"{text}no structure is left (at most {write_percent(LARGEST_SHARE)} is predictable)"
+
+
 def _name_lags(facts: ResultFacts) -> str:
     """Return the option for twice the lags of the library; empty if they are unknown."""
     option = next((name for name in ("lags", "library_lags") if name in facts.document["settings"]), "")
@@ -1052,20 +1063,8 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
     ),
     Statement(
         "free-run-estimate",
-        lambda facts: (
-            facts.is_unpredictable_ahead
-            and facts.criterion.get("error", "free_run") != "free_run"
-            and not facts.has_tried_free_run
-        ),
-        lambda facts: (
-            "try an estimate that minimises the error of the free run "
-            f"({name_option('estimator', 'free-run')}), or measure the disturbance: one step ahead, "
-            + (
-                f"at most {write_percent(LARGEST_SHARE)} is predictable"
-                if facts.is_far_ahead
-                else f"no structure is left (at most {write_percent(LARGEST_SHARE)} is predictable)"
-            )
-        ),
+        lambda facts: facts.is_unpredictable_ahead and facts.criterion.get("error", "free_run") != "free_run",
+        _suggest_free_run_estimate,
     ),
     Statement(
         "other-terms",

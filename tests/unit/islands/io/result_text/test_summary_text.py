@@ -40,7 +40,8 @@ LOST = EvaluationOutcome(Status.DIVERGED, "at sample 17")
 def findings():
     data = record(300)
     named = Dataset(data.u, data.y, 0.1, ("u_V",), "y_um", ("V",), "um")
-    return islands.fit(named, library="phi-polynomial", max_terms=4, seed=7).with_wall_time(0.5).search_result
+    settings = {"library": "phi-polynomial", "max_terms": 4, "estimator": "least-squares", "seed": 7}
+    return islands.fit(named, **settings).with_wall_time(0.5).search_result
 
 
 def describe(found):
