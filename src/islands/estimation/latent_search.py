@@ -165,15 +165,53 @@ def search_latent_models(record: Dataset, seed: int, steps: Steps) -> list[Laten
             racing = [each for each in kept.values() if each.units]
             moved = threads.map(partial(_Candidate.advance, steps=count, data=data, stop=steps), racing)
             candidates = [each for each in candidates if not each.units] + list(moved)
-        steps.report("final estimation of state spaces", 0.7)
-        front = _find_front(candidates)
-        best = _remove_blocks(front[-1], data, direct=True)
-        direct = best.reads_at_once
-        left = front[:-1] if direct else front
-        reduced = list(threads.map(partial(_remove_blocks, data=data, direct=direct), left))
-        reduced += [best] if direct else []
-        found = threads.map(partial(_finish, data=data, record=advanced, steps=steps), reduced)
-        models = [each for each in found if each is not None]
+        return _estimate_front(candidates, data, record, advanced, threads, steps)
+
+
+def search_linear_models(record: Dataset, steps: Steps) -> list[LatentModel]:
+    """Search state spaces without units: the linear models of the same data.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record without missing values.
+    steps : Steps
+
+    Returns
+    -------
+    list of LatentModel
+        As of `search_latent_models`. The last one has the least error on the held-out blocks.
+    """
+    advanced = advance_all_inputs(record)
+    data = _make_data(advanced)
+    linear = _fit_linear(data, steps)
+    if not linear:
+        return []
+    with ThreadPoolExecutor() as threads:
+        return _estimate_front(linear, data, record, advanced, threads, steps)
+
+
+def _estimate_front(
+    candidates: Sequence[_Candidate],
+    data: _Data,
+    record: Dataset,
+    advanced: Dataset,
+    threads: ThreadPoolExecutor,
+    steps: Steps,
+) -> list[LatentModel]:
+    """Reduce the models of the front, estimate them on all blocks, and return them.
+
+    ``advanced`` is the record with all inputs one sample early.
+    """
+    steps.report("final estimation of state spaces", 0.7)
+    front = _find_front(candidates)
+    best = _remove_blocks(front[-1], data, direct=True)
+    direct = best.reads_at_once
+    left = front[:-1] if direct else front
+    reduced = list(threads.map(partial(_remove_blocks, data=data, direct=direct), left))
+    reduced += [best] if direct else []
+    found = threads.map(partial(_finish, data=data, record=advanced, steps=steps), reduced)
+    models = [each for each in found if each is not None]
     return models if direct else [replace(each, input_names=record.input_names) for each in models]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.estimation.latent_search import search_latent_models
+from islands.estimation.latent_search import search_latent_models, search_linear_models
 from islands.progress import Steps, StoppedError, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 from support.latent_systems import smooth_input, spring_record
@@ -42,6 +42,16 @@ def test_the_cubic_spring_is_found(springs):
     assert "resonance at 5.1" in found.equation().plain
     # The unit reads the states, so the system is no Hammerstein system.
     assert any(name.startswith("w1") for name in found.names)
+
+
+@pytest.mark.ci
+def test_linear_models_are_a_front_without_units():
+    found = search_linear_models(spring_record(900, noise=0.02), Steps())
+    assert [each.units for each in found] == [()] * len(found)
+    sizes = [each.size for each in found]
+    assert sizes == sorted(sizes)
+    assert found[-1].order >= 2
+    assert search_linear_models(spring_record(3), Steps()) == []
 
 
 @pytest.mark.nightly
