@@ -1,0 +1,48 @@
+"""Searches that a benchmark compares: one for each class, with a reason where it has no model."""
+
+import numpy as np
+import pytest
+
+from islands.benchmarks.definition import CLASSES, LATENT, LINEAR
+from islands.benchmarks.model_searches import MODEL_SEARCHES, count_terms
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.models.latent import LatentModel
+from islands.progress import ignore_progress, never_stop
+from islands.simulation.predictors import free_run
+from support.coupled_systems import TWO_MASSES, make_coupled_record
+from support.latent_systems import make_model, smooth_input
+
+
+def find(kind, record):
+    return MODEL_SEARCHES[kind].find(record, 0, ignore_progress, never_stop)
+
+
+def test_every_class_has_a_search():
+    assert tuple(MODEL_SEARCHES) == CLASSES
+    assert [each for each in CLASSES if MODEL_SEARCHES[each].is_random] == [LATENT]
+
+
+@pytest.mark.parametrize("kind", [LATENT, LINEAR])
+def test_a_class_of_one_output_says_so(kind):
+    with pytest.raises(SettingsError, match="no model of several outputs"):
+        find(kind, make_coupled_record(TWO_MASSES, 200))
+
+
+def test_terms_are_those_of_equations_and_the_units_of_state_spaces():
+    assert count_terms(make_model()) == 1
+    assert count_terms(TWO_MASSES) == 8
+    assert count_terms(TWO_MASSES.models[0]) == 4
+
+
+@pytest.mark.ci
+def test_the_linear_model_of_a_linear_system_is_found():
+    u, y = smooth_input(1500, 3), np.zeros(1500)
+    for k in range(2, 1500):
+        y[k] = 1.5 * y[k - 1] - 0.7 * y[k - 2] + 0.2 * u[k - 1]
+    noise = 0.01 * np.random.default_rng(5).standard_normal(1500)
+    record = Dataset(u, y + noise, 0.1)
+    model = find(LINEAR, record)
+    assert isinstance(model, LatentModel)
+    assert (model.order, model.units) == (2, ())
+    assert free_run(model, record).mean_squared_error ** 0.5 == pytest.approx(0.01, rel=0.1)
