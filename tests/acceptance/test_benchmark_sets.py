@@ -32,9 +32,10 @@ def folder(tmp_path):
 def test_the_list_says_where_data_are_and_what_is_published(folder):
     shown = succeed("benchmark", "list", "--data", folder)
     tanks, _, others = shown.partition("wiener-hammerstein\n")
-    assert "present; origin: Schoukens" in tanks
+    assert "origin: Schoukens" in tanks
+    assert "cascaded_tanks.csv is present (SHA-256 78e9181e" in tanks
     assert "tests in V: validation (published: 0.191)" in tanks
-    assert "wh2009.npz is missing; origin: " in others
+    assert "wh2009.npz is missing (SHA-256 3e5f89a0" in others
     assert "doi 10.5281/zenodo.4445334" in others
 
 

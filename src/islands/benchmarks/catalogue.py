@@ -1,4 +1,4 @@
-"""Table of the benchmarks: what they are, whose rules they follow, and what others have published."""
+"""Table of the benchmarks: descriptions, rules, origins, and published errors."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -106,7 +106,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
             },
             unit="1e-5 m",
             scale=1e5,
-            rule="split of the owners, who state no initial samples: 50 as for the other sets",
+            rule="split of the owners without initial samples: 50 as for the other sets",
             address="Noel and Schoukens, doi 10.4121/12967592",
             licence="MIT (of the copy)",
             read=measured_files.read_bouc_wen,

@@ -98,7 +98,7 @@ class Benchmark:
     scale : float
         Factor from the unit of the output to this one.
     rule : str
-        Split and initial samples, and who states them.
+        Split and initial samples, and their source.
     address : str
         DOI or address of the data.
     licence : str

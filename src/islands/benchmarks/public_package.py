@@ -10,7 +10,6 @@ from importlib import import_module
 from importlib.util import find_spec
 from inspect import isfunction, signature
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -69,7 +68,12 @@ def make_package_benchmark(name: str) -> Benchmark:
 
 def _find_functions() -> dict[str, Any]:
     """Return the functions that split their data, by name."""
-    package: ModuleType = import_module(f"{PACKAGE}.benchmarks")
+    try:
+        package = import_module(f"{PACKAGE}.benchmarks")
+    except ImportError as error:
+        raise SettingsError(
+            f"{PACKAGE} is installed, but a package that it imports is missing: {error}"
+        ) from error
     return {
         name: each
         for name, each in vars(package).items()

@@ -52,7 +52,7 @@ def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
 
 
 def _simulate(model: AnyModel, test: BenchmarkTest, warm_up: int) -> NDArray[np.float64]:
-    """Return the free run with one value for every sample and output; NaN where there is none."""
+    """Return the free run, a value for each sample and output; NaN in the warm-up and after a divergence."""
     visible = test.visible
     if isinstance(visible, Dataset) and not isinstance(model, CoupledModel):
         return predict(model, visible, warm_up)

@@ -1,4 +1,4 @@
-"""``islands benchmark``: errors of the searches on published sets, beside published errors."""
+"""``islands benchmark``: errors of the searches on published sets, next to published errors."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -124,12 +124,16 @@ def _describe(entry: Benchmark, data: Path | None) -> list[str]:
     """Return the lines of the list about a set."""
     tests = (f"{test} (published: {_write_least(found)})" for test, found in entry.published.items())
     missing = list_missing_files(entry, data)
-    state = f"{', '.join(missing)} is missing" if missing else "present"
+    files = (
+        f"{file} is {'missing' if file in missing else 'present'} (SHA-256 {digest})"
+        for file, digest in entry.files.items()
+    )
     return [
         entry.description,
         f"tests in {entry.unit or 'the unit of the output'}: {', '.join(tests)}",
         f"{entry.samples} samples for the estimation; {entry.rule}",
-        f"{state}; origin: {entry.address}; licence: {entry.licence}",
+        f"origin: {entry.address}; licence: {entry.licence}",
+        *files,
     ]
 
 
@@ -167,7 +171,7 @@ def _print_rows(name: str, rows: Sequence["BenchmarkRow"]) -> None:
 def _make_document(
     chosen: Mapping[str, Benchmark], data: Path | None, budget: float | None, rows: Sequence["BenchmarkRow"]
 ) -> dict[str, Any]:
-    """Return the rows and what they depend on as JSON values."""
+    """Return the rows, and the rules and options of the comparison, as JSON values."""
     return {
         "islands": read_version(),
         "budget_s": budget,

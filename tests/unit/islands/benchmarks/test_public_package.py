@@ -1,4 +1,4 @@
-"""Sets of a package that is no dependency: a package with its interface stands in for it."""
+"""Sets of a package that is no dependency: a module with its interface takes its place."""
 
 import sys
 from types import ModuleType, SimpleNamespace
@@ -86,6 +86,13 @@ def test_a_set_that_cannot_be_loaded_says_why(package):
         read("nonlinear_benchmarks:Wide")
     with pytest.raises(SettingsError, match="no initial samples"):
         read("nonlinear_benchmarks:Old")
+
+
+def test_a_package_with_a_missing_import_is_an_error(monkeypatch):
+    monkeypatch.setattr(public_package, "is_installed", lambda: True)
+    monkeypatch.setitem(sys.modules, f"{public_package.PACKAGE}.benchmarks", None)
+    with pytest.raises(SettingsError, match="a package that it imports is missing"):
+        public_package.list_package_sets()
 
 
 def test_unknown_sets_and_a_missing_package_are_errors(package, monkeypatch):
