@@ -223,31 +223,44 @@ def make_rows(
     """
     rows = []
     for test in tests:
-        errors = {kind: [_as_number(each.errors[test]) for each in found] for kind, found in outcomes.items()}
-        linear = _finite(median(errors[LINEAR])) if LINEAR in errors else None
-        for kind, found in outcomes.items():
-            sizes = [each for each in found if each.parameters is not None]
-            rows.append(
-                BenchmarkRow(
-                    benchmark=name,
-                    test=test,
-                    metric=METRIC,
-                    unit=benchmark.unit,
-                    model=kind,
-                    median=_finite(median(errors[kind])),
-                    worst=_finite(max(errors[kind])),
-                    per_seed=tuple(_describe_seed(each, test) for each in found),
-                    published=benchmark.published.get(test, ()),
-                    linear=linear,
-                    terms=median(each.terms for each in sizes if each.terms is not None) if sizes else None,
-                    parameters=median(each.parameters for each in sizes if each.parameters)
-                    if sizes
-                    else None,
-                    wall_s=median(each.wall_s for each in found),
-                    is_tuned=benchmark.is_tuned,
-                )
-            )
+        linear = _median(outcomes[LINEAR], test) if LINEAR in outcomes else None
+        rows += [_make_row(name, benchmark, test, kind, found, linear) for kind, found in outcomes.items()]
     return rows
+
+
+def _make_row(
+    name: str,
+    benchmark: Benchmark,
+    test: str,
+    kind: str,
+    outcomes: Sequence[SeedOutcome],
+    linear: float | None,
+) -> BenchmarkRow:
+    return BenchmarkRow(
+        benchmark=name,
+        test=test,
+        metric=METRIC,
+        unit=benchmark.unit,
+        model=kind,
+        median=_median(outcomes, test),
+        worst=_finite(max(_as_number(each.errors[test]) for each in outcomes)),
+        per_seed=tuple(_describe_seed(each, test) for each in outcomes),
+        published=benchmark.published.get(test, ()),
+        linear=linear,
+        terms=_median_size([each.terms for each in outcomes]),
+        parameters=_median_size([each.parameters for each in outcomes]),
+        wall_s=median(each.wall_s for each in outcomes),
+        is_tuned=benchmark.is_tuned,
+    )
+
+
+def _median(outcomes: Sequence[SeedOutcome], test: str) -> float | None:
+    return _finite(median(_as_number(each.errors[test]) for each in outcomes))
+
+
+def _median_size(sizes: Sequence[int | None]) -> float | None:
+    known = [each for each in sizes if each is not None]
+    return median(known) if known else None
 
 
 def _as_number(error: float | str) -> float:

@@ -141,21 +141,6 @@ def list_other_files(benchmark: Benchmark, folder: Path) -> list[str]:
     return found
 
 
-def check_files(name: str, benchmark: Benchmark, folder: Path | None) -> None:
-    """Check that the files of a benchmark are in the folder.
-
-    Raises
-    ------
-    SettingsError
-        A file is missing.
-    """
-    if missing := list_missing_files(benchmark, folder):
-        raise SettingsError(
-            f"{name} needs {', '.join(missing)} in the folder {folder or 'of the sets'}: "
-            f"give the folder with {name_option('data', example='DIR')}. Origin: {benchmark.address}"
-        )
-
-
 def read_data(name: str, benchmark: Benchmark, folder: Path | None) -> BenchmarkData:
     """Read the data of a benchmark.
 
@@ -174,7 +159,11 @@ def read_data(name: str, benchmark: Benchmark, folder: Path | None) -> Benchmark
     RecordError
         A file has other columns or too few samples.
     """
-    check_files(name, benchmark, folder)
+    if missing := list_missing_files(benchmark, folder):
+        raise SettingsError(
+            f"{name} needs {', '.join(missing)} in the folder {folder or 'of the sets'}: "
+            f"give the folder with {name_option('data', example='DIR')}. Origin: {benchmark.address}"
+        )
     try:
         return benchmark.read(folder or Path())
     except (KeyError, IndexError, TypeError, ValueError) as error:

@@ -16,7 +16,6 @@ from islands.benchmarks.definition import (
     CLASSES,
     Benchmark,
     PublishedError,
-    check_files,
     list_missing_files,
     list_other_files,
     read_data,
@@ -83,10 +82,14 @@ def run(
     for each in classes or ():
         lookup(dict.fromkeys(CLASSES), each, "class of models")
     chosen = {name: find_benchmark(name) for name in _expand(names, data)}
-    for name, entry in chosen.items():
-        check_files(name, entry, data)
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
+    # Read first: an error in a file is shown before the searches, which take minutes.
+    found = {}
+    with progress("benchmark") as show:
+        for name, entry in chosen.items():
+            show(f"reading {name}", None)
+            found[name] = read_data(name, entry, data)
     compile_kernels()
     # The searches load the kernels, which the help of the command does not need.
     from islands.benchmarks.comparison import ComparisonSettings, compare  # noqa: PLC0415
@@ -98,9 +101,7 @@ def run(
         for place, (name, entry) in enumerate(chosen.items()):
             if not stop():
                 part = report_part(show, place / len(chosen), (place + 1) / len(chosen))
-                part(f"{name}: reading", 0.0)
-                found = read_data(name, entry, data)
-                rows += compare(name, entry, found, settings, perf_counter, part, stop)
+                rows += compare(name, entry, found[name], settings, perf_counter, part, stop)
             incomplete += [name] * stop()
     for name in dict.fromkeys(row.benchmark for row in rows):
         _print_rows(name, [row for row in rows if row.benchmark == name])
@@ -129,7 +130,7 @@ def _describe(entry: Benchmark, data: Path | None) -> list[str]:
         for file, digest in entry.files.items()
     )
     return [
-        entry.description,
+        entry.description + " The searches were developed with this set at hand." * entry.is_tuned,
         f"tests in {entry.unit or 'the unit of the output'}: {', '.join(tests)}",
         f"{entry.samples} samples for the estimation; {entry.rule}",
         f"origin: {entry.address}; licence: {entry.licence}",

@@ -9,7 +9,6 @@ from islands.benchmarks.definition import (
     Benchmark,
     BenchmarkData,
     BenchmarkTest,
-    check_files,
     list_missing_files,
     list_other_files,
     read_data,
@@ -52,8 +51,6 @@ def test_a_missing_file_is_named_with_the_option_and_the_origin(tmp_path):
     assert list_missing_files(entry, None) == list_missing_files(entry, tmp_path) == ["set.csv"]
     with command_line_names(), pytest.raises(SettingsError, match=r"set\.csv .*--data DIR.*doi 10\.1/2"):
         read_data("name", entry, tmp_path)
-    (tmp_path / "set.csv").touch()
-    check_files("name", entry, tmp_path)
 
 
 def test_a_file_of_another_content_is_listed(tmp_path):
