@@ -35,6 +35,9 @@ NEGLIGIBLE_EXCESS = 0.01
 #: Excess of an RMSE over the least, as a fraction, of a model that is as good on the estimation data.
 _EXCESS_BY_CHANCE = 0.5
 
+#: Largest error on the estimation data, relative to the least of all models, of a model that is compared.
+_LARGEST_RATIO = 2.0
+
 #: RMSE as a fraction of the output range below which errors count as equal.
 ROUNDING = 1e-6
 
@@ -71,13 +74,14 @@ def recommend(
 
     Candidates are the models whose free run on the validation data is bounded and which pass the physics
     checks: holds and excursions stay bounded and, if the search constrains models of hysteresis, Property 1
-    holds. Of these, the one with the least RMSE is the reference. A model is as good as the reference if its
-    RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds
-    it by at most 20 % and the mean squared errors differ by at most three standard errors. The standard error
-    is that of the mean difference over blocks of the validation data. A model is also as good if its RMSE on
-    the estimation data exceeds that of the reference by at most 1 %, and that on the validation data by at
-    most 50 %. Of these models, those whose free-run error on the estimation data exceeds 1.5 times the least
-    of them are passed over.
+    holds. Those whose free-run error on the estimation data exceeds twice the least are left out. Of the
+    others, the one with the least RMSE is the reference. A model is as good as the reference if its RMSE
+    exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds it by
+    at most 20 % and the mean squared errors differ by at most three standard errors. The standard error is
+    that of the mean difference over blocks of the validation data. A model is also as good if its RMSE on the
+    estimation data exceeds that of the reference by at most 1 %, and that on the validation data by at most
+    50 %. Of these models, those whose free-run error on the estimation data exceeds 1.5 times the least of
+    them are passed over.
 
     Parameters
     ----------
@@ -98,18 +102,21 @@ def recommend(
     sound = [at for at in bounded if is_sound(assessments[at].physics, hysteresis)]
     candidates = sound or bounded
     best = min(candidates, key=lambda at: (_rmse(assessments[at]), at))
+    close = _pass_over(candidates, assessments, _LARGEST_RATIO)
+    lucky = best not in close
+    best = min(close, key=lambda at: (_rmse(assessments[at]), at))
     equal = [
         at
-        for at in candidates
+        for at in close
         if _is_as_good(assessments[at], assessments[best])
         or _is_as_good_in_estimation(assessments[at], assessments[best])
     ]
-    kept = _pass_over(equal, assessments)
+    kept = _pass_over(equal, assessments, LARGEST_ESTIMATION_RATIO)
     chosen = min(kept, key=lambda at: (sizes[at], at))
     return Recommendation(
         chosen + 1,
         (
-            _describe_choice(chosen, best, len(equal), len(kept), assessments, unit),
+            _describe_choice(chosen, best, len(equal), len(kept), assessments, unit) + _describe_luck(lucky),
             _describe_physics(bool(sound), hysteresis, assessments[chosen].physics),
         ),
     )
@@ -178,10 +185,10 @@ def _is_as_good_in_estimation(entry: Assessment, reference: Assessment) -> bool:
     return _rmse(entry) <= (1.0 + _EXCESS_BY_CHANCE) * _rmse(reference)
 
 
-def _pass_over(equal: Sequence[int], assessments: Sequence[Assessment]) -> list[int]:
-    """Return the models whose error on the estimation data is close to the least of them."""
-    errors = {at: _estimation_error(assessments[at]) for at in equal}
-    limit = LARGEST_ESTIMATION_RATIO * min(errors.values())
+def _pass_over(places: Sequence[int], assessments: Sequence[Assessment], ratio: float) -> list[int]:
+    """Return the models whose error on the estimation data is at most a multiple of the least of them."""
+    errors = {at: _estimation_error(assessments[at]) for at in places}
+    limit = ratio * min(errors.values())
     return [at for at, error in errors.items() if error <= limit]
 
 
@@ -247,6 +254,14 @@ def _describe_choice(
         f"{exception}: its error on the estimation data is no larger, that on the validation data is RMSE "
         f"{error}, least {least}"
     )
+
+
+def _describe_luck(lucky: bool) -> str:
+    """State whether the model with the least validation error of all is left out."""
+    if not lucky:
+        return ""
+    condition = f"more than {_LARGEST_RATIO:g} times the least error on the estimation data"
+    return f"; models with {condition} are left out"
 
 
 def _describe_physics(sound: bool, hysteresis: bool, physics: PhysicsChecks) -> str:

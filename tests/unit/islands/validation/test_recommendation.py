@@ -125,7 +125,7 @@ def test_a_model_that_is_as_good_on_the_validation_data_alone_is_passed_over(est
 
 
 def test_the_least_validation_error_by_chance_is_passed_over():
-    lucky = Candidate(3, 0.99 * NOISE, estimated=0.2)
+    lucky = Candidate(3, 0.99 * NOISE, estimated=0.018)
     entries = [lucky.assessment(), Candidate(4, NOISE).assessment()]
     found = recommend([3, 4], entries, False, "um")
     assert found.rank == 2
@@ -137,13 +137,23 @@ def test_the_least_validation_error_by_chance_is_passed_over():
     )
     found = recommend([3, 4], entries[::-1], False)
     assert "no smaller model is as good" not in found.reasons[0]
-    lucky = Candidate(3, NOISE, estimated=0.2).assessment()
+    lucky = Candidate(3, NOISE, estimated=0.018).assessment()
     found = recommend([4, 3], [Candidate(4, 0.99 * NOISE).assessment(), lucky], False)
     assert found.reasons[0].endswith("; no smaller model is as good on both parts of the data")
 
 
-def test_the_estimation_data_do_not_justify_a_larger_validation_error():
-    assert chosen(Candidate(3, NOISE, estimated=0.2), Candidate(4, 4 * NOISE)) == 3
+@pytest.mark.parametrize(("estimated", "size"), [(0.0199, 3), (0.0201, 4), (nan, 4)])
+def test_a_model_with_a_large_error_on_the_estimation_data_is_no_reference(estimated, size):
+    assert chosen(Candidate(3, NOISE, estimated=estimated), Candidate(4, 4 * NOISE)) == size
+
+
+def test_the_reason_states_that_a_reference_is_left_out():
+    entries = [Candidate(3, NOISE, estimated=0.2).assessment(), Candidate(4, 4 * NOISE).assessment()]
+    assert (
+        recommend([3, 4], entries, False)
+        .reasons[0]
+        .endswith("; models with more than 2 times the least error on the estimation data are left out")
+    )
 
 
 def test_no_model_is_passed_over_if_all_diverge_on_the_estimation_data():
