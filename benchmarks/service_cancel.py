@@ -20,7 +20,8 @@ from service_table import Figure, run
 
 from support.processes import descendants
 from support.service import KNOWN, held, hidden
-from support.service_processes import TERMINAL, Service, serving
+from support.service_client import TERMINAL
+from support.service_processes import Service, serving
 
 #: Seconds of the record, whose diagnosis and identification take a while.
 RECORD_SECONDS = 150.0

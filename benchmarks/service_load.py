@@ -28,7 +28,8 @@ from sqlalchemy import insert
 from islands_service.domain.job import ProgressReport, Submission
 from islands_service.store import Store
 from islands_service.store.tables import jobs
-from support.service_processes import SPEC, Service, serving
+from support.service_client import SPEC
+from support.service_processes import Service, serving
 
 #: Number of concurrent clients.
 CLIENTS = 16

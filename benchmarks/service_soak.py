@@ -28,7 +28,8 @@ from soak_killer import Killer
 
 from support.databases import Server, server
 from support.processes import alive
-from support.service_processes import TERMINAL, Service, serving
+from support.service_client import TERMINAL
+from support.service_processes import Service, serving
 
 #: Number of different jobs.
 SEEDS = 5

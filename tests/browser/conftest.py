@@ -1,7 +1,7 @@
-"""Fixtures for tests of the dashboard in a real browser with a real service.
+"""Fixtures for tests of the dashboard in a real browser with a real web server.
 
-Without playwright or Chromium these tests are skipped. Fixtures have module scope: playwright keeps an
-event loop running in this thread, and tests of other modules may need a separate one.
+Without playwright or Chromium these tests are skipped. The browser ends with the last test of this folder:
+playwright keeps an event loop running in this thread, and other tests may need a separate one.
 """
 
 import json
@@ -12,9 +12,8 @@ from typing import Any
 
 import pytest
 
-from islands_service.store import Store
 from support.screen import Screen
-from support.service_processes import Service, serving
+from support.service_client import ServiceClient
 
 CHROMIUM = Path("/usr/bin/chromium")
 
@@ -24,7 +23,7 @@ STORE_KEY = "sessionStorage.setItem('islands.key', {})"
 _INSTALL = "install it with 'apt-get install --no-install-recommends chromium'"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def chromium() -> Iterator[Any]:
     api = pytest.importorskip(
         "playwright.sync_api", reason="playwright is not installed: run: make .venv/ready-test"
@@ -79,32 +78,33 @@ def quiet(screens: Callable[..., Screen]) -> Iterator[Callable[..., Screen]]:
     assert [screen.complaints for screen in made] == [[]] * len(made)
 
 
-@pytest.fixture(scope="module")
-def guarded(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
-    """Factory of services that need a key; their client has one."""
+@pytest.fixture(scope="session")
+def hosted(serve: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """Factory of services in a thread, without coordinators: tests change the state of jobs themselves."""
 
     @contextmanager
-    def run(*options: object) -> Iterator[Service]:
-        folder = tmp_path_factory.mktemp("guarded") / "data"
+    def run(**settings: object) -> Iterator[ServiceClient]:
+        folder = tmp_path_factory.mktemp("hosted") / "data"
         folder.mkdir()
-        with Store(f"sqlite:///{folder / 'islands.db'}") as store:
-            _, secret = store.keys.create("test", frozenset({"read", "write"}))
-        with serving(folder, "--require-keys", *options) as service:
-            service.client.headers["Authorization"] = f"Bearer {secret}"
-            yield service
+        with serve(folder, rate=0, **settings) as running:
+            service = ServiceClient(running.url, folder)
+            if running.settings.keys_needed:
+                service.client.headers.update(running.key())
+            with service.client:
+                yield service
 
     return run
 
 
 @pytest.fixture(scope="module")
-def service(guarded: Callable[..., Any]) -> Iterator[Service]:
-    """A service without coordinators."""
-    with guarded("--coordinators", 0) as running:
+def service(chromium: Any, hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
+    """A service that needs a key; its client has one."""
+    with hosted(require_keys=True) as running:
         yield running
 
 
 @pytest.fixture
-def opened(quiet: Callable[..., Screen], service: Service) -> Callable[..., Any]:
+def opened(quiet: Callable[..., Screen], service: ServiceClient) -> Callable[..., Any]:
     """Function that opens an address of the service of the module with a stored key."""
 
     def open_at(place: str, **options: Any) -> Any:
@@ -117,7 +117,7 @@ def opened(quiet: Callable[..., Screen], service: Service) -> Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
-def desk(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A service without coordinators: tests change the state of jobs themselves."""
-    with serving(tmp_path_factory.mktemp("desk") / "data", "--coordinators", 0) as service:
-        yield service
+def desk(chromium: Any, hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
+    """A service that needs no key."""
+    with hosted() as running:
+        yield running

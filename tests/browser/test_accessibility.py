@@ -10,14 +10,14 @@ from support.markup_rules import find_markup_defects
 from support.played import advance, stored
 from support.reading import unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 WIDE, NARROW = (1280, 800), (360, 800)
 
 
 @pytest.fixture(scope="module")
-def places(desk: Service) -> dict[str, str]:
+def places(desk: ServiceClient) -> dict[str, str]:
     """Addresses of all views without a result."""
     problem = {"title": "The job failed", "detail": "data.csv, line 8, column y_um is empty: " + "x" * 200}
     failed = desk.submit(500, name="a-name-without-a-space-" * 8, tags=["rig 2", "t" * 40])
@@ -54,7 +54,7 @@ def opened(screen: Screen, place: str) -> Any:
 )
 def test_every_page_fits_and_has_sufficient_contrast(
     quiet: Callable[..., Screen],
-    desk: Service,
+    desk: ServiceClient,
     places: dict[str, str],
     name: str,
     scheme: str,
@@ -91,7 +91,9 @@ BROKEN = {
 
 
 @pytest.mark.ci
-def test_each_rule_of_the_markup_finds_what_breaks_it(screens: Callable[..., Screen], desk: Service) -> None:
+def test_each_rule_of_the_markup_finds_what_breaks_it(
+    screens: Callable[..., Screen], desk: ServiceClient
+) -> None:
     page = screens(desk.url).page
     frame = "<html lang=en><title>x</title><main><h1>Rules</h1>{}</main></html>"
     page.set_content(frame.format("<p>text</p>"))
@@ -104,7 +106,7 @@ def test_each_rule_of_the_markup_finds_what_breaks_it(screens: Callable[..., Scr
 
 @pytest.mark.ci
 def test_numbers_are_aligned_in_columns(
-    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+    quiet: Callable[..., Screen], desk: ServiceClient, places: dict[str, str]
 ) -> None:
     page = opened(quiet(desk.url), places["list"])
     style = page.locator("td.figure").first.evaluate("cell => getComputedStyle(cell).fontVariantNumeric")
@@ -113,7 +115,7 @@ def test_numbers_are_aligned_in_columns(
 
 @pytest.mark.ci
 def test_a_state_has_a_symbol_in_addition_to_its_colour(
-    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+    quiet: Callable[..., Screen], desk: ServiceClient, places: dict[str, str]
 ) -> None:
     page = opened(quiet(desk.url), places["list"])
     badges = page.locator("tbody .state").evaluate_all(
@@ -125,7 +127,7 @@ def test_a_state_has_a_symbol_in_addition_to_its_colour(
 
 @pytest.mark.ci
 def test_all_controls_are_reachable_by_keyboard(
-    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+    quiet: Callable[..., Screen], desk: ServiceClient, places: dict[str, str]
 ) -> None:
     page = opened(quiet(desk.url), places["running"])
     page.keyboard.press("Tab")
@@ -148,7 +150,9 @@ def test_all_controls_are_reachable_by_keyboard(
 
 
 @pytest.mark.ci
-def test_times_are_shown_in_utc(quiet: Callable[..., Screen], desk: Service, places: dict[str, str]) -> None:
+def test_times_are_shown_in_utc(
+    quiet: Callable[..., Screen], desk: ServiceClient, places: dict[str, str]
+) -> None:
     """Independent of the time zone and the clock of the machine of the browser."""
     screen = quiet(desk.url, timezone_id="Asia/Tokyo")
     screen.page.clock.install(time="2031-01-01T00:00:00Z")

@@ -10,7 +10,7 @@ import pytest
 from support.canvas import DRAWN, count_segments, get_drawn, get_faint_lines, get_lines
 from support.processes import eventually
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
@@ -29,7 +29,7 @@ LOG = {"y": {"label": "RMS error", "log": True}}
 
 
 @pytest.fixture(scope="module")
-def page(chromium: Any, desk: Service) -> Iterator[Any]:
+def page(chromium: Any, desk: ServiceClient) -> Iterator[Any]:
     """One page for all tests: each chart replaces the previous one."""
     screen = Screen(chromium.new_page(viewport={"width": 1280, "height": 800}), desk.url)
     screen.go().get_by_role("heading", name="Jobs", exact=True).wait_for()

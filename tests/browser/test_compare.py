@@ -11,7 +11,7 @@ import pytest
 from support.played import run_submitted
 from support.reading import unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
@@ -25,7 +25,7 @@ def find_runs(page: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def jobs(service: Service) -> tuple[str, str]:
+def jobs(service: ServiceClient) -> tuple[str, str]:
     """Two succeeded jobs of the same record; the second one has smaller models."""
     names = [("large", {}), ("small", {"max_terms": 3})]
     first, second = (
@@ -41,7 +41,9 @@ def compared(opened: Callable[..., Any], jobs: tuple[str, str]) -> Any:
     return page
 
 
-def test_two_jobs_are_compared(compared: Any, service: Service, jobs: tuple[str, str], expect: Any) -> None:
+def test_two_jobs_are_compared(
+    compared: Any, service: ServiceClient, jobs: tuple[str, str], expect: Any
+) -> None:
     expect(compared.get_by_text("All models have the same data.")).to_be_visible()
     for job, row in zip(jobs, compared.locator("table").first.locator("tbody tr").all(), strict=True):
         (best,) = (each for each in json.loads(service.models(job))["items"] if each["recommended"])
@@ -92,7 +94,7 @@ def test_models_of_a_job_are_chosen_on_its_page(
 
 
 def test_jobs_of_different_data_and_jobs_without_a_result_are_stated(
-    opened: Callable[..., Any], service: Service, jobs: tuple[str, str], expect: Any
+    opened: Callable[..., Any], service: ServiceClient, jobs: tuple[str, str], expect: Any
 ) -> None:
     other = run_submitted(service, service.submit(5, name="rows", rows="0:300"))
     queued = service.submit(5, name="waits")

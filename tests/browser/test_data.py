@@ -13,7 +13,7 @@ from support.command_line import write_hysteresis
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
@@ -53,7 +53,7 @@ def remove_rows(text: str) -> str:
     return "\n".join([*lines[:101], *lines[141:]])
 
 
-def submit(page: Any, desk: Service) -> dict[str, Any]:
+def submit(page: Any, desk: ServiceClient) -> dict[str, Any]:
     """Start the job of the page; return its specification."""
     page.get_by_role("button", name="Identify").click()
     page.wait_for_url("**/#/jobs/*")
@@ -64,7 +64,7 @@ def submit(page: Any, desk: Service) -> dict[str, Any]:
 
 
 @pytest.fixture
-def looked(quiet: Callable[..., Screen], desk: Service, text: str) -> Any:
+def looked(quiet: Callable[..., Screen], desk: ServiceClient, text: str) -> Any:
     """Page of a data set whose file was dropped on the list of jobs."""
     page = quiet(desk.url).go()
     page.get_by_role("heading", name="Jobs", exact=True).wait_for()
@@ -74,7 +74,9 @@ def looked(quiet: Callable[..., Screen], desk: Service, text: str) -> Any:
     return page
 
 
-def test_a_dropped_file_is_looked_at_and_a_job_of_it_started(looked: Any, desk: Service, expect: Any) -> None:
+def test_a_dropped_file_is_looked_at_and_a_job_of_it_started(
+    looked: Any, desk: ServiceClient, expect: Any
+) -> None:
     assert looked.get_by_label("u_V is an input").is_checked()
     assert looked.get_by_label("y_um is the output").is_checked()
     looked.get_by_role("button", name="Identify").click()
@@ -84,7 +86,7 @@ def test_a_dropped_file_is_looked_at_and_a_job_of_it_started(looked: Any, desk: 
     desk.ask("POST", f"/v1/jobs/{job['id']}/cancel")
 
 
-def test_the_visible_rows_are_those_of_the_job(looked: Any, desk: Service) -> None:
+def test_the_visible_rows_are_those_of_the_job(looked: Any, desk: ServiceClient) -> None:
     plot = looked.get_by_role("slider", name="Record")
     plot.focus()
     for key in ("+", "+", "+", "PageDown"):
@@ -166,7 +168,7 @@ def test_sampling_times_of_columns_are_shown_if_they_differ(
     expect(looked.locator("table.choice th", has_text="Sampling time")).to_have_count(count)
 
 
-def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
     page = screens(desk.url).go("#/data")
     page.get_by_role("heading", name="Data", exact=True).wait_for()
     drop(page, "empty.csv", "")
@@ -175,7 +177,7 @@ def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: Service, e
 
 
 def test_a_remedy_changes_the_record_of_the_job(
-    quiet: Callable[..., Screen], desk: Service, text: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, text: str, expect: Any
 ) -> None:
     page = quiet(desk.url).go("#/data")
     drop(page, "gaps.csv", remove_rows(text))
@@ -198,7 +200,7 @@ def test_a_remedy_changes_the_record_of_the_job(
     page.wait_for_url(f"**/{first}*")
 
 
-def test_a_range_that_is_dragged_validates(looked: Any, desk: Service, expect: Any) -> None:
+def test_a_range_that_is_dragged_validates(looked: Any, desk: ServiceClient, expect: Any) -> None:
     looked.get_by_role("button", name="Mark validation").click()
     box = looked.get_by_role("slider", name="Record").bounding_box()
     width, y = box["width"], box["y"] + 60
@@ -223,7 +225,7 @@ def test_a_range_that_is_dragged_validates(looked: Any, desk: Service, expect: A
 
 
 def test_only_changed_settings_are_sent_and_a_job_can_be_run_again(
-    looked: Any, desk: Service, expect: Any
+    looked: Any, desk: ServiceClient, expect: Any
 ) -> None:
     looked.get_by_text("Settings", exact=True).click()
     looked.get_by_label("Preset").select_option("hysteresis")
@@ -242,7 +244,7 @@ def test_only_changed_settings_are_sent_and_a_job_can_be_run_again(
 
 
 def test_several_files_are_one_job_if_they_have_the_same_columns(
-    quiet: Callable[..., Screen], desk: Service, text: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, text: str, expect: Any
 ) -> None:
     page = quiet(desk.url).go("#/data")
     page.get_by_role("heading", name="Data", exact=True).wait_for()
@@ -258,7 +260,7 @@ def test_several_files_are_one_job_if_they_have_the_same_columns(
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_pages_of_data_are_readable(
-    quiet: Callable[..., Screen], desk: Service, text: str, scheme: str, width: int
+    quiet: Callable[..., Screen], desk: ServiceClient, text: str, scheme: str, width: int
 ) -> None:
     page = quiet(desk.url, width, 800, color_scheme=scheme).go("#/data")
     drop(page, "piezo.csv", text)

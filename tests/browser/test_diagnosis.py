@@ -19,7 +19,7 @@ from support.played import stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 pytestmark = pytest.mark.ci
@@ -57,7 +57,7 @@ RESULT["record"] |= {"samples": 400, "dt": 0.01}
 PAGE = b"<!DOCTYPE html><title>piezo.csv: named</title><h1>piezo.csv against bouc-wen-piezo</h1>"
 
 
-def make_outcome(desk: Service, **summary: Any) -> JobOutcome:
+def make_outcome(desk: ServiceClient, **summary: Any) -> JobOutcome:
     """Return the outcome of a diagnosis, with a stored report."""
     blobs = Blobs(desk.folder / "blobs")
     output = np.sin(np.arange(400) / 20)
@@ -70,7 +70,7 @@ def make_outcome(desk: Service, **summary: Any) -> JobOutcome:
     return JobOutcome(JobState.SUCCEEDED, RESULT, summary={**SUMMARY, **summary}, artefacts=artefacts)
 
 
-def submit_diagnosis(desk: Service, **changes: Any) -> str:
+def submit_diagnosis(desk: ServiceClient, **changes: Any) -> str:
     spec = {"dataset": desk.dataset, "input": "u_V", "output": "y_um", "tolerance": {"dp": 0.01}}
     simulation = {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}
     answer = desk.ask("POST", "/v1/discrepancies", json={**spec, "simulation": simulation, **changes})
@@ -79,7 +79,7 @@ def submit_diagnosis(desk: Service, **changes: Any) -> str:
 
 
 def test_the_page_of_a_diagnosis_shows_progress_and_result(
-    quiet: Callable[..., Screen], desk: Service, expect: Any, tmp_path: Path
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any, tmp_path: Path
 ) -> None:
     job = submit_diagnosis(desk, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -118,7 +118,7 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
 
 
 def test_a_long_result_fits_on_a_narrow_screen(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = submit_diagnosis(desk)
     with stored(desk) as store:
@@ -134,7 +134,7 @@ def test_a_long_result_fits_on_a_narrow_screen(
 
 
 def test_the_list_shows_the_verdict_of_a_diagnosis(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     jobs = [submit_diagnosis(desk, name=name) for name in ("one", "two")]
     nothing = {"verdict": "nothing", "effects": [], "reduction_percent": None}
@@ -152,7 +152,7 @@ def test_the_list_shows_the_verdict_of_a_diagnosis(
 
 
 @pytest.fixture
-def finished(desk: Service) -> str:
+def finished(desk: ServiceClient) -> str:
     """A succeeded diagnosis."""
     job = submit_diagnosis(desk)
     with stored(desk) as store:
@@ -161,7 +161,7 @@ def finished(desk: Service) -> str:
 
 
 def test_verdict_and_figure_are_on_the_first_screen_above_the_causes(
-    quiet: Callable[..., Screen], desk: Service, finished: str
+    quiet: Callable[..., Screen], desk: ServiceClient, finished: str
 ) -> None:
     page = quiet(desk.url, width=1440, height=900).go(f"#/jobs/{finished}")
     eventually(lambda: page.locator("canvas").count() == 1 and page.locator("canvas").evaluate(DRAWN) > 100)
@@ -171,7 +171,7 @@ def test_verdict_and_figure_are_on_the_first_screen_above_the_causes(
 
 
 def test_the_values_of_all_outputs_are_read_with_the_keys(
-    quiet: Callable[..., Screen], desk: Service, finished: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, finished: str, expect: Any
 ) -> None:
     page = quiet(desk.url).go(f"#/jobs/{finished}")
     plot = page.get_by_role("slider", name="Record")
@@ -181,7 +181,7 @@ def test_the_values_of_all_outputs_are_read_with_the_keys(
 
 
 def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
-    quiet: Callable[..., Screen], desk: Service, finished: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, finished: str, expect: Any
 ) -> None:
     page = quiet(desk.url).go(f"#/jobs/{finished}")
     rows = page.locator("table.causes tbody tr")
@@ -198,7 +198,7 @@ def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
 
 
 def test_an_extended_difference_equation_is_typeset_and_exported(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = submit_diagnosis(desk)
     linear = {"kind": "linear", "order": 0, "numerator": [2.0]}
@@ -217,7 +217,7 @@ def test_an_extended_difference_equation_is_typeset_and_exported(
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_page_of_a_finished_diagnosis_is_readable(
-    quiet: Callable[..., Screen], desk: Service, finished: str, scheme: str, width: int
+    quiet: Callable[..., Screen], desk: ServiceClient, finished: str, scheme: str, width: int
 ) -> None:
     page = quiet(desk.url, width, 800, color_scheme=scheme).go(f"#/jobs/{finished}")
     page.locator("table.causes").wait_for()

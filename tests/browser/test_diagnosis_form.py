@@ -12,13 +12,13 @@ from support.command_line import write_offset
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
 
 @pytest.fixture(scope="module")
-def dataset(desk: Service, tmp_path_factory: pytest.TempPathFactory) -> str:
+def dataset(desk: ServiceClient, tmp_path_factory: pytest.TempPathFactory) -> str:
     """A record with a recorded simulation in the column ``theirs_um``."""
     file = write_offset(tmp_path_factory.mktemp("data") / "offset.csv")
     answer = desk.ask("POST", "/v1/datasets", files={"file": ("offset.csv", file.read_bytes())})
@@ -32,7 +32,7 @@ def open_form(screen: Screen, dataset: str) -> Any:
     return page
 
 
-def submit(page: Any, desk: Service) -> dict[str, Any]:
+def submit(page: Any, desk: ServiceClient) -> dict[str, Any]:
     """Start the diagnosis; return its specification. The job is cancelled."""
     page.get_by_role("button", name="Diagnose").click()
     page.wait_for_url("**/#/jobs/*")
@@ -43,7 +43,7 @@ def submit(page: Any, desk: Service) -> dict[str, Any]:
 
 
 def test_a_diagnosis_of_a_column_is_started_and_the_column_drawn_before(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
     page = open_form(quiet(desk.url), dataset)
     expect(page.get_by_label("Column", exact=True)).to_have_value("theirs_um")
@@ -56,7 +56,7 @@ def test_a_diagnosis_of_a_column_is_started_and_the_column_drawn_before(
 
 
 def test_values_and_tolerances_of_a_built_in_simulation_are_those_of_the_job(
-    quiet: Callable[..., Screen], desk: Service, dataset: str
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str
 ) -> None:
     page = open_form(quiet(desk.url), dataset)
     page.get_by_label("Simulation", exact=True).select_option("second-order")
@@ -75,7 +75,7 @@ def test_values_and_tolerances_of_a_built_in_simulation_are_those_of_the_job(
 
 
 def test_a_wrong_equation_is_explained_and_the_corrected_one_started(
-    screens: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
     page = open_form(screens(desk.url), dataset)
     page.get_by_label("Simulation", exact=True).select_option("ode")
@@ -97,7 +97,7 @@ def test_a_wrong_equation_is_explained_and_the_corrected_one_started(
 
 
 def test_a_text_survives_another_choice_of_columns(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
     page = open_form(quiet(desk.url), dataset)
     page.get_by_label("Simulation", exact=True).select_option("ode")
@@ -110,7 +110,7 @@ def test_a_text_survives_another_choice_of_columns(
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_form_is_readable(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, expect: Any, scheme: str, width: int
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any, scheme: str, width: int
 ) -> None:
     page = open_form(quiet(desk.url, width, 800, color_scheme=scheme), dataset)
     for kind in ("second-order", "linear", "model", "ode"):

@@ -7,19 +7,19 @@ import pytest
 
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
 
 @pytest.fixture
-def docs(quiet: Callable[..., Screen], desk: Service) -> Callable[..., Any]:
+def docs(quiet: Callable[..., Screen], desk: ServiceClient) -> Callable[..., Any]:
     """Function that opens the reference; an error or a request to another origin fails the test."""
     return lambda place="docs", **options: quiet(desk.url, **options).go(place)
 
 
 def test_every_operation_and_every_schema_is_an_entry(
-    docs: Callable[..., Any], desk: Service, expect: Any
+    docs: Callable[..., Any], desk: ServiceClient, expect: Any
 ) -> None:
     document = desk.ask("GET", "/openapi.json").json()
     operations = [each for of in document["paths"].values() for each in of.values()]

@@ -12,7 +12,7 @@ from support.canvas import count_segments, get_faint_lines, get_lines
 from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import LONG, taken
 
 PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7 <b>column y</b> is empty"}
@@ -30,7 +30,7 @@ def island_errors(generation: int, islands: int = 2) -> list[float]:
 
 @pytest.mark.ci
 def test_the_convergence_chart_grows_with_the_events(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -54,7 +54,7 @@ def test_the_convergence_chart_grows_with_the_events(
 
 @pytest.mark.ci
 def test_warnings_about_the_data_are_shown_during_the_search(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -68,7 +68,7 @@ def test_warnings_about_the_data_are_shown_during_the_search(
 
 @pytest.mark.ci
 def test_bar_and_time_left_of_a_search_move_from_its_first_phase_on(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -94,7 +94,7 @@ def test_bar_and_time_left_of_a_search_move_from_its_first_phase_on(
 
 @pytest.mark.ci
 def test_a_job_shows_its_run_time_and_the_limit(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -115,7 +115,9 @@ def test_a_job_shows_its_run_time_and_the_limit(
 
 
 @pytest.mark.ci
-def test_a_failed_job_shows_its_problem(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_a_failed_job_shows_its_problem(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
         store.leases.finish(taken(store, job), JobOutcome(JobState.FAILED, problem=PROBLEM))
@@ -128,7 +130,7 @@ def test_a_failed_job_shows_its_problem(quiet: Callable[..., Screen], desk: Serv
 
 @pytest.mark.ci
 def test_a_queued_job_is_cancelled_resumed_and_deleted_if_confirmed(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -159,7 +161,7 @@ def test_a_queued_job_is_cancelled_resumed_and_deleted_if_confirmed(
 
 @pytest.mark.ci
 def test_a_running_job_is_cancelling_until_its_coordinator_stops(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -177,7 +179,7 @@ def test_a_running_job_is_cancelling_until_its_coordinator_stops(
 @pytest.mark.ci
 @pytest.mark.parametrize("state", [JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED])
 def test_an_ended_job_shows_no_note_and_no_phase_of_its_attempts(
-    quiet: Callable[..., Screen], desk: Service, expect: Any, state: JobState
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any, state: JobState
 ) -> None:
     reason, note = "the disk was full", "waiting for capacity"
     job = desk.submit(500, name="piezo")
@@ -202,7 +204,7 @@ def test_an_ended_job_shows_no_note_and_no_phase_of_its_attempts(
 
 @pytest.mark.nightly
 def test_a_job_resumed_by_another_client_is_updated(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     desk.ask("POST", f"/v1/jobs/{job}/cancel")
@@ -217,7 +219,7 @@ def test_a_job_resumed_by_another_client_is_updated(
 
 @pytest.mark.nightly
 def test_a_late_response_does_not_restore_an_old_state(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     held: list[Any] = []
@@ -235,7 +237,9 @@ def test_a_late_response_does_not_restore_an_old_state(
 
 
 @pytest.mark.ci
-def test_a_reload_keeps_the_scroll_position(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_a_reload_keeps_the_scroll_position(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 30)
@@ -252,7 +256,7 @@ def test_a_reload_keeps_the_scroll_position(quiet: Callable[..., Screen], desk: 
 
 @pytest.mark.ci
 def test_every_island_has_a_line_for_any_number_of_islands(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, settings={"islands": 20})
     with stored(desk) as store:
@@ -268,7 +272,9 @@ def test_every_island_has_a_line_for_any_number_of_islands(
 
 
 @pytest.mark.ci
-def test_an_unknown_job_shows_a_message(screens: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_an_unknown_job_shows_a_message(
+    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
     page = screens(desk.url).go("#/jobs/nope")
     expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
     expect(page.locator("main")).to_contain_text("there is no job 'nope'")
@@ -278,7 +284,7 @@ def test_an_unknown_job_shows_a_message(screens: Callable[..., Screen], desk: Se
 
 @pytest.mark.ci
 def test_a_job_deleted_by_another_client_shows_a_message(
-    screens: Callable[..., Screen], desk: Service, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     page = screens(desk.url).go(f"#/jobs/{job}")
@@ -290,7 +296,7 @@ def test_a_job_deleted_by_another_client_shows_a_message(
 
 @pytest.mark.ci
 def test_the_page_shows_the_settings_and_the_data_set_of_a_job(
-    quiet: Callable[..., Screen], desk: Service
+    quiet: Callable[..., Screen], desk: ServiceClient
 ) -> None:
     page = quiet(desk.url).go(f"#/jobs/{desk.submit(321, rows='0:3500')}")
     page.locator("table code", has_text="y_um").wait_for()
@@ -329,7 +335,7 @@ EQUATIONS = {
 
 
 @pytest.fixture(scope="module")
-def blank(chromium: Any, desk: Service) -> Iterator[Screen]:
+def blank(chromium: Any, desk: ServiceClient) -> Iterator[Screen]:
     """One page for all equations, which it does not show."""
     screen = Screen(chromium.new_page(), desk.url)
     screen.go()

@@ -9,7 +9,7 @@ import pytest
 from islands_service.domain.job import JobOutcome, JobState
 from support.played import stored
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 pytestmark = pytest.mark.ci
@@ -25,7 +25,7 @@ SUMMARY = {
 
 
 @pytest.fixture(autouse=True)
-def emptied(desk: Service) -> Iterator[None]:
+def emptied(desk: ServiceClient) -> Iterator[None]:
     """Delete the jobs of other tests."""
     yield
     for job in desk.ask("GET", "/v1/jobs?limit=200").json()["items"]:
@@ -33,7 +33,7 @@ def emptied(desk: Service) -> Iterator[None]:
         assert desk.ask("DELETE", f"/v1/jobs/{job['id']}").status_code == 204
 
 
-def end(desk: Service, job: str, state: JobState = JobState.SUCCEEDED, **outcome: Any) -> str:
+def end(desk: ServiceClient, job: str, state: JobState = JobState.SUCCEEDED, **outcome: Any) -> str:
     """End a queued job; by default it succeeds with a model."""
     given = outcome or {"document": {}, "summary": SUMMARY}
     with stored(desk) as store:
@@ -51,7 +51,7 @@ def shown(page: Any) -> list[str]:
 
 
 def test_a_row_shows_the_equation_the_error_and_the_verdict(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = end(desk, desk.submit(500, name="stage 3", seed=7, tags=["cold"]))
     found = row(quiet(desk.url).go(), job)
@@ -59,14 +59,14 @@ def test_a_row_shows_the_equation_the_error_and_the_verdict(
     expect(found.locator(".verdict")).to_have_text("usable, with limits")
     assert found.locator("td.figure").all_text_contents()[:2] == ["3.14 %", "4"]
     about = found.locator(".about-job").text_content()
-    assert about.startswith("Identification · data.csv · seed 7")
+    assert about.startswith("Identification · data.csv · hysteresis · seed 7")
     assert about.endswith("u_V → y_um")
     assert found.locator(".tag").all_text_contents() == ["cold"]
     assert not found.locator("progress").is_visible()
 
 
 def test_a_click_anywhere_in_a_row_opens_its_job(
-    screens: Callable[..., Screen], desk: Service, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = end(desk, desk.submit(500, name="stage 3"))
     page = screens(desk.url).go()
@@ -78,7 +78,7 @@ def test_a_click_anywhere_in_a_row_opens_its_job(
     assert stops == ["INPUT", "A", "BUTTON"]
 
 
-def test_a_name_is_changed_in_its_row(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_a_name_is_changed_in_its_row(quiet: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
     job = desk.submit(500, name="before")
     page = quiet(desk.url).go()
     rename = row(page, job).get_by_role("button", name="Rename")
@@ -103,7 +103,7 @@ def test_a_name_is_changed_in_its_row(quiet: Callable[..., Screen], desk: Servic
 
 
 def test_a_refused_name_stays_in_its_field(
-    screens: Callable[..., Screen], desk: Service, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="before")
     page = screens(desk.url).go()
@@ -116,7 +116,9 @@ def test_a_refused_name_stays_in_its_field(
     expect(field).to_have_value("after")
 
 
-def test_rows_do_not_move_under_the_pointer(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_rows_do_not_move_under_the_pointer(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
     old = [desk.submit(500, name=f"old {number}") for number in range(2)]
     page = quiet(desk.url).go()
     row(page, old[0]).hover()
@@ -131,7 +133,7 @@ def test_rows_do_not_move_under_the_pointer(quiet: Callable[..., Screen], desk: 
 
 
 def test_tags_are_added_on_the_page_of_a_job_and_filter_the_list(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job, other = desk.submit(500, name="one"), desk.submit(500, name="two", tags=["cold"])
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -161,7 +163,7 @@ def test_tags_are_added_on_the_page_of_a_job_and_filter_the_list(
 
 
 def test_a_name_is_changed_on_the_page_of_a_job(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="before")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -174,7 +176,7 @@ def test_a_name_is_changed_on_the_page_of_a_job(
 
 
 def test_a_search_is_in_the_address_and_keeps_the_focus(
-    screens: Callable[..., Screen], desk: Service, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     found = end(desk, desk.submit(500, name="Bühne"))
     other = desk.submit(500, name="tank")
@@ -198,7 +200,7 @@ def test_a_search_is_in_the_address_and_keeps_the_focus(
     assert shown(page) == [found]
 
 
-def test_the_list_is_sorted_by_error(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_the_list_is_sorted_by_error(quiet: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
     jobs = []
     for error in (2.0, 0.5):
         summary = {**SUMMARY, "metrics": {"mape": error}}
@@ -217,7 +219,7 @@ def test_the_list_is_sorted_by_error(quiet: Callable[..., Screen], desk: Service
 
 
 def test_selected_jobs_are_deleted_after_a_confirmation(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     ended = [end(desk, desk.submit(500, name=f"ended {number}")) for number in range(3)]
     waiting = desk.submit(500, name="waiting")
@@ -240,7 +242,7 @@ def test_selected_jobs_are_deleted_after_a_confirmation(
 
 
 def test_selected_jobs_are_cancelled_and_compared(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     ended = [end(desk, desk.submit(500, name=f"ended {number}")) for number in range(2)]
     waiting = [desk.submit(500, name=f"waiting {number}") for number in range(2)]
@@ -257,7 +259,7 @@ def test_selected_jobs_are_cancelled_and_compared(
 
 @pytest.mark.parametrize(("kind", "resumed"), [("invalid-record", False), ("no-progress", True)])
 def test_a_job_is_resumed_only_where_it_can_succeed(
-    quiet: Callable[..., Screen], desk: Service, expect: Any, kind: str, resumed: bool
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any, kind: str, resumed: bool
 ) -> None:
     problem = {"type": kind, "title": "The job failed", "detail": "line 8, column y_um is empty"}
     job = end(desk, desk.submit(500), JobState.FAILED, problem=problem)

@@ -9,18 +9,18 @@ import pytest
 from support.played import advance, stored
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 
 @pytest.fixture(scope="module")
-def locked(guarded: Callable[..., Any]) -> Iterator[Service]:
-    with guarded("--coordinators", 0) as service:
+def locked(hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
+    with hosted(require_keys=True) as service:
         yield service
 
 
 @pytest.fixture
-def key(locked: Service) -> str:
+def key(locked: ServiceClient) -> str:
     """A key of a new owner, which the client of the test uses, too."""
     secret = make_key(locked, "read", "write")
     locked.client.headers["Authorization"] = f"Bearer {secret}"
@@ -28,7 +28,7 @@ def key(locked: Service) -> str:
     return secret
 
 
-def make_key(service: Service, *scopes: str, owner: str | None = None) -> str:
+def make_key(service: ServiceClient, *scopes: str, owner: str | None = None) -> str:
     with stored(service) as store:
         return store.keys.create("test", frozenset(scopes), owner)[1]
 
@@ -40,7 +40,7 @@ def enter(page: Any, secret: str) -> None:
 
 @pytest.mark.ci
 def test_the_key_form_rejects_wrong_keys_and_keeps_a_valid_one(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     job = locked.submit(500, name="mine")
     page = screens(locked.url).go(f"#/jobs/{job}")
@@ -66,7 +66,7 @@ def test_the_key_form_rejects_wrong_keys_and_keeps_a_valid_one(
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_key_form_has_sufficient_contrast(
-    screens: Callable[..., Screen], locked: Service, width: int, scheme: str
+    screens: Callable[..., Screen], locked: ServiceClient, width: int, scheme: str
 ) -> None:
     page = screens(locked.url, width=width, color_scheme=scheme).go()
     page.get_by_label("Key").wait_for()
@@ -74,7 +74,7 @@ def test_the_key_form_has_sufficient_contrast(
 
 
 @pytest.mark.ci
-def test_the_key_is_in_no_url(screens: Callable[..., Screen], locked: Service, key: str) -> None:
+def test_the_key_is_in_no_url(screens: Callable[..., Screen], locked: ServiceClient, key: str) -> None:
     screen = screens(locked.url)
     send_request: list[str] = []
     screen.page.on("request", lambda request: send_request.append(request.url))
@@ -87,7 +87,7 @@ def test_the_key_is_in_no_url(screens: Callable[..., Screen], locked: Service, k
 
 @pytest.mark.ci
 def test_event_streams_are_opened_with_the_key(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     job = locked.submit(500)
     page = screens(locked.url).go(f"#/jobs/{job}")
@@ -101,7 +101,7 @@ def test_event_streams_are_opened_with_the_key(
 
 @pytest.mark.ci
 def test_jobs_of_another_owner_are_hidden(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     job = locked.submit(500, name="mine")
     page = screens(locked.url).go(f"#/jobs/{job}")
@@ -113,7 +113,7 @@ def test_jobs_of_another_owner_are_hidden(
 
 @pytest.mark.nightly
 def test_a_revoked_key_shows_the_key_form_with_the_reason(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     page = screens(locked.url).go()
     enter(page, key)
@@ -126,7 +126,7 @@ def test_a_revoked_key_shows_the_key_form_with_the_reason(
 
 @pytest.mark.nightly
 def test_an_action_without_its_scope_shows_a_problem(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     job = locked.submit(500)
     with stored(locked) as store:
@@ -143,7 +143,7 @@ def test_an_action_without_its_scope_shows_a_problem(
 
 @pytest.mark.ci
 def test_an_administrator_sees_the_owners_of_jobs_and_opens_those_of_the_key(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     theirs = locked.submit(500, name="theirs")
     own = make_key(locked, "read", "write", "admin", owner="operator")
@@ -170,7 +170,7 @@ def test_an_administrator_sees_the_owners_of_jobs_and_opens_those_of_the_key(
 
 @pytest.mark.ci
 def test_a_key_of_one_owner_has_no_choice_of_owners(
-    screens: Callable[..., Screen], locked: Service, key: str, expect: Any
+    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:
     locked.submit(500, name="mine")
     page = screens(locked.url).go("#/jobs")

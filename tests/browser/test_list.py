@@ -10,7 +10,7 @@ import pytest
 from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from support.played import advance, stored
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 pytestmark = pytest.mark.ci
@@ -23,7 +23,7 @@ def row(page: Any, job: str) -> Any:
 
 
 def test_a_new_job_appears_and_changes_its_state(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     page = quiet(desk.url).go()
     job = desk.submit(500, name="tank, level 3")
@@ -44,7 +44,7 @@ def test_a_new_job_appears_and_changes_its_state(
 
 
 def test_a_name_cannot_reverse_the_text_around_it(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     """A right-to-left override would turn "report\u202efdp.exe" into "reportexe.pdf" and all that follows."""
     job = desk.submit(500, name="report\u202efdp")
@@ -55,7 +55,7 @@ def test_a_name_cannot_reverse_the_text_around_it(
 
 
 def test_a_job_that_waits_for_a_reason_shows_it(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
@@ -65,7 +65,7 @@ def test_a_job_that_waits_for_a_reason_shows_it(
 
 
 def test_a_queued_job_shows_its_place_among_all_jobs(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     with stored(desk) as store:
         while (lease := store.leases.claim(f"emptied {time.monotonic()}", 3600.0)) is not None:
@@ -80,7 +80,7 @@ def test_a_queued_job_shows_its_place_among_all_jobs(
 
 
 def test_a_queued_job_shows_when_it_starts_if_running_jobs_have_a_time_left(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     with stored(desk) as store:
         running = desk.submit(500)
@@ -98,7 +98,7 @@ def test_a_queued_job_shows_when_it_starts_if_running_jobs_have_a_time_left(
 
 
 def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     waits = "waiting for capacity: 0 of 2 island actors are ready, the others need a CPU each"
     reason = "the record has a gap of 3 s after sample 400: give --gaps split"
@@ -117,7 +117,7 @@ def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
     assert page.get_by_text(reason).count() == 1
 
 
-def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
     job = desk.submit(500, name=HOSTILE)
     page = quiet(desk.url).go()
     link = row(page, job).locator("th a")
@@ -130,7 +130,7 @@ def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], des
 
 
 def test_a_filter_shows_only_jobs_in_its_state(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     waiting, other = desk.submit(500), desk.submit(500)
     assert desk.ask("POST", f"/v1/jobs/{other}/cancel").status_code == 202
@@ -149,7 +149,7 @@ def test_a_filter_shows_only_jobs_in_its_state(
 
 
 def test_pages_show_each_job_once_while_jobs_are_added(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     jobs = [desk.submit(500) for _ in range(55)]
     page = quiet(desk.url).go()
@@ -166,7 +166,7 @@ def test_pages_show_each_job_once_while_jobs_are_added(
     expect(row(page, late)).to_be_visible()
 
 
-def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go()
     link = row(page, job).locator("th a")
@@ -179,7 +179,7 @@ def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], 
     assert page.url.endswith(f"#/jobs/{job}")
 
 
-def test_a_hidden_page_sends_no_requests(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_a_hidden_page_sends_no_requests(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
     desk.submit(500)
     screen = quiet(desk.url)
     asked: list[str] = []
@@ -207,7 +207,7 @@ def test_a_hidden_page_sends_no_requests(quiet: Callable[..., Screen], desk: Ser
 
 
 def test_a_rejected_request_shows_its_problem(
-    screens: Callable[..., Screen], desk: Service, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     desk.submit(500)
     page = screens(desk.url).go("#/jobs?cursor=garbage")
@@ -219,7 +219,7 @@ def test_a_rejected_request_shows_its_problem(
     expect(banner).to_have_count(0)
 
 
-def test_an_unknown_address_redirects_to_the_list(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_an_unknown_address_redirects_to_the_list(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
     for place in ("#/nonsense", "#/jobs/", "#/jobs/a/b", "#%zz"):
         page = quiet(desk.url).go(place)
         page.get_by_role("heading", name="Jobs", exact=True).wait_for()

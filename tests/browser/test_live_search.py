@@ -15,15 +15,15 @@ from support.coordinators import SerialCoordinator
 from support.played import advance, stored
 from support.processes import eventually
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 
 @pytest.fixture(scope="module")
-def service(guarded: Callable[..., Any]) -> Iterator[Service]:
+def service(hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
     """A service whose searches run in this process, without Ray."""
     stopping = StopRequest()
-    with guarded("--coordinators", 0) as running:
+    with hosted(require_keys=True) as running:
         settings = ServiceSettings(data_dir=running.folder)
         thread = Thread(target=SerialCoordinator(settings, "me", stopping).run)
         thread.start()
@@ -34,7 +34,7 @@ def service(guarded: Callable[..., Any]) -> Iterator[Service]:
 
 @pytest.mark.ci
 def test_a_running_job_states_its_phase_in_words(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo", preset="auto")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -73,7 +73,7 @@ def test_a_running_job_states_its_phase_in_words(
 
 @pytest.mark.ci
 def test_the_front_grows_and_its_points_show_their_equations(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -103,7 +103,7 @@ def test_the_front_grows_and_its_points_show_their_equations(
 
 @pytest.mark.ci
 def test_stop_and_keep_the_best_ends_a_search_with_models(
-    opened: Callable[..., Any], service: Service, expect: Any
+    opened: Callable[..., Any], service: ServiceClient, expect: Any
 ) -> None:
     job = service.submit(1_000_000, name="endless")
     page = opened(f"#/jobs/{job}")

@@ -18,7 +18,7 @@ from support.played import run_submitted, stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.statements import find_contradictions
 from support.stores import LONG, taken
 
@@ -32,6 +32,8 @@ MAX_PAINT_MS = 2000
 #: Maximum ratio of the first contentful paint to that of a page with a few words.
 MAX_PAINT_RATIO = 20
 
+#: Milliseconds in which a busy machine draws the figures of a model or of a search.
+DRAWN = 120_000
 
 #: Transferred bytes of files and of data, and the first contentful paint in milliseconds.
 MEASURED = """() => {
@@ -44,14 +46,14 @@ MEASURED = """() => {
 
 
 @pytest.fixture(scope="module")
-def finished(service: Service) -> str:
+def finished(service: ServiceClient) -> str:
     """A succeeded job, executed by the test process."""
-    return run_submitted(service, service.submit(60, name="piezo, 2 islands"))
+    return run_submitted(service, service.submit(10, name="piezo, 2 islands"))
 
 
 @pytest.mark.ci
 def test_a_finished_job_shows_its_models_with_their_metrics(
-    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+    opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:
     page = opened(f"#/jobs/{finished}")
     models = json.loads(service.models(finished))["items"]
@@ -72,7 +74,7 @@ def test_a_finished_job_shows_its_models_with_their_metrics(
 
 @pytest.mark.ci
 def test_the_panel_begins_with_the_sentences(
-    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+    opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:
     page = opened(f"#/jobs/{finished}")
     words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
@@ -82,7 +84,9 @@ def test_the_panel_begins_with_the_sentences(
 
 
 @pytest.mark.nightly
-def test_the_report_is_saved_as_a_file(opened: Callable[..., Any], service: Service, finished: str) -> None:
+def test_the_report_is_saved_as_a_file(
+    opened: Callable[..., Any], service: ServiceClient, finished: str
+) -> None:
     page = opened(f"#/jobs/{finished}")
     words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
     with page.expect_download() as saved:
@@ -137,7 +141,7 @@ def test_a_diverged_error_is_one_word_with_the_reason_as_title(
 
 @pytest.mark.ci
 def test_the_equation_is_mathml_that_matches_the_model(
-    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+    opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:
     model = json.loads(service.models(finished))["items"][1]
     page = opened(f"#/jobs/{finished}/models/2")
@@ -160,21 +164,24 @@ def test_figures_are_loaded_when_they_scroll_into_view(
     page = opened("#/jobs")
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
-    page.goto(f"{page.url.partition('#')[0]}#/jobs/{finished}/models/3")
+    # A request waits until its route is removed.
+    page.route("**/figures/*", lambda _route: None)
+    page.goto(f"{page.url.partition('#')[0]}#/jobs/{finished}")
     expect(page.locator(".gallery .rendered")).to_have_count(4)
     page.wait_for_load_state("networkidle")
     assert not [url for url in asked if "/figures/" in url]
     page.locator(".rendered").first.scroll_into_view_if_needed()
     expect(page.get_by_text("Drawing…").first).to_be_visible()
+    page.unroute("**/figures/*")
     page.locator(".rendered").last.scroll_into_view_if_needed()
-    expect(page.locator(".gallery img")).to_have_count(4, timeout=60_000)
+    expect(page.locator(".gallery img")).to_have_count(4, timeout=DRAWN)
     for name in ("Free run", "Output over input", "Held input", "Residual correlations"):
         picture = page.get_by_role("img", name=f"{name}, drawn by the service")
         expect(picture).to_be_visible()
         eventually(lambda shown=picture: shown.evaluate("img => img.complete && img.naturalWidth > 300"))
     page.get_by_text("Figures of the search").click()
     page.locator(".search .rendered").last.scroll_into_view_if_needed()
-    expect(page.locator(".search img")).to_have_count(4, timeout=60_000)
+    expect(page.locator(".search img")).to_have_count(4, timeout=DRAWN)
 
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
@@ -188,7 +195,7 @@ def test_the_models_panel_has_sufficient_contrast(
 
 
 @pytest.fixture(scope="module")
-def coupled(service: Service) -> str:
+def coupled(service: ServiceClient) -> str:
     """A succeeded job of two outputs, executed by the test process."""
     record = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
     rows = zip(0.1 * np.arange(200).round(3), record.records[0].u[:, 0], *record.y.T, strict=True)
@@ -209,7 +216,7 @@ def coupled(service: Service) -> str:
 @pytest.mark.ci
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_job_of_two_outputs_shows_both(
-    opened: Callable[..., Any], service: Service, coupled: str, expect: Any, scheme: str
+    opened: Callable[..., Any], service: ServiceClient, coupled: str, expect: Any, scheme: str
 ) -> None:
     page = opened(f"#/jobs/{coupled}", color_scheme=scheme)
     words = service.ask("GET", f"/v1/jobs/{coupled}").json()["summary"]["words"].splitlines()
@@ -224,11 +231,13 @@ def test_a_job_of_two_outputs_shows_both(
     expect(page.get_by_text("Convergence")).to_have_count(0)
     assert unreadable(page) == []
     page.locator(".gallery .rendered").last.scroll_into_view_if_needed()
-    expect(page.locator(".gallery img")).to_have_count(2, timeout=60_000)
+    expect(page.locator(".gallery img")).to_have_count(2, timeout=DRAWN)
 
 
 @pytest.mark.ci
-def test_a_model_is_saved_as_a_file(opened: Callable[..., Any], service: Service, finished: str) -> None:
+def test_a_model_is_saved_as_a_file(
+    opened: Callable[..., Any], service: ServiceClient, finished: str
+) -> None:
     page = opened(f"#/jobs/{finished}/models/2")
     for button, form, name in (("C", "c", "model-02.c"), ("LaTeX", "latex", "model-02.tex")):
         with page.expect_download() as saved:
@@ -254,7 +263,7 @@ def test_every_export_format_has_a_button(opened: Callable[..., Any], finished: 
 
 @pytest.mark.ci
 def test_a_selected_model_is_kept_by_a_reload(
-    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+    opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:
     page = opened(f"#/jobs/{finished}")
     models = json.loads(service.models(finished))["items"]
@@ -277,7 +286,7 @@ def test_a_selected_model_is_kept_by_a_reload(
 def test_the_page_is_small_and_loads_quickly(
     opened: Callable[..., Any],
     screens: Callable[..., Screen],
-    service: Service,
+    service: ServiceClient,
     finished: str,
     expect: Any,
 ) -> None:
@@ -297,13 +306,13 @@ def test_the_page_is_small_and_loads_quickly(
 
 @pytest.mark.ci
 def test_a_figure_is_saved_as_svg_png_and_csv(
-    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+    opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:
     page = opened(f"#/jobs/{finished}", color_scheme="dark")
     figure = page.locator("figure.rendered", has=page.get_by_role("heading", name="Residual correlations"))
     figure.scroll_into_view_if_needed()
-    # The first request draws all figures, which takes half a minute on a busy machine.
-    figure.get_by_role("img").wait_for(timeout=120_000)
+    # The first request draws all figures.
+    figure.get_by_role("img").wait_for(timeout=DRAWN)
     expect(figure.get_by_role("img")).to_have_css("filter", "invert(1) hue-rotate(180deg)")
     made = {}
     for form in ("SVG", "PNG", "CSV"):

@@ -19,7 +19,7 @@ from support.played import stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 #: Records, of which the last ones have play at the input.
@@ -28,20 +28,20 @@ COUNT = 27
 NAME = "press <b>4</b>"
 
 
-def upload_record(desk: Service, folder: Path) -> str:
+def upload_record(desk: ServiceClient, folder: Path) -> str:
     """Upload a record; return its path."""
     path = folder / "record-next.csv"
     write_record(make_records(COUNT, play=0.5)[-1], path)
     return str(path)
 
 
-def create_monitor(desk: Service) -> str:
+def create_monitor(desk: ServiceClient) -> str:
     answer = desk.ask("POST", "/v1/monitors", json={**OSCILLATOR, "name": NAME})
     assert answer.status_code == 201, answer.text
     return str(answer.json()["id"])
 
 
-def add_record(desk: Service, monitor: str, folder: Path) -> str:
+def add_record(desk: ServiceClient, monitor: str, folder: Path) -> str:
     """Submit a record; return the id of its job."""
     path = Path(upload_record(desk, folder))
     dataset = desk.ask("POST", "/v1/datasets", files={"file": (path.name, path.read_bytes())}).json()["id"]
@@ -50,7 +50,7 @@ def add_record(desk: Service, monitor: str, folder: Path) -> str:
     return str(answer.json()["id"])
 
 
-def store_states(desk: Service, monitor: str, job: str, saved: SavedMonitor) -> None:
+def store_states(desk: ServiceClient, monitor: str, job: str, saved: SavedMonitor) -> None:
     """End the job of a record with the states of a monitor."""
     with stored(desk) as store:
         lease = taken(store, job)
@@ -74,7 +74,9 @@ def changed() -> SavedMonitor:
 
 
 @pytest.fixture(scope="module")
-def places(desk: Service, changed: SavedMonitor, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def places(
+    desk: ServiceClient, changed: SavedMonitor, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, str]:
     """Addresses of the list and of a monitor with an alarm."""
     monitor = create_monitor(desk)
     store_states(desk, monitor, add_record(desk, monitor, tmp_path_factory.mktemp("records")), changed)
@@ -84,7 +86,12 @@ def places(desk: Service, changed: SavedMonitor, tmp_path_factory: pytest.TempPa
 @pytest.mark.parametrize("name", ["list", "monitor"])
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_pages_of_monitors_fit_and_have_sufficient_contrast(
-    quiet: Callable[..., Screen], desk: Service, places: dict[str, str], name: str, scheme: str, width: int
+    quiet: Callable[..., Screen],
+    desk: ServiceClient,
+    places: dict[str, str],
+    name: str,
+    scheme: str,
+    width: int,
 ) -> None:
     page = quiet(desk.url, width, 800, color_scheme=scheme).go(places[name])
     page.locator("tbody tr").first.wait_for()
@@ -93,7 +100,7 @@ def test_the_pages_of_monitors_fit_and_have_sufficient_contrast(
 
 @pytest.mark.nightly
 def test_the_page_of_a_monitor_follows_its_records_and_marks_the_alarm(
-    quiet: Callable[..., Screen], desk: Service, expect: Any, changed: SavedMonitor, tmp_path: Path
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any, changed: SavedMonitor, tmp_path: Path
 ) -> None:
     monitor = create_monitor(desk)
     page = quiet(desk.url).go(f"#/monitors/{monitor}")
@@ -139,7 +146,7 @@ def test_the_page_of_a_monitor_follows_its_records_and_marks_the_alarm(
 
 @pytest.mark.nightly
 def test_a_diagnosis_is_followed_by_a_monitor_that_links_to_it(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     spec = {
         "dataset": desk.dataset,

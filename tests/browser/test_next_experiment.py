@@ -16,7 +16,7 @@ from support.played import stored
 from support.processes import eventually
 from support.reading import unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 pytestmark = pytest.mark.ci
@@ -57,7 +57,7 @@ EXPERIMENT = {
 }
 
 
-def finish(desk: Service, experiment: dict[str, Any]) -> str:
+def finish(desk: ServiceClient, experiment: dict[str, Any]) -> str:
     order = {
         "dataset": desk.dataset,
         "input": "u_V",
@@ -86,7 +86,7 @@ def finish(desk: Service, experiment: dict[str, Any]) -> str:
 
 
 def test_the_input_is_described_drawn_and_saved(
-    quiet: Callable[..., Screen], desk: Service, expect: Any, tmp_path: Path
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any, tmp_path: Path
 ) -> None:
     job = finish(desk, EXPERIMENT)
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -105,7 +105,7 @@ def test_the_input_is_described_drawn_and_saved(
 
 @pytest.mark.nightly
 def test_causes_that_no_input_separates_have_words_alone(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     pair = {**EXPERIMENT["pairs"][0], "predicted": None, "repeats": None}
     page = quiet(desk.url).go(f"#/jobs/{finish(desk, {'pairs': [pair], 'input': None})}")
@@ -118,7 +118,7 @@ def test_causes_that_no_input_separates_have_words_alone(
 @pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
 def test_the_section_is_readable(
-    quiet: Callable[..., Screen], desk: Service, tmp_path: Path, scheme: str, width: int
+    quiet: Callable[..., Screen], desk: ServiceClient, tmp_path: Path, scheme: str, width: int
 ) -> None:
     page = quiet(desk.url, width, 800, color_scheme=scheme).go(f"#/jobs/{finish(desk, EXPERIMENT)}")
     page.locator(".next-experiment canvas").wait_for()

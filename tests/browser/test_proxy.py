@@ -11,7 +11,7 @@ import pytest
 
 from support.played import stored
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 COOKIE = "_oauth2_proxy=session"
 
@@ -52,10 +52,10 @@ def logging_in(url: str, token: str) -> Iterator[str]:
 
 @pytest.mark.ci
 def test_the_dashboard_needs_no_key_behind_a_proxy_that_adds_a_token(
-    screens: Callable[..., Screen], guarded: Callable[..., Any], expect: Any
+    screens: Callable[..., Screen], hosted: Callable[..., Any], expect: Any
 ) -> None:
-    with guarded("--coordinators", 0) as service:
-        assert isinstance(service, Service)
+    with hosted(require_keys=True) as service:
+        assert isinstance(service, ServiceClient)
         with stored(service) as store:
             secret = store.keys.create("proxy", frozenset({"read", "write"}))[1]
         with logging_in(service.url, secret) as url:

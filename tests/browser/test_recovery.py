@@ -12,8 +12,15 @@ from support.canvas import count_segments, get_lines
 from support.played import advance, squared_error, stored
 from support.processes import eventually, kill
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_processes import Service, serving
 from support.stores import taken
+
+
+@pytest.fixture(scope="module")
+def desk(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service in processes, which a test can kill."""
+    with serving(tmp_path_factory.mktemp("desk") / "data", "--coordinators", 0) as running:
+        yield running
 
 
 @contextmanager

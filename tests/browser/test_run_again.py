@@ -8,7 +8,7 @@ import pytest
 from support.command_line import write_offset
 from support.repository import ROOT
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
@@ -61,13 +61,13 @@ REQUESTS: Mapping[str, dict[str, Any]] = {
 
 
 @pytest.fixture(scope="module")
-def dataset(desk: Service, tmp_path_factory: pytest.TempPathFactory) -> str:
+def dataset(desk: ServiceClient, tmp_path_factory: pytest.TempPathFactory) -> str:
     file = write_offset(tmp_path_factory.mktemp("data") / "offset.csv")
     answer = desk.ask("POST", "/v1/datasets", files={"file": ("offset.csv", file.read_bytes())})
     return str(answer.json()["id"])
 
 
-def start(desk: Service, path: str, request: Mapping[str, Any]) -> dict[str, Any]:
+def start(desk: ServiceClient, path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     answer = desk.ask("POST", path, json=dict(request))
     assert answer.status_code == 202, answer.text
     job = answer.json()
@@ -81,7 +81,7 @@ def open_again(screen: Screen, job: Mapping[str, Any]) -> Any:
     return page
 
 
-def submit(page: Any, desk: Service, button: str) -> dict[str, Any]:
+def submit(page: Any, desk: ServiceClient, button: str) -> dict[str, Any]:
     """Start the job of a form; return it. It is cancelled."""
     page.get_by_role("button", name=button, exact=True).click()
     page.wait_for_url("**/#/jobs/*")
@@ -93,7 +93,7 @@ def submit(page: Any, desk: Service, button: str) -> dict[str, Any]:
 @pytest.mark.nightly
 @pytest.mark.parametrize("kind", REQUESTS)
 def test_a_diagnosis_is_run_again_with_all_of_its_settings(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, kind: str
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, kind: str
 ) -> None:
     order = {"dataset": dataset, "input": "u_V", "output": "y_um", "name": "first", **REQUESTS[kind]}
     job = start(desk, "/v1/discrepancies", order)
@@ -103,7 +103,7 @@ def test_a_diagnosis_is_run_again_with_all_of_its_settings(
 
 
 def test_the_equations_of_a_diagnosis_are_edited_again(
-    screens: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
     text = (ROOT / "examples" / "simulations" / "dc-motor.toml").read_text()
     simulation = desk.ask("POST", "/v1/simulations/equations", json={"text": text}).json()
@@ -119,7 +119,7 @@ def test_the_equations_of_a_diagnosis_are_edited_again(
 
 @pytest.mark.nightly
 def test_a_changed_setting_is_the_only_difference(
-    quiet: Callable[..., Screen], desk: Service, dataset: str
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str
 ) -> None:
     order = {"dataset": dataset, "input": "theirs_um", "channels": ["u_V"], "output": "y_um"}
     job = start(desk, "/v1/discrepancies", {**order, **REQUESTS["second-order"]})
@@ -130,7 +130,7 @@ def test_a_changed_setting_is_the_only_difference(
 
 
 def test_a_model_of_several_outputs_is_identified_again(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
     settings = {"generations": 7, "shifts": [1, 2]}
     order = {"dataset": dataset, "inputs": ["u_V"], "output": ["y_um", "theirs_um"], "rows": "20:380"}

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from support.service_processes import Service
+from support.screen import Screen
+from support.service_processes import Service, serving
 
 pytestmark = pytest.mark.nightly
 
@@ -18,18 +19,19 @@ RECORD_STATES = """(selector) => {
 
 
 @pytest.fixture(scope="module")
-def service(guarded: Callable[..., Any]) -> Iterator[Service]:
-    with guarded() as running:
+def desk(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service with a coordinator."""
+    with serving(tmp_path_factory.mktemp("service") / "data") as running:
         yield running
 
 
 def test_the_list_shows_all_states_of_a_search(
-    opened: Callable[..., Any], service: Service, expect: Any
+    quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
-    service.submit(5, name="before")
-    page = opened("#/jobs")
+    desk.submit(5, name="before")
+    page = quiet(desk.url).go("#/jobs")
     expect(page.locator("tbody tr")).not_to_have_count(0)
-    job = service.submit(700, name="watched")
+    job = desk.submit(700, name="watched")
     badge = f"tr[data-job='{job}'] .state"
     expect(page.locator(badge)).to_be_visible()
     page.evaluate(RECORD_STATES, badge)
@@ -43,16 +45,16 @@ def test_the_list_shows_all_states_of_a_search(
 
 
 def test_a_running_search_is_cancelled_from_the_page(
-    opened: Callable[..., Any], service: Service, expect: Any
+    quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
-    job = service.submit(1_000_000)
-    page = opened(f"#/jobs/{job}")
+    job = desk.submit(1_000_000)
+    page = quiet(desk.url).go(f"#/jobs/{job}")
     expect(page.locator(".title .state")).to_have_text("running")
     expect(page.locator(".convergence figure.chart").first).to_be_visible(timeout=60_000)
     expect(page.locator(".convergence figure.chart .position").first).not_to_have_text("generation 0")
     page.get_by_role("button", name="Cancel").click()
     expect(page.locator(".title .state")).to_have_text("cancelled", timeout=60_000)
-    assert service.job(job)["state"] == "cancelled"
-    reached = int(service.job(job)["progress"]["generation"])
+    assert desk.job(job)["state"] == "cancelled"
+    reached = int(desk.job(job)["progress"]["generation"])
     shown = page.locator(".convergence figure.chart .position").first.text_content().split()[-1]
     assert 0 < int(shown) <= reached

@@ -13,13 +13,14 @@ import pytest
 
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import parse_spec
+from islands_service.intake.reader_process import SIMULATION_SERVER
 from support.canvas import DRAWN
 from support.oscillator_fmus import write_oscillator
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service import npz
-from support.service_processes import Service, serving
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
@@ -30,15 +31,19 @@ COMPILED = 180_000
 
 
 @pytest.fixture(scope="module")
-def desk(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A service without coordinators that accepts FMUs."""
-    folder = tmp_path_factory.mktemp("desk") / "data"
-    with serving(folder, "--coordinators", 0, environment={"ISLANDS_ALLOW_FMUS": "true"}) as service:
-        yield service
+def desk(chromium: Any, hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
+    """A service that accepts FMUs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ISLANDS_ALLOW_FMUS", "true")
+        # One that runs has started without the setting.
+        SIMULATION_SERVER.close()
+        with hosted(allow_fmus=True) as service:
+            yield service
+        SIMULATION_SERVER.close()
 
 
 @pytest.fixture(scope="module")
-def dataset(desk: Service) -> str:
+def dataset(desk: ServiceClient) -> str:
     t = 0.01 * np.arange(400)
     u, x, v = 10.0 * np.sin(3.0 * t) + np.sin(40.0 * t), np.zeros(400), 0.0
     for k in range(1, 400):
@@ -76,7 +81,7 @@ def open_form(screen: Screen, dataset: str, kind: str) -> Any:
 
 
 def test_a_preview_draws_the_calibrated_simulation_and_states_a_wrong_equation(
-    screens: Callable[..., Screen], desk: Service, dataset: str, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
     form = open_form(screens(desk.url), dataset, "second-order")
     form.get_by_role("button", name="Preview").click()
@@ -94,7 +99,7 @@ def test_a_preview_draws_the_calibrated_simulation_and_states_a_wrong_equation(
 
 
 def test_an_fmu_is_uploaded_previewed_and_diagnosed(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, fmu: Path, expect: Any
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, fmu: Path, expect: Any
 ) -> None:
     form = open_form(quiet(desk.url), dataset, "fmu")
     form.get_by_label("File", exact=True).set_input_files(fmu)
@@ -125,7 +130,7 @@ def test_an_fmu_is_uploaded_previewed_and_diagnosed(
 @pytest.mark.parametrize("stiffness", ["k%2B", "k=a,b"])
 def test_channels_drive_further_inputs_and_the_command_is_the_request(
     quiet: Callable[..., Screen],
-    desk: Service,
+    desk: ServiceClient,
     dataset: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -161,7 +166,7 @@ def test_channels_drive_further_inputs_and_the_command_is_the_request(
 
 
 def test_a_preview_that_fails_states_the_reason_of_the_fmu(
-    screens: Callable[..., Screen], desk: Service, dataset: str, fmu: Path, expect: Any
+    screens: Callable[..., Screen], desk: ServiceClient, dataset: str, fmu: Path, expect: Any
 ) -> None:
     form = open_form(screens(desk.url), dataset, "fmu")
     form.get_by_label("File", exact=True).set_input_files(fmu)
@@ -179,7 +184,13 @@ def test_a_preview_that_fails_states_the_reason_of_the_fmu(
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_form_of_an_fmu_and_a_preview_are_readable(
-    quiet: Callable[..., Screen], desk: Service, dataset: str, fmu: Path, expect: Any, scheme: str, width: int
+    quiet: Callable[..., Screen],
+    desk: ServiceClient,
+    dataset: str,
+    fmu: Path,
+    expect: Any,
+    scheme: str,
+    width: int,
 ) -> None:
     form = open_form(quiet(desk.url, width, 800, color_scheme=scheme), dataset, "fmu")
     form.get_by_label("File", exact=True).set_input_files(fmu)

@@ -10,7 +10,7 @@ from support.canvas import count_segments, get_lines
 from support.played import run_submitted
 from support.processes import eventually
 from support.reading import unreadable
-from support.service_processes import Service
+from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
 
@@ -21,9 +21,9 @@ def get_response(page: Any) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def finished(service: Service) -> str:
+def finished(service: ServiceClient) -> str:
     """A succeeded job, executed by the test process."""
-    return run_submitted(service, service.submit(20, name="piezo"))
+    return run_submitted(service, service.submit(5, name="piezo"))
 
 
 @pytest.fixture

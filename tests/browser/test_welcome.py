@@ -17,12 +17,12 @@ from support.played import stored
 from support.processes import eventually
 from support.reading import unreadable
 from support.screen import Screen
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import taken
 
 
 @pytest.fixture(scope="module")
-def commands(chromium: Any, desk: Service) -> dict[str, str]:
+def commands(chromium: Any, desk: ServiceClient) -> dict[str, str]:
     """Commands by heading, read from the page of a service without jobs."""
     screen = Screen(chromium.new_page(), desk.url)
     page = screen.go()
@@ -58,12 +58,12 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def list_jobs(desk: Service) -> list[str]:
+def list_jobs(desk: ServiceClient) -> list[str]:
     return [job["id"] for job in desk.ask("GET", "/v1/jobs").json()["items"]]
 
 
 @pytest.fixture
-def run_with_coordinator(desk: Service) -> Iterator[Any]:
+def run_with_coordinator(desk: ServiceClient) -> Iterator[Any]:
     """Function that runs a command and finishes the job that it waits for."""
     with ThreadPoolExecutor(1) as pool, stored(desk) as store:
 
@@ -99,7 +99,7 @@ def test_the_client_submits_and_waits(
 
 @pytest.mark.ci
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
-def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: Service) -> None:
+def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: ServiceClient) -> None:
     upload, submit = commands["curl"].split("\n", 1)
     uploaded = run(folder, "sh", "-ec", f"{upload} --silent --show-error --fail")
     assert uploaded.returncode == 0, uploaded.stderr
@@ -111,7 +111,7 @@ def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: 
 
 @pytest.mark.ci
 def test_the_instructions_disappear_with_the_first_job(
-    chromium: Any, commands: dict[str, str], desk: Service, expect: Any
+    chromium: Any, commands: dict[str, str], desk: ServiceClient, expect: Any
 ) -> None:
     assert list(commands) == ["Command line", "Python", "curl"]
     assert all(desk.url in text for text in commands.values())

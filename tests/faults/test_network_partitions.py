@@ -12,7 +12,8 @@ import pytest
 
 from support.hosts import Host, hosts
 from support.processes import alive, eventually
-from support.service_processes import TERMINAL, Service, serving
+from support.service_client import TERMINAL
+from support.service_processes import Service, serving
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 

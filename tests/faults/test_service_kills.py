@@ -15,7 +15,8 @@ from islands.io.result_folder import result_document
 from islands_service.intake.confined_process import ENVIRONMENT
 from support.control_groups import memory_limit
 from support.processes import alive, descendants, eventually, kill
-from support.service_processes import ROLES, SPEC, Service, serving
+from support.service_client import SPEC
+from support.service_processes import ROLES, Service, serving
 
 #: Generations of the job that is disturbed.
 LONG = 200

@@ -13,7 +13,8 @@ from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify
 from islands.io.records import read_record
 from islands.io.result_folder import result_document
-from support.service_processes import SPEC, Service, serving
+from support.service_client import SPEC
+from support.service_processes import Service, serving
 
 #: Generations of a search of one or two seconds.
 GENERATIONS = 300

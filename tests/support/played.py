@@ -11,14 +11,14 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from support.job_runs import make_run
-from support.service_processes import Service
+from support.service_client import ServiceClient
 from support.stores import LONG, taken
 
 GENERATIONS = 500
 
 
 @contextmanager
-def stored(service: Service) -> Iterator[Store]:
+def stored(service: ServiceClient) -> Iterator[Store]:
     """Open the store of a service."""
     with Store(f"sqlite:///{service.folder / 'islands.db'}") as store:
         yield store
@@ -66,7 +66,7 @@ def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2)
     store.leases.report(lease, ProgressReport(progress, points, after=first - 1))
 
 
-def run_submitted(service: Service, job: str) -> str:
+def run_submitted(service: ServiceClient, job: str) -> str:
     """Run an identification that was submitted to a service without coordinators; return its id."""
     with stored(service) as store:
         lease = taken(store, job)
