@@ -14,17 +14,19 @@ from islands.errors import RecordError
 SEED = 1
 
 
-@pytest.mark.ci
 @pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    "cases", [pytest.param(60, marks=pytest.mark.ci), pytest.param(200, marks=pytest.mark.nightly)]
+)
 def test_every_search_of_a_short_or_extreme_record_ends_in_a_result_or_in_words(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, cases: int
 ) -> None:
     """Libraries and presets are given: their choice by trials takes seconds, and `make fuzz` has it."""
     monkeypatch.setattr(fuzz_searches, "_AUTO", 0.0)
-    status = main(["--cases", "200", "--seed", str(SEED)])
+    status = main(["--cases", str(cases), "--seed", str(SEED)])
     printed = capsys.readouterr().out
     assert status == 0, printed
-    assert "200 cases, 0 defects" in printed
+    assert f"{cases} cases, 0 defects" in printed
     for function in ("fit", "identify", "diagnose", "fit_coupled"):
         for ending in ("result", "RecordError"):
             assert f"{function}: {ending} " in printed, printed

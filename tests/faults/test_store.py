@@ -131,7 +131,7 @@ def test_repeated_kills_lose_no_acknowledged_job(database):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("reports", [1, 2, 9, 30])
+@pytest.mark.parametrize("reports", [1, *(pytest.param(n, marks=pytest.mark.nightly) for n in (2, 9)), 30])
 def test_killed_coordinator_leaves_complete_reports(database, reports):
     with Store(database) as store:
         job = submitted(store)
