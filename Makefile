@@ -45,10 +45,10 @@ collect: .venv/ready-test
 test: .venv/ready-test .venv/ready-lint .venv/ready-docs
 	$(PYTEST) -n 3
 
-# What CI runs besides `make test`: browser, PostgreSQL, kills of a coordinator and of an island. The tests of the
-# wheel need one, which .ci/run builds first.
+# What CI runs besides `make test`: browser, PostgreSQL, kills of a coordinator and of an island. More of these tests
+# wait: for processes, pages and databases. The tests of the wheel need one, which .ci/run builds first.
 ci: .venv/ready-test .venv/ready-lint .venv/ready-docs .venv/ready-packages
-	$(PYTEST) -n 3 -m "ci and not nightly" --ignore tests/acceptance/test_installed_wheel.py
+	$(PYTEST) -n 4 -m "ci and not nightly" --ignore tests/acceptance/test_installed_wheel.py
 
 # Another order and other kills every day of the year.
 DAY = $(shell date +%j)
