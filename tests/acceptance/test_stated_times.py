@@ -17,7 +17,7 @@ SECONDS_OF_LOOPS = 1.7
 #: Row of the table, and its steps in ``.ci/run``. The download of packages depends on the network.
 STEPS = {
     "`make demo` after the set-up": ("demo",),
-    "`make test`": ("packages and bytecode of the tests", "make test"),
+    "`make test`": ("packages of the tests", "bytecode of the tests", "make test"),
 }
 
 INSTALL = ROOT / "docs" / "getting-started" / "install.md"
