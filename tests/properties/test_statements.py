@@ -279,23 +279,34 @@ def test_no_two_sentences_about_a_diagnosis_contradict_each_other(choices):
 
 CASES = make_cases()
 
+PORTFOLIO = [name for name in CASES if name.startswith("portfolio")]
+
 #: Cases of every kind; `tests/benchmarks/contradictions.py` has all of them.
 SAMPLE = (
-    *(name for name in CASES if name.startswith("portfolio")),
+    *PORTFOLIO[::4],
     *[name for name in CASES if name.startswith("law")][::12],
     *(name for name in CASES if name.startswith("first order") and name.endswith("seed 1")),
-    *(
-        f"first order, {fault}, seed 0"
-        for fault in ("sentinels", "spikes", "short", "extrapolation", "integrator")
-    ),
+    *(f"first order, {fault}, seed 0" for fault in ("sentinels", "extrapolation")),
     *[name for name in CASES if name.startswith("several outputs")][::5],
     *("diagnosis, portfolio, first order", "diagnosis, portfolio, tank", "diagnosis, wrong parameter"),
     *("diagnosis, stopped before free forms", "diagnosis, channels", "diagnosis, column, gain, seed 0"),
 )
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("name", SAMPLE)
+#: Further cases, each with some seconds of search.
+SLOW = (
+    *(name for name in PORTFOLIO if name not in SAMPLE),
+    *(f"first order, {fault}, seed 0" for fault in ("spikes", "short", "integrator")),
+)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(pytest.param(name, marks=pytest.mark.ci) for name in SAMPLE),
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in SLOW),
+    ],
+)
 def test_no_two_sentences_about_a_record_contradict_each_other(name):
     """In the summary, in a notebook, over REST and in the report, from the run and from its folder."""
     for where, text in list_texts(name, CASES[name]()).items():
