@@ -1,7 +1,7 @@
 """Fixtures for tests of the dashboard in a real browser with a real web server.
 
-Without playwright or Chromium these tests are skipped. The browser ends with the last test of this folder:
-playwright keeps an event loop running in this thread, and other tests may need a separate one.
+Without playwright or Chromium these tests are skipped. Fixtures have module scope: playwright keeps an
+event loop running in this thread, and tests of other modules may need a separate one.
 """
 
 import json
@@ -23,7 +23,7 @@ STORE_KEY = "sessionStorage.setItem('islands.key', {})"
 _INSTALL = "install it with 'apt-get install --no-install-recommends chromium'"
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     api = pytest.importorskip(
         "playwright.sync_api", reason="playwright is not installed: run: make .venv/ready-test"
