@@ -12,8 +12,10 @@ from typing import Any
 
 import pytest
 
+from islands_service.store import Store
 from support.screen import Screen
 from support.service_client import ServiceClient
+from support.service_processes import serving
 
 CHROMIUM = Path("/usr/bin/chromium")
 
@@ -97,9 +99,14 @@ def hosted(serve: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) 
 
 
 @pytest.fixture(scope="module")
-def service(chromium: Any, hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
-    """A service that needs a key; its client has one."""
-    with hosted(require_keys=True) as running:
+def service(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
+    """A service in processes that needs a key; its client has one. It may end while it draws figures."""
+    folder = tmp_path_factory.mktemp("service") / "data"
+    folder.mkdir()
+    with Store(f"sqlite:///{folder / 'islands.db'}") as store:
+        _, secret = store.keys.create("test", frozenset({"read", "write"}))
+    with serving(folder, "--coordinators", 0, "--require-keys") as running:
+        running.client.headers["Authorization"] = f"Bearer {secret}"
         yield running
 
 

@@ -20,16 +20,15 @@ from support.stores import taken
 
 
 @pytest.fixture(scope="module")
-def service(hosted: Callable[..., Any]) -> Iterator[ServiceClient]:
-    """A service whose searches run in this process, without Ray."""
+def searching(service: ServiceClient) -> Iterator[ServiceClient]:
+    """The service, whose searches run in this process, without Ray."""
     stopping = StopRequest()
-    with hosted(require_keys=True) as running:
-        settings = ServiceSettings(data_dir=running.folder)
-        thread = Thread(target=SerialCoordinator(settings, "me", stopping).run)
-        thread.start()
-        yield running
-        stopping.request()
-        thread.join(30.0)
+    settings = ServiceSettings(data_dir=service.folder)
+    thread = Thread(target=SerialCoordinator(settings, "me", stopping).run)
+    thread.start()
+    yield service
+    stopping.request()
+    thread.join(30.0)
 
 
 @pytest.mark.ci
@@ -103,9 +102,9 @@ def test_the_front_grows_and_its_points_show_their_equations(
 
 @pytest.mark.ci
 def test_stop_and_keep_the_best_ends_a_search_with_models(
-    opened: Callable[..., Any], service: ServiceClient, expect: Any
+    opened: Callable[..., Any], searching: ServiceClient, expect: Any
 ) -> None:
-    job = service.submit(1_000_000, name="endless")
+    job = searching.submit(1_000_000, name="endless")
     page = opened(f"#/jobs/{job}")
     expect(page.locator(".live .equation")).to_contain_text("y_um(k) = ", timeout=60_000)
     run = page.locator(".search-run")
@@ -122,7 +121,7 @@ def test_stop_and_keep_the_best_ends_a_search_with_models(
     expect(page.locator("main")).to_contain_text("the owner stopped the job, which leaves out: search from")
     expect(page.locator("table.models tbody tr")).not_to_have_count(0)
     # Each point of the front opens its model, by the keyboard as well.
-    models = service.ask("GET", f"/v1/jobs/{job}/models").json()["items"]
+    models = searching.ask("GET", f"/v1/jobs/{job}/models").json()["items"]
     smallest = min(models, key=lambda model: model["size"])
     page.get_by_role("slider", name="Size against error").focus()
     for key in ("Home", "Enter"):
