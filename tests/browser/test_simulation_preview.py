@@ -115,14 +115,23 @@ def test_an_fmu_is_uploaded_previewed_and_diagnosed(
     job = desk.job(form.page.url.rpartition("/")[2])
     desk.ask("POST", f"/v1/jobs/{job['id']}/cancel")
     simulation = job["spec"]["simulation"]
-    assert simulation.pop("file").endswith("-fmu")
+    assert simulation["file"].endswith("-fmu")
     assert simulation == {
+        "file": simulation["file"],
         "kind": "fmu",
         "input": "u",
         "output": "x",
         "parameters": {"m": {}, "k": {"value": 210}},
     }
     assert job["spec"]["tolerance"] == {"m": 0.05}
+    form.page.get_by_role("link", name="Run again with changes").click()
+    expect(form.get_by_label("Value of k")).to_have_value("210")
+    expect(form.get_by_label("Uploaded FMU")).to_have_value(job["spec"]["simulation"]["file"])
+    form.get_by_role("button", name="Diagnose", exact=True).click()
+    form.page.wait_for_url(lambda address: "#/jobs/" in address and job["id"] not in address)
+    again = desk.job(form.page.url.rpartition("/")[2])
+    desk.ask("POST", f"/v1/jobs/{again['id']}/cancel")
+    assert again["spec"] == job["spec"]
 
 
 @pytest.mark.nightly

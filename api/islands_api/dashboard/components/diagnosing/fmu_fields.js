@@ -26,13 +26,17 @@ const hasName = (channel, name) =>
     channel.name.startsWith(name) &&
     /^(_[^_]+|\s*[[(（,/].+)$/.test(channel.name.slice(name.length)));
 
-/** Make the fields of further inputs, which are driven by channels `{name, unit}` of the same name. */
-function makeChannelFields(inputs, channels) {
+/**
+ * Make the fields of further inputs, which are driven by channels `{name, unit}` of the same name; `driven`
+ * are the names of those of a request, or null.
+ */
+function makeChannelFields(inputs, channels, driven) {
   const fields = inputs.map(({ name }, place) => {
     const found = channels.find((each) => hasName(each, name));
     const options = found ? [el("option", { value: name }, found.name)] : [];
     options.push(el("option", { value: "" }, "nothing"));
     const field = el("select", { name: `fmu-channel-${place}` }, options);
+    if (driven && !driven.includes(name)) field.value = "";
     const hint = found
       ? "Without a channel it keeps its start value."
       : `It keeps its start value. To drive it, choose a column with the name ${name} as a further input.`;
@@ -48,21 +52,30 @@ function makeChannelFields(inputs, channels) {
 const quoteOption = (text) => text.replace(/[%&+]/g, encodeURIComponent);
 
 /**
- * Make the fields of the variables of an FMU; `read()` returns its simulation and the tolerances.
- * `setChannels(channels)` states which channels `{name, unit}` can drive further inputs.
+ * Make the fields of the variables of an FMU; `given` has the simulation and the tolerance of a request, or
+ * is null. `read()` returns its simulation and the tolerances. `setChannels(channels)` states which channels
+ * `{name, unit}` can drive further inputs.
  */
-function makeVariableFields(fmu, onChange) {
+function makeVariableFields(fmu, given, onChange) {
   const [input, output] = [makeChoice("fmu-input", fmu.inputs), makeChoice("fmu-output", fmu.outputs)];
   const isShort = fmu.parameters.length <= fmu.most_parameters;
   const described = fmu.parameters.map(({ name, unit, start }) => ({ name, unit, default: start }));
-  const chosen = isShort ? described.map(({ name }) => name) : [];
+  const named = Object.entries(given?.simulation.parameters ?? {});
+  const calibrated = given ? named.filter(([, { fixed }]) => !fixed) : described.map(({ name }) => [name]);
+  const chosen = given || isShort ? calibrated.map(([name]) => name) : [];
   const fields = makeParameterFields(described, { hasValues: true, units: ["", ""], chosen });
+  if (given) {
+    [input.value, output.value] = [given.simulation.input, given.simulation.output];
+    const parameters = Object.fromEntries(named.map(([name, { value }]) => [name, value]));
+    fields.fill({ parameters, tolerance: given.tolerance });
+  }
   const initial = fmu.initial.map(({ name }) => name).join(", ") || "none";
   const further = el("div", { class: "fields" });
   let [channels, channelFields] = [[], null];
 
   function showChannels() {
-    channelFields = makeChannelFields(fmu.inputs.filter(({ name }) => name !== input.value), channels);
+    const others = fmu.inputs.filter(({ name }) => name !== input.value);
+    channelFields = makeChannelFields(others, channels, given && (given.simulation.channels ?? []));
     further.replaceChildren(...channelFields.nodes);
   }
 
@@ -90,12 +103,12 @@ function makeVariableFields(fmu, onChange) {
   );
 
   /** Return the parameters that are calibrated, and those with another value, which is exact. */
-  function readParameters({ parameters: given, chosen: calibrated }) {
-    const isListed = ({ name }) => name in given || calibrated.includes(name);
+  function readParameters({ parameters: values, chosen: free }) {
+    const isListed = ({ name }) => name in values || free.includes(name);
     const listed = described.filter(isListed).map(({ name }) => name);
     const entries = listed.map((name) => {
-      const value = name in given ? { value: given[name] } : {};
-      return [name, calibrated.includes(name) ? value : { ...value, fixed: true }];
+      const value = name in values ? { value: values[name] } : {};
+      return [name, free.includes(name) ? value : { ...value, fixed: true }];
     });
     return Object.fromEntries(entries);
   }
@@ -139,11 +152,12 @@ function writeFile(file, names, parameters) {
 /**
  * Make the choice of an FMU; `refusal` says why the service runs none, or is empty. `read()` returns the
  * simulation, its tolerances and the parts of its command, or null. `onChange()` is called at every change;
- * `setChannels(channels)` states the channels `{name, unit}` of the record.
+ * `setChannels(channels)` states the channels `{name, unit}` of the record, and `fill(request)` loads the FMU
+ * of a request.
  */
 export function makeFmuFields(refusal, onChange, signal) {
   const complaint = el("p", { class: "complaint" }, refusal);
-  if (refusal) return { node: complaint, setChannels() {}, read: () => null };
+  if (refusal) return { node: complaint, setChannels() {}, fill() {}, read: () => null };
   const file = el("input", { name: "fmu", type: "file", accept: ".fmu" });
   const stored = el("select", { name: "stored-fmu" });
   const storedFields = el(
@@ -153,10 +167,10 @@ export function makeFmuFields(refusal, onChange, signal) {
   );
   const message = el("p", { class: "check", role: "status" });
   const host = el("div");
-  let [variables, channels] = [null, []];
+  let [variables, channels, asked] = [null, [], ""];
 
-  function show(fmu, words = "") {
-    variables = fmu && makeVariableFields(fmu, onChange);
+  function show(fmu, words = "", given = null) {
+    variables = fmu && makeVariableFields(fmu, given, onChange);
     variables?.setChannels(channels);
     host.replaceChildren(...(fmu ? [variables.node] : []));
     message.classList.toggle("complaint", fmu === null && words !== "");
@@ -164,12 +178,12 @@ export function makeFmuFields(refusal, onChange, signal) {
     onChange();
   }
 
-  async function take(request, words) {
+  async function take(request, words, given = null) {
     show(null);
     setText(message, words);
     try {
       const fmu = await request();
-      show(fmu, `FMI ${fmu.fmi}, ${fmu.interface}: ${fmu.parameters.length} parameters.`);
+      show(fmu, `FMI ${fmu.fmi}, ${fmu.interface}: ${fmu.parameters.length} parameters.`, given);
       return fmu;
     } catch (error) {
       if (!signal.aborted) show(null, error.message);
@@ -187,19 +201,24 @@ export function makeFmuFields(refusal, onChange, signal) {
 
   const listSafely = (chosen) =>
     list(chosen).catch((error) => signal.aborted || setText(message, error.message));
-  const load = () => getJson(`v1/fmus/${encodeURIComponent(stored.value)}`, { signal });
+  const load = (id) => getJson(`v1/fmus/${encodeURIComponent(id)}`, { signal });
   file.addEventListener("change", async () => {
     if (!file.files.length) return;
     const fmu = await take(() => uploadFmu(file.files[0]), `Reading ${file.files[0].name}…`);
     if (fmu) listSafely(fmu.id);
   });
-  stored.addEventListener("change", () => (stored.value ? take(load, "Loading…") : show(null)));
+  const takeStored = () => take(() => load(stored.value), "Loading…");
+  stored.addEventListener("change", () => (stored.value ? takeStored() : show(null)));
   const hint = "FMI 2.0 or 3.0. The service runs its code in a process that can read nothing else.";
   const fields = el("div", { class: "fields" }, makeField(FORM, "File", file, hint));
   const node = el("div", { class: "fmu" }, fields, storedFields, message, host);
   return {
     node,
-    open: () => listSafely(stored.value),
+    open: () => listSafely(stored.value || asked),
+    fill({ simulation, tolerance = {} }) {
+      asked = simulation.file;
+      take(() => load(asked), "Loading…", { simulation, tolerance });
+    },
     setChannels(found) {
       channels = found;
       variables?.setChannels(channels);

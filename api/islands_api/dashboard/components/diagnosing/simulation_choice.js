@@ -172,8 +172,7 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
 
   function getFields() {
     const listed = byKind.get(kind.value);
-    // The fields of an FMU have values only after it is read.
-    const isKept = !simulations.includes(listed) || (kind.value === "fmu" && kind.value === chosen);
+    const isKept = !simulations.includes(listed);
     const make = makers[kind.value] ?? (() => makePhysicalFields(listed, record.units));
     if (!made.has(kind.value)) {
       made.set(kind.value, isKept ? makeKeptFields() : make());
