@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from islands.data.averaging import average_samples
 from islands.data.coupled_record import couple, match_coupled, split_coupled
 from islands.data.dataset import Dataset
-from islands.data.split import average_split, match_split, split_data
+from islands.data.split import Split, average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import SearchResult, SearchStatistics
@@ -40,7 +40,7 @@ from islands.reports.comparison import ComparedModel, comparison_report
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from islands.reports.origin import Origin
-from islands.validation.assessment import assess
+from islands.validation.assessment import Assessment, assess
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import FMU, REPORT, Job, name_free_run
 from islands_service.domain.job_spec import Identification, parse_identification
@@ -204,9 +204,19 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(replace(assessment, bands=bands))
     search = _search(document["search"], store.results.history(job.id))
+    linear = _read_linear_comparison(document, split, shooting)
     return SearchResult(
-        record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average
+        record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average, linear
     )
+
+
+def _read_linear_comparison(document: Mapping[str, Any], split: Split, shooting: int) -> Assessment | None:
+    """Return the linear model of the same data; None in results without one."""
+    entry = document.get("linear")
+    if entry is None:
+        return None
+    model = model_from_json(json.dumps(entry["model"]), "the linear model of the result")
+    return assess(model, split, shooting, criterion=read_criterion(entry))
 
 
 def _read_result(

@@ -18,7 +18,7 @@ from islands.evolution.search_result import SearchResult
 from islands.inspection.noise import measure_output_noise
 from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
-from islands.io.models import terms_document, write_model
+from islands.io.models import model_json, terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.models.coupled_narx import AnyModel
 from islands.models.equations import named_signals, named_statement
@@ -162,6 +162,7 @@ def _comparison_document(assessment: Assessment) -> dict[str, Any]:
         "size": assessment.model.size,
         "equation": written.line,
         "named_equation": written.named,
+        "model": json.loads(model_json(assessment.model)),
         **_assessment_document(assessment),
     }
 
