@@ -65,3 +65,14 @@ def test_settings_of_narx_models_are_refused(folder):
     columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused")
     text = fail("fit", folder / "spring.csv", *columns, "--model", "latent", "--lags", "3")
     assert "settings of NARX models" in text
+
+
+def test_a_structure_is_that_of_latent_models(folder):
+    columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused", "--structure")
+    text = fail("fit", folder / "spring.csv", *columns, "wiener")
+    assert "a structure is a setting of latent models: leave it out, or --model latent" in text
+    text = fail("fit", folder / "spring.csv", *columns, "wienr", "--model", "latent")
+    assert "Did you mean 'wiener'?" in text
+    found = islands.fit(read(folder)[:300], model="latent", structure="feedback")
+    assert found.settings["structure"] == "feedback"
+    assert not any(name.startswith("f") for name in found.best.model.parameter_names)

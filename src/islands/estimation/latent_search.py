@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_all_inputs
+from islands.errors import lookup
 from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
 from islands.estimation.modal_form import find_modal_form
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.kernels.state_space import simulate_state_space
-from islands.models.latent import LatentModel, StateSpaceLayout, find_codes, read_at_once
+from islands.models.latent import ZERO_BLOCKS, LatentModel, StateSpaceLayout, find_codes, read_at_once
 from islands.progress import Steps
 from islands.simulation.initial_states import Segment, estimate_states
 
@@ -38,9 +39,12 @@ _UNITS = (
     *((name,) * 2 for name in ("hinge", "saturation", "dead zone", "bell")),
 )
 
-#: Random starts of each order and units; orders with a larger error than this multiple of the least linear
-#: error are left out.
-_STARTS, _LARGEST_RATIO = 2, 3.0
+#: Random starts of each order and units.
+_STARTS = 2
+
+#: Orders whose linear model has larger mean squared errors than this multiple of the least are left out. On
+#: held-out rows, a linear model may drift whose units would not.
+_LARGEST_RATIO = 4.0
 
 #: Steps of the effects of the units, then of all parameters before the first comparison.
 _FIRST_STEPS, _TRIAL_STEPS = 6, 10
@@ -48,8 +52,9 @@ _FIRST_STEPS, _TRIAL_STEPS = 6, 10
 #: Rounds of the race: steps, and models that are left before them.
 _ROUNDS = ((15, 12), (40, 6), (150, 3))
 
-#: Blocks of a record, samples of a block at most, and the part of each that is held out.
-_BLOCKS, _LARGEST_BLOCK, _HELD_OUT = 5, 4_000, 0.2
+#: Blocks of a record, samples of a block at least and at most, and the part of each that is held out. Slow
+#: states are not visible in short blocks.
+_BLOCKS, _SMALLEST_BLOCK, _LARGEST_BLOCK, _HELD_OUT = 5, 500, 4_000, 0.2
 
 #: Samples from which the initial states of a block are estimated, at least for a state and at most.
 _SAMPLES_PER_STATE, _LARGEST_MEMORY = 3, 100
@@ -74,15 +79,14 @@ class _Data:
     Attributes
     ----------
     record : Dataset
-    used, held_out : tuple of Segment
-        Blocks for the estimation and for the comparison of models, in pairs.
+    used : tuple of Segment
+        Blocks for the estimation.
     whole : tuple of Segment
-        Both together.
+        The same blocks with the rows after them, which are held out for the comparison of models.
     """
 
     record: Dataset
     used: tuple[Segment, ...]
-    held_out: tuple[Segment, ...]
     whole: tuple[Segment, ...]
 
 
@@ -115,10 +119,12 @@ class _Candidate:
     def advance(self, steps: int, data: _Data, stop: Steps) -> "_Candidate":
         """Return the candidate after some steps."""
         self.fit.advance(steps, lambda: stop.skip("refinement of parameters"))
-        return replace(self, error=_measure(self.fit, data.held_out))
+        return replace(self, error=_measure(self.fit, data))
 
 
-def search_latent_models(record: Dataset, seed: int, steps: Steps) -> list[LatentModel]:
+def search_latent_models(
+    record: Dataset, seed: int, steps: Steps, structure: str = "auto"
+) -> list[LatentModel]:
     """Search state spaces with static units.
 
     Parameters
@@ -128,6 +134,15 @@ def search_latent_models(record: Dataset, seed: int, steps: Steps) -> list[Laten
     seed : int
         Seed of the random starts.
     steps : Steps
+    structure : str
+        An entry of ``ZERO_BLOCKS``. In a Wiener system the units follow the dynamics and the output alone
+        reads them, in a Hammerstein system they read the inputs alone, and with feedback the output reads the
+        states alone.
+
+    Raises
+    ------
+    SettingsError
+        The structure is unknown.
 
     Returns
     -------
@@ -136,23 +151,19 @@ def search_latent_models(record: Dataset, seed: int, steps: Steps) -> list[Laten
         first. They are estimated on all blocks. If the output of the one with the least error reads an input
         at sample k, the inputs of all are read one sample early. Empty if the record is too short.
     """
+    zeros = lookup(ZERO_BLOCKS, structure, "structure")
     advanced = advance_all_inputs(record)
     data = _make_data(advanced)
     linear = _fit_linear(data, steps)
     if not linear:
         return []
-    least = min(each.error for each in linear)
     candidates = list(linear)
     starts = [
-        (each, units, start)
-        for each in linear
-        if each.error <= _LARGEST_RATIO * least
-        for units in _UNITS
-        for start in range(_STARTS)
+        (each, units, start) for each in _keep_orders(linear) for units in _UNITS for start in range(_STARTS)
     ]
 
     def begin(entry: tuple[_Candidate, tuple[str, ...], int]) -> _Candidate | None:
-        return None if steps.skip("starts of further units") else _begin(*entry, data, seed, steps)
+        return None if steps.skip("starts of further units") else _begin(*entry, zeros, data, seed, steps)
 
     with ThreadPoolExecutor() as threads:
         steps.report("starts of state spaces with units", 0.1)
@@ -224,13 +235,12 @@ def _make_data(record: Dataset) -> _Data:
         preprocessing=None,
     )
     used: list[Segment] = []
-    held_out: list[Segment] = []
     whole: list[Segment] = []
     for begin, end in _cut_blocks(scaled):
         cut = end - round(_HELD_OUT * (end - begin))
-        for found, first, last in ((used, begin, cut), (held_out, cut, end), (whole, begin, end)):
-            found.append(_take(scaled, first, last))
-    return _Data(scaled, tuple(used), tuple(held_out), tuple(whole))
+        used.append(_take(scaled, begin, cut))
+        whole.append(_take(scaled, begin, end))
+    return _Data(scaled, tuple(used), tuple(whole))
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -241,7 +251,7 @@ def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _cut_blocks(record: Dataset) -> Iterator[tuple[int, int]]:
     """Yield the first and the last row of each block; blocks do not cross segments."""
-    share = max(1, record.samples // _BLOCKS)
+    share = max(_SMALLEST_BLOCK, record.samples // _BLOCKS)
     for begin, end in record.bounds:
         count = max(1, round((end - begin) / share))
         cuts = np.linspace(begin, end, count + 1).astype(int).tolist()
@@ -268,8 +278,15 @@ def _fit_linear(data: _Data, steps: Steps) -> list[_Candidate]:
             continue
         fit = _make_linear_fit(model.theta, order, data.used)
         fit.advance(_TRIAL_STEPS)
-        found.append(_Candidate(model.layout, (), 0, fit, _measure(fit, data.held_out)))
+        found.append(_Candidate(model.layout, (), 0, fit, _measure(fit, data)))
     return [each for each in found if isfinite(each.error)]
+
+
+def _keep_orders(linear: Sequence[_Candidate]) -> list[_Candidate]:
+    """Return the linear models whose error on the used or on the held-out rows is close to the least."""
+    used = _LARGEST_RATIO * min(each.fit.mean_square for each in linear)
+    held_out = _LARGEST_RATIO * min(each.error for each in linear)
+    return [each for each in linear if each.fit.mean_square <= used or each.error <= held_out]
 
 
 def _make_linear_fit(theta: NDArray[np.float64], order: int, segments: Sequence[Segment]) -> StateSpaceFit:
@@ -290,23 +307,49 @@ def _estimate_start(
     return estimate_states(theta, codes, Segment(segment.u[:rows], segment.y[:rows]), np.zeros(order))
 
 
-def _measure(fit: StateSpaceFit, segments: Sequence[Segment]) -> float:
-    """Return the mean squared error after the rows that give the initial states; infinite if one diverges."""
-    total, count, order = 0.0, 0, fit.states.shape[1]
-    for segment in segments:
-        rows = _count_memory(segment, order)
-        x, y = _estimate_start(fit.theta, fit.codes, segment, order), np.empty(len(segment.y))
-        if simulate_state_space(fit.theta, fit.codes, segment.u, x, y) < len(y):
+def _measure(fit: StateSpaceFit, data: _Data) -> float:
+    """Return the mean squared error of the held-out rows of all blocks; infinite after a divergence.
+
+    It is the larger one of two free runs. That of the block goes on, since a start at the held-out rows would
+    hide the error of slow states. The other starts there from estimated states, as a simulation of the model
+    does.
+    """
+    going_on, started, count, counted = 0.0, 0.0, 0, 0
+    for segment, used, states in zip(data.whole, data.used, fit.states, strict=True):
+        cut = len(used.y)
+        errors = _simulate_errors(fit, segment, states)
+        held_out = Segment(segment.u[cut:], segment.y[cut:])
+        rows = _count_memory(held_out, len(states))
+        again = _simulate_errors(fit, held_out, _estimate_start(fit.theta, fit.codes, held_out, len(states)))
+        if errors is None or again is None:
             return np.inf
-        total += float(np.nansum((segment.y - y)[rows:] ** 2))
-        count += len(y) - rows
-    return total / max(1, count)
+        going_on += float(np.nansum(errors[cut:] ** 2))
+        started += float(np.nansum(again[rows:] ** 2))
+        count += int(np.count_nonzero(~np.isnan(errors[cut:])))
+        counted += int(np.count_nonzero(~np.isnan(again[rows:])))
+    return max(going_on / max(1, count), started / max(1, counted))
+
+
+def _simulate_errors(
+    fit: StateSpaceFit, segment: Segment, states: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return the errors of a free run from initial states; None if it diverges."""
+    y = np.empty(len(segment.y))
+    if simulate_state_space(fit.theta, fit.codes, segment.u, states.copy(), y) < len(y):
+        return None
+    return segment.y - y
 
 
 def _begin(
-    linear: _Candidate, units: tuple[str, ...], start: int, data: _Data, seed: int, steps: Steps
+    linear: _Candidate,
+    units: tuple[str, ...],
+    start: int,
+    zeros: Sequence[str],
+    data: _Data,
+    seed: int,
+    steps: Steps,
 ) -> _Candidate:
-    """Add units to a linear model and estimate."""
+    """Add units to a linear model, without the blocks that are zero, and estimate."""
     order, inputs, count = linear.layout.order, linear.layout.inputs, len(units)
     layout = StateSpaceLayout(order, inputs, count)
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(order, _UNITS.index(units), start)))
@@ -318,13 +361,26 @@ def _begin(
     theta[slices["W"]] = rng.standard_normal(count * (order + inputs)) / np.sqrt(order + inputs)
     theta[slices["s"]] = _OFFSET * rng.standard_normal(count)
     codes = find_codes(units)
-    fixed = np.zeros(theta.size, bool)
-    fixed[slices["W"]] = fixed[slices["s"]] = True
-    fit = StateSpaceFit(theta, _number(~fixed), codes, data.used, linear.fit.states.copy())
+    free = _find_nonzero(layout, zeros)
+    theta[~free] = 0.0
+    effects = free.copy()
+    effects[slices["W"]] = effects[slices["s"]] = False
+    fit = StateSpaceFit(theta, _number(effects), codes, data.used, linear.fit.states.copy())
     fit.advance(_FIRST_STEPS)
-    fit.release(np.arange(theta.size))
+    fit.release(_number(free))
     found = _Candidate(layout, units, start, fit, np.inf)
     return found.advance(_TRIAL_STEPS, data, steps)
+
+
+def _find_nonzero(layout: StateSpaceLayout, zeros: Sequence[str]) -> NDArray[np.bool_]:
+    """Return which parameters belong to no block that is zero."""
+    slices, every = layout.find_slices(), np.arange(len(layout.names))
+    weights = every[slices["W"]].reshape(layout.units, layout.order + layout.inputs)
+    blocks = {"W of the states": weights[:, : layout.order].ravel()}
+    free = np.ones(every.size, bool)
+    for name in zeros:
+        free[blocks[name] if name in blocks else every[slices[name]]] = False
+    return free
 
 
 def _number(free: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -368,7 +424,7 @@ def _fit_without(candidate: _Candidate, block: NDArray[np.int64], data: _Data) -
     theta[block], free[block] = 0.0, False
     fit = StateSpaceFit(theta, _number(free), candidate.fit.codes, data.used, candidate.fit.states.copy())
     fit.advance(_ROUNDS[0][0])
-    return replace(candidate, fit=fit, error=_measure(fit, data.held_out))
+    return replace(candidate, fit=fit, error=_measure(fit, data))
 
 
 def _finish(candidate: _Candidate, data: _Data, record: Dataset, steps: Steps) -> LatentModel | None:

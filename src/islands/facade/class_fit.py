@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
+from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_all_inputs
 from islands.data.split import Split
@@ -35,7 +36,9 @@ _STEPS = 100
 _CRITERION = refinement_criterion(None)
 
 
-def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps) -> SearchResult:
+def fit_class(
+    record: Dataset, split: Split, kind: str, structure: str, seed: int, steps: Steps
+) -> SearchResult:
     """Fit the models of a class.
 
     Every starting model of the class is refined on the free run of the estimation data. The model with the
@@ -49,6 +52,8 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
         Estimation data and validation data at the rate of the record.
     kind : str
         An entry of ``MODEL_CLASSES``.
+    structure : str
+        An entry of ``ZERO_BLOCKS``, which latent models have.
     seed : int
         Stored in the result, and seed of its prediction bands.
     steps : Steps
@@ -56,13 +61,13 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
     Raises
     ------
     SettingsError
-        There is no such class, or no model has a free run that remains bounded.
+        There is no such class or structure, or no model has a free run that remains bounded.
     """
     lookup(dict.fromkeys((NARX, *MODEL_CLASSES)), kind, "class of models")
     entry = MODEL_CLASSES[kind]
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
     if issubclass(entry, LatentModel):
-        latent = search_latent_models(split.estimation, seed, steps)
+        latent = search_latent_models(split.estimation, seed, steps, structure)
         if any(each.reads_at_once for each in latent):
             split = Split(advance_all_inputs(split.estimation), advance_all_inputs(split.validation))
         models: Sequence[DynamicModel] = latent
@@ -77,6 +82,8 @@ def fit_class(record: Dataset, split: Split, kind: str, seed: int, steps: Steps)
     steps.report("assessment of the models", 0.9)
     assessed = [assess(model, split, interval, criterion=_CRITERION) for model in models]
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
+    if structure != AUTO:
+        settings["structure"] = structure
     counts = {"ok": len(models)}
     search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
     result = SearchResult(record, split, seed, settings, search, rank_models(assessed))

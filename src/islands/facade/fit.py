@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data, warn_of_extrapolation
-from islands.errors import SettingsError, check_seed
+from islands.errors import SettingsError, check_seed, name_option
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
@@ -19,6 +19,7 @@ from islands.io.data_frames import read_data
 from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING
 from islands.io.result_folder import record_document
+from islands.models.latent import LatentModel
 from islands.progress import (
     ProgressCallback,
     Steps,
@@ -42,6 +43,7 @@ def fit(
     output: str | None = None,
     validation: "RecordLike | float" = 0.25,
     model: str = NARX,
+    structure: str = AUTO,
     library: str = AUTO,
     degree: int | None = None,
     lags: int | None = None,
@@ -79,6 +81,9 @@ def fit(
         Data that rank the models: a separate record, or the fraction at the end of ``record``.
     model : str
         Class of the models: ``narx``, or an entry of ``MODEL_CLASSES``.
+    structure : str
+        Structure of latent models, which has zeros: ``wiener``, ``hammerstein``, ``feedback``, or ``auto``
+        for any. See `search_latent_models`.
     library : str
         An entry of ``LIBRARIES``, such as ``phi-polynomial`` for hysteresis or ``polynomial`` for smooth
         systems. ``auto`` fits several libraries and takes the best one, as the preset ``auto`` does.
@@ -142,6 +147,7 @@ def fit(
         record,
         validation,
         model=model,
+        structure=structure,
         library=library,
         degree=degree,
         lags=lags,
@@ -164,6 +170,7 @@ def fit_record(
     validation: Dataset | float = 0.25,
     *,
     model: str = NARX,
+    structure: str = AUTO,
     library: str = AUTO,
     degree: int | None = None,
     lags: int | None = None,
@@ -180,7 +187,7 @@ def fit_record(
     ----------
     record : Dataset
     validation : Dataset or float
-    model, library, degree, lags, delays, constraints, seed, progress, stop
+    model, structure, library, degree, lags, delays, constraints, seed, progress, stop
         As for `fit`.
     **changes
         Settings that differ from those of `FitSettings`.
@@ -191,6 +198,10 @@ def fit_record(
         As `fit`.
     """
     check_seed(seed)
+    if structure != AUTO and model != LatentModel.kind:
+        raise SettingsError(
+            f"a structure is a setting of latent models: leave it out, or {name_option('model', 'latent')}"
+        )
     settings = FitSettings(**changes)
     split = split_data(record, validation)
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
@@ -201,7 +212,7 @@ def fit_record(
                 f"library, max_terms and so on are settings of NARX models, not for the model {model}: "
                 "leave them out"
             )
-        found = fit_class(record, split, model, seed, Steps(progress, stop))
+        found = fit_class(record, split, model, structure, seed, Steps(progress, stop))
         return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))
     try:
         found = fit_chosen_library(

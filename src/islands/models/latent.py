@@ -40,6 +40,12 @@ UNITS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+#: Blocks of parameters that are zero in the structure of a system: effects of the units on the states or on
+#: the output, or weights of the states in the arguments of the units.
+ZERO_BLOCKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {"auto": (), "wiener": ("E",), "hammerstein": ("W of the states",), "feedback": ("F",)}
+)
+
 #: Text of units in equations for readers, if it is another one.
 _NAMED_POWERS: Mapping[str, str] = MappingProxyType({"square": "square({0})", "cube": "cube({0})"})
 

@@ -29,6 +29,7 @@ from islands.figures.names import FREE_RUN, parse_figures
 from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.models.candidate_library import LIBRARIES
+from islands.models.latent import ZERO_BLOCKS
 from islands.progress import PhasedProgress, Steps
 
 #: Default library for several outputs.
@@ -53,6 +54,9 @@ def fit(
         ),
     ] = None,
     model: ModelClass = NARX,
+    structure: Annotated[
+        str, typer.Option("--structure", help=f"Structure of latent models: {', '.join(ZERO_BLOCKS)}.")
+    ] = AUTO,
     library: Annotated[
         str,
         typer.Option(
@@ -126,6 +130,7 @@ def fit(
         phases = fit_phases(library, outputs if len(outputs) > 1 else ()) if model == NARX else CLASS_PHASES
         given: dict[str, Any] = {
             "model": model,
+            "structure": structure,
             "library": library,
             "degree": degree,
             "lags": lags,
@@ -143,8 +148,8 @@ def fit(
         }
         result: islands.Result | islands.CoupledResult
         if len(outputs) > 1:
-            if given.pop("model") != NARX:
-                raise SettingsError(f"--model {model} is for one output: leave it out")
+            if (given.pop("model"), given.pop("structure")) != (NARX, AUTO):
+                raise SettingsError("--model and --structure are for one output: leave them out")
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
             given["library"] = SEVERAL_OUTPUTS if library == AUTO else library

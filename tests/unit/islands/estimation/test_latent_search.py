@@ -72,6 +72,16 @@ def test_a_saturation_of_the_input_has_units_that_read_the_input_alone():
 
 
 @pytest.mark.ci
+@pytest.mark.parametrize(("structure", "absent"), [("wiener", "e"), ("hammerstein", "w"), ("feedback", "f")])
+def test_a_structure_has_its_zeros(structure, absent):
+    found = search_latent_models(saturated_record(240, 1), 0, Steps(), structure)
+    assert any(each.units for each in found)
+    for each in found:
+        assert not any(name.startswith(absent) for name in each.names)
+        assert np.isfinite(rmse(each, saturated_record(300, 7)))
+
+
+@pytest.mark.ci
 def test_the_same_seed_gives_the_same_models():
     record = spring_record(240, noise=0.02)
     assert search(record) == search(record)
