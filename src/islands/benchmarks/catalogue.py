@@ -71,6 +71,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
             read=measured_files.read_cascaded_tanks,
             files={"cascaded_tanks.csv": "78e9181e9ff95a763f18e0070fb8d64f6959d29c936aa04f535bc2fe37b72a60"},
             samples=1024,
+            is_tuned=True,
         ),
         "wiener-hammerstein": Benchmark(
             description="Electronic circuit: filter, diode, filter.",
@@ -146,6 +147,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
                 "mrdamper_labcontrol.csv": "cb78cb8da8cc1280ebc01df7fec39e01cda42a447bcd4734e54ab00fe63cdcd3"
             },
             samples=10_507,
+            is_tuned=True,
         ),
         "piezo-micromanipulator": Benchmark(
             description="Piezoelectric cantilever at 150 V and 1 Hz: hysteresis and creep.",
@@ -162,6 +164,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
                 )
             },
             samples=18_750,
+            is_tuned=True,
         ),
         "piezo-loops": Benchmark(
             description="Ferroelectric disc: butterfly loops of the strain at four amplitudes.",
@@ -176,6 +179,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
                 "piezo_pnzt_loops.csv": "068507f0efee81209781e8bf140ab835ae750c0acbfc2fd0fc7d5a832911acf9"
             },
             samples=1203,
+            is_tuned=True,
         ),
         "memory-alloy-wing": Benchmark(
             description="Wing with a shape-memory alloy: major and minor loops, nearly static.",
@@ -190,6 +194,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
                 "sma_wing_hysteresis.csv": "a704ef44f50c8f0b63cb126fbcf97b8f855ed9041ea70bdf3a2b5816874fbcbd"
             },
             samples=642,
+            is_tuned=True,
         ),
         "hair-dryer": Benchmark(
             description="Temperature of the air of a hair dryer: linear, with a dead time.",
@@ -202,6 +207,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
             read=measured_files.read_hair_dryer,
             files={"daisy_hairdryer.csv": "3746b8debf6121a870db480403c181ed0999a1ddd708c7d011d5574b3b662634"},
             samples=750,
+            is_tuned=True,
         ),
         "gas-furnace": Benchmark(
             description="Gas furnace of Box and Jenkins: linear, with a dead time and coloured noise.",
@@ -226,6 +232,7 @@ MEASURED: Mapping[str, Benchmark] = MappingProxyType(
             read=measured_files.read_buck_converter,
             files={"buck_converter.csv": "2ee8c70b1c4b64a2a4c3e5838bd21eed9aad9587a5df8dd2cf97536a464782c4"},
             samples=1001,
+            is_tuned=True,
         ),
     }
 )
