@@ -233,6 +233,14 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     return tuple(sorted(models, key=_ranking_key))
 
 
+def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
+    """Return the best model of every size, best first; see `rank_models`."""
+    best: dict[int, Assessment] = {}
+    for entry in rank_models(models):
+        best.setdefault(entry.model.size, entry)
+    return tuple(best.values())
+
+
 def _ranking_key(entry: Assessment) -> tuple[bool, float, int, str]:
     errors = entry.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))

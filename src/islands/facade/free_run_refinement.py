@@ -15,7 +15,7 @@ import numpy as np
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import LEAST_SQUARES, refinement_criterion
 from islands.estimation.refinement import refine
-from islands.evolution.search_result import SearchResult, rank_models
+from islands.evolution.search_result import SearchResult, keep_best_of_sizes
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
@@ -104,14 +104,6 @@ def refine_models(
         refined = _add_models(refined, smaller)
         added += smaller
     return (refined, added) if _is_better(refined.recommended, found.recommended) else (found, [])
-
-
-def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
-    """Return the best model of every size, best first; see `rank_models`."""
-    best: dict[int, Assessment] = {}
-    for entry in rank_models(models):
-        best.setdefault(entry.model.size, entry)
-    return tuple(best.values())
 
 
 def _add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResult:

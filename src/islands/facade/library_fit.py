@@ -36,6 +36,7 @@ from islands.evolution.individual import Individual, Population
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
+    keep_best_of_sizes,
     mark_stopped,
     with_average,
     with_bands,
@@ -44,7 +45,7 @@ from islands.evolution.search_result import (
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.facade.final_models import screen
-from islands.facade.free_run_refinement import keep_best_of_sizes, refine_models
+from islands.facade.free_run_refinement import refine_models
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
