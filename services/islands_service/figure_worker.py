@@ -204,7 +204,8 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(replace(assessment, bands=bands))
     search = _search(document["search"], store.results.history(job.id))
-    linear = _read_linear_comparison(document, split, shooting)
+    # The comparison is part of the report on all models only.
+    linear = _read_linear_comparison(document, split, shooting) if rank is None else None
     return SearchResult(
         record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average, linear
     )

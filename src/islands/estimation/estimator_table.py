@@ -7,6 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+#: Standard errors within which an estimated parameter does not differ from zero.
+SIGNIFICANT = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class Estimator:

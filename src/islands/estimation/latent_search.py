@@ -23,10 +23,9 @@ from islands.errors import lookup
 from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
 from islands.estimation.modal_form import find_modal_form
 from islands.estimation.state_space_fit import StateSpaceFit
-from islands.kernels.state_space import simulate_state_space
 from islands.models.latent import ZERO_BLOCKS, LatentModel, StateSpaceLayout, find_codes, read_at_once
 from islands.progress import Steps
-from islands.simulation.initial_states import Segment, estimate_states
+from islands.simulation.initial_states import Segment, estimate_states, simulate_errors
 
 #: Numbers of states of the linear models.
 _ORDERS = (1, 2, 3, 4, 6)
@@ -317,10 +316,11 @@ def _measure(fit: StateSpaceFit, data: _Data) -> float:
     going_on, started, count, counted = 0.0, 0.0, 0, 0
     for segment, used, states in zip(data.whole, data.used, fit.states, strict=True):
         cut = len(used.y)
-        errors = _simulate_errors(fit, segment, states)
+        errors = simulate_errors(fit.theta, fit.codes, segment, states)
         held_out = Segment(segment.u[cut:], segment.y[cut:])
         rows = _count_memory(held_out, len(states))
-        again = _simulate_errors(fit, held_out, _estimate_start(fit.theta, fit.codes, held_out, len(states)))
+        start = _estimate_start(fit.theta, fit.codes, held_out, len(states))
+        again = simulate_errors(fit.theta, fit.codes, held_out, start)
         if errors is None or again is None:
             return np.inf
         going_on += float(np.nansum(errors[cut:] ** 2))
@@ -328,16 +328,6 @@ def _measure(fit: StateSpaceFit, data: _Data) -> float:
         count += int(np.count_nonzero(~np.isnan(errors[cut:])))
         counted += int(np.count_nonzero(~np.isnan(again[rows:])))
     return max(going_on / max(1, count), started / max(1, counted))
-
-
-def _simulate_errors(
-    fit: StateSpaceFit, segment: Segment, states: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
-    """Return the errors of a free run from initial states; None if it diverges."""
-    y = np.empty(len(segment.y))
-    if simulate_state_space(fit.theta, fit.codes, segment.u, states.copy(), y) < len(y):
-        return None
-    return segment.y - y
 
 
 def _begin(

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.kernels.state_space import accumulate_products, simulate_state_space
+from islands.kernels.state_space import accumulate_products
 from islands.kernels.summation import dot
-from islands.simulation.initial_states import Segment
+from islands.simulation.initial_states import Segment, simulate_errors
 
 #: Initial damping, its factors after a failed and a successful step, its limits.
 _DAMPING, _INCREASE, _DECREASE, _LEAST_DAMPING, _MAX_DAMPING = 1e-2, 4.0, 0.2, 1e-12, 1e8
@@ -88,10 +88,9 @@ class StateSpaceFit:
     def _measure(self, theta: NDArray[np.float64], states: NDArray[np.float64]) -> float:
         total, count = 0.0, 0
         for segment, start in zip(self.segments, states, strict=True):
-            y = np.empty(len(segment.y))
-            if simulate_state_space(theta, self.codes, segment.u, start.copy(), y) < len(y):
+            error = simulate_errors(theta, self.codes, segment, start)
+            if error is None:
                 return np.inf
-            error = segment.y - y
             error = error[~np.isnan(error)]
             total += float(dot(error, 0, error, 0, error.size))
             count += error.size

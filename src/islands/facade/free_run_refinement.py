@@ -8,12 +8,12 @@ of zero. Least squares is kept where the free run gains little: it is efficient 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import inf, isnan
+from math import inf
 
 import numpy as np
 
 from islands.estimation.estimate import estimate
-from islands.estimation.estimator_table import LEAST_SQUARES, refinement_criterion
+from islands.estimation.estimator_table import LEAST_SQUARES, SIGNIFICANT, refinement_criterion
 from islands.estimation.refinement import refine
 from islands.evolution.search_result import SearchResult, keep_best_of_sizes
 from islands.models.narx import Model
@@ -35,9 +35,6 @@ _CLOSE = 2.0
 
 #: Largest number of accepted steps of a refinement.
 _STEPS = 30
-
-#: Standard errors within which a parameter does not differ from zero.
-_SIGNIFICANT = 2.0
 
 #: Largest error of the recommended model relative to that of least squares, unless it has fewer terms.
 _LARGEST_RATIO = 0.95
@@ -87,13 +84,15 @@ def refine_models(
             if entry:
                 yield entry
 
-    least = min(map(_error, found.models))
+    least = min(each.validation_error for each in found.models)
     if least <= ROUNDING * found.split.validation.output_range or steps.skip(_REFINEMENT):
         return found, []
     steps.report(_REFINEMENT, None)
     limit = _CLOSE * least
     starts = [
-        each.model for each in found.models if each.criterion == LEAST_SQUARES and _error(each) <= limit
+        each.model
+        for each in found.models
+        if each.criterion == LEAST_SQUARES and each.validation_error <= limit
     ]
     added = [each for each in map_over_record(refine_one, starts, record.samples) if each]
     refined = _add_models(found, added)
@@ -110,12 +109,6 @@ def _add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResu
     return replace(found, models=keep_best_of_sizes((*found.models, *models)))
 
 
-def _error(entry: Assessment) -> float:
-    """Return the RMSE of the free run on the validation data; infinite if it diverges."""
-    error = entry.metrics["validation"]["free_run"].rmse
-    return inf if isnan(error) else error
-
-
 def _keep_significant(entry: Assessment) -> tuple[Regressor, ...]:
     """Return the regressors of a refined model without the least significant one.
 
@@ -129,9 +122,9 @@ def _keep_significant(entry: Assessment) -> tuple[Regressor, ...]:
     ratios = np.full(model.size, inf)
     np.divide(np.abs(model.parameters), errors, out=ratios, where=errors > 0.0)
     worst = int(np.argmin(ratios))
-    return model.regressors[:worst] + model.regressors[worst + 1 :] if ratios[worst] < _SIGNIFICANT else ()
+    return model.regressors[:worst] + model.regressors[worst + 1 :] if ratios[worst] < SIGNIFICANT else ()
 
 
 def _is_better(entry: Assessment, reference: Assessment) -> bool:
     limit = _LARGEST_RATIO if entry.model.size >= reference.model.size else 1.0
-    return _error(entry) <= limit * _error(reference)
+    return entry.validation_error <= limit * reference.validation_error

@@ -169,7 +169,7 @@ class LibraryFit:
         found = replace(fit.found, search=replace(fit.found.search, certificates=certificates))
         delays = [delay // fit.average for delay in settings["delays"]]
         shooting = count_means(settings["shooting"], fit.average)
-        found = with_linear_comparison(found, delays, shooting, self.steps)
+        found = with_linear_comparison(found, delays, shooting, fit.steps)
         banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, fit.steps)
         return with_average(banded, fit.average)
 

@@ -36,6 +36,30 @@ class Segment:
     y: NDArray[np.float64]
 
 
+def simulate_errors(
+    theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, start: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return the errors of a free run of a segment from initial states; None if it diverges.
+
+    Parameters
+    ----------
+    theta, codes
+        As of `StateSpaceFit`.
+    segment : Segment
+    start : ndarray, shape (states,)
+        States at the first row.
+
+    Returns
+    -------
+    ndarray, shape (rows,), or None
+        NaN where the output is missing.
+    """
+    y = np.empty(len(segment.y))
+    if simulate_state_space(theta, codes, segment.u, start.copy(), y) < len(y):
+        return None
+    return segment.y - y
+
+
 def estimate_states(
     theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, rest: NDArray[np.float64]
 ) -> NDArray[np.float64]:

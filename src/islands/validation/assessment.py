@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import nan
+from math import inf, isnan, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +110,12 @@ class Assessment:
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
     bands: PredictionBands | None = None
     criterion: Criterion | None = None
+
+    @property
+    def validation_error(self) -> float:
+        """RMSE of the free run on the validation data; infinite if it diverges."""
+        error = self.metrics["validation"]["free_run"].rmse
+        return inf if isnan(error) else error
 
     @property
     def squared_errors(self) -> NDArray[np.float64]:

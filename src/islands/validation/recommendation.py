@@ -101,10 +101,10 @@ def recommend(
         )
     sound = [at for at in bounded if is_sound(assessments[at].physics, hysteresis)]
     candidates = sound or bounded
-    best = min(candidates, key=lambda at: (_rmse(assessments[at]), at))
+    best = min(candidates, key=lambda at: (assessments[at].validation_error, at))
     close = _pass_over(candidates, assessments, _LARGEST_RATIO)
     lucky = best not in close
-    best = min(close, key=lambda at: (_rmse(assessments[at]), at))
+    best = min(close, key=lambda at: (assessments[at].validation_error, at))
     equal = [
         at
         for at in close
@@ -182,7 +182,7 @@ def _is_as_good_in_estimation(entry: Assessment, reference: Assessment) -> bool:
     error, smallest = _estimation_error(entry), _estimation_error(reference)
     if isinf(error) or error > (1.0 + NEGLIGIBLE_EXCESS) * smallest:
         return False
-    return _rmse(entry) <= (1.0 + _EXCESS_BY_CHANCE) * _rmse(reference)
+    return entry.validation_error <= (1.0 + _EXCESS_BY_CHANCE) * reference.validation_error
 
 
 def _pass_over(places: Sequence[int], assessments: Sequence[Assessment], ratio: float) -> list[int]:
@@ -235,7 +235,7 @@ def _describe_choice(
     chosen: int, best: int, equal: int, kept: int, assessments: Sequence[Assessment], unit: str
 ) -> str:
     """State the choice among a number of equal models, of which some are kept for the estimation data."""
-    error, least = (f"{_rmse(assessments[at]):.4g} {unit}".rstrip() for at in (chosen, best))
+    error, least = (f"{assessments[at].validation_error:.4g} {unit}".rstrip() for at in (chosen, best))
     if chosen == best:
         both = " on both parts of the data" if kept < equal else ""
         return f"least free-run error on the validation data, RMSE {error}; no smaller model is as good{both}"
@@ -301,7 +301,3 @@ def _describe_motion(held: float, physics: PhysicsChecks) -> str:
     leaves = f"leaves its recorded range by up to {ranges:.3g} ranges" if ranges > 0.0 else ""
     moves = "is still moving at the end" if drift > _STILL else ""
     return f"the output {' and '.join(filter(None, (leaves, moves)))}"
-
-
-def _rmse(entry: Assessment) -> float:
-    return entry.metrics["validation"]["free_run"].rmse

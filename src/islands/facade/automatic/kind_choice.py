@@ -6,7 +6,7 @@ models are compared on the validation data.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, lcm
+from math import isfinite, lcm
 from types import MappingProxyType
 from typing import Any
 
@@ -213,9 +213,7 @@ def _take_best(results: Sequence[SearchResult], missing: Sequence[str]) -> Searc
     count = lcm(*(each.average for each in results))
 
     def measure(result: SearchResult) -> float:
-        compared = average_errors(result.recommended, count // result.average)
-        error = compared.metrics["validation"]["free_run"].rmse
-        return error if isfinite(error) else inf
+        return average_errors(result.recommended, count // result.average).validation_error
 
     best = min(results, key=measure)
     search = replace(
@@ -231,7 +229,7 @@ def _is_bounded(model: Assessment) -> bool:
 
 def _measure(model: Assessment, record: Dataset) -> float:
     """Return the free-run RMSE on the validation data as a fraction of the output range of a record."""
-    return max(model.metrics["validation"]["free_run"].rmse / record.output_range, ROUNDING)
+    return max(model.validation_error / record.output_range, ROUNDING)
 
 
 def _select_kind(

@@ -13,6 +13,7 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 from islands.data.preprocessing_steps import Preprocessing
 from islands.data.split import compare_input_ranges
 from islands.errors import name_option
+from islands.estimation.estimator_table import SIGNIFICANT
 from islands.io.result_text.dry_friction import DryFriction, find_dry_friction
 from islands.models.equations import name_columns
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
@@ -44,9 +45,6 @@ _ROUNDING = 1e-6
 
 #: Least fraction of the validation samples inside a band of 90 %: two standard errors of 20 independent ones.
 _LEAST_COVERAGE = 0.75
-
-#: Standard errors below which a parameter is not significant.
-_SIGNIFICANT = 2.0
 
 #: Error of a linear model relative to that of the model below which the model is no better.
 _BETTER_THAN_LINEAR = 1.05
@@ -319,12 +317,15 @@ class ResultFacts(RunFacts):
         return self.document.get("linear") or {}
 
     @property
+    def linear_error(self) -> float:
+        """RMSE of the free run of that linear model on the validation data."""
+        return float(self.linear["metrics"]["validation"]["free_run"]["rmse"])
+
+    @property
     def linear_ratio(self) -> float | None:
         """Error of the linear model relative to that of the model; None if that is unknown or exact."""
         own = self.error()["rmse"]
-        if not self.linear or not own or self.is_rounding(own):
-            return None
-        return float(self.linear["metrics"]["validation"]["free_run"]["rmse"] / own)
+        return None if not self.linear or not own or self.is_rounding(own) else self.linear_error / own
 
     @property
     def has_tried_free_run(self) -> bool:
@@ -484,7 +485,7 @@ def list_insignificant(terms: Iterable[Document]) -> list[str]:
         term.get("term", term["regressor"])
         for term in terms
         if term["standard_error"] is not None
-        and abs(term["parameter"]) < _SIGNIFICANT * term["standard_error"]
+        and abs(term["parameter"]) < SIGNIFICANT * term["standard_error"]
     ]
 
 
@@ -589,8 +590,8 @@ def _describe_error(facts: ResultFacts) -> str:
 
 
 def _describe_linear_model(facts: ResultFacts) -> str:
-    error = facts.linear["metrics"]["validation"]["free_run"]["rmse"]
-    text = f"Linear model: RMSE {facts.write_amount(error)} with {facts.linear['size']} terms"
+    size = facts.linear["size"]
+    text = f"Linear model: RMSE {facts.write_amount(facts.linear_error)} with {size} terms"
     ratio = facts.linear_ratio
     return f"{text}." if ratio is None else f"{text}, {ratio:.3g} times the error of this model."
 
