@@ -8,9 +8,9 @@ from math import inf
 import pytest
 
 from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.generation import _abandon_threshold, _thresholds_by_size, first_generation, step
 from islands.evolution.hall_of_fame import DEPTH
 from islands.evolution.individual import Individual
-from islands.evolution.island import _abandon_threshold, _thresholds_by_size, first_generation, step
 from islands.evolution.problem import make_problem
 from islands.simulation.outcome import Status
 from support.searches import SMALL, exactly, islands_of, record

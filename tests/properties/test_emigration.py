@@ -12,8 +12,9 @@ from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import select_migrants
 from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation import select_elite
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.island import Island, select_elite
+from islands.evolution.island import Island
 from islands.evolution.migration.policies import SELECTION_POLICIES
 from islands.evolution.problem import Problem
 from islands.evolution.rng import Purpose, Stream

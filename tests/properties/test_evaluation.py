@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from islands.evolution import evaluation
 from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.generation import first_generation
 from islands.evolution.individual import Individual
-from islands.evolution.island import first_generation
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse

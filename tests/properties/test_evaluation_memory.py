@@ -11,8 +11,8 @@ import pytest
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.gene_index import GeneIndex
+from islands.evolution.generation import first_generation, step
 from islands.evolution.individual import Individual
-from islands.evolution.island import first_generation, step
 from islands.evolution.rng import Purpose, Stream
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import receive_migrants, run_epoch
 from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.generation import select_elite
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
-from islands.evolution.island import Island, select_elite
+from islands.evolution.island import Island
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES
 from islands.evolution.migration.topology import parse_topology
 from islands.evolution.problem import Problem

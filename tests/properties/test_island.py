@@ -15,9 +15,9 @@ import pytest
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation import first_generation, select_elite, step
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual, make_regressor, unique_niches
-from islands.evolution.island import first_generation, select_elite, step
 from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.expressions.parsing import parse

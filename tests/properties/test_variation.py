@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import phi
+from islands.evolution.generation import first_generation, step
 from islands.evolution.individual import Individual, make_regressor
-from islands.evolution.island import first_generation, step
 from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.island import first_generation, step
+from islands.evolution.generation import first_generation, step
 from islands.evolution.offspring import Offspring
 from islands.evolution.settings import Settings
 from islands.kernels.breeding import Individuals

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation import first_generation, step
 from islands.evolution.individual import Individual
-from islands.evolution.island import first_generation, step
 from islands.evolution.offspring import Offspring
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings

@@ -23,7 +23,7 @@ from islands_service.store.database import StoreError
 if TYPE_CHECKING:
     from islands.evolution.archipelago import Archipelago
     from islands.evolution.engine import ArchipelagoEpoch, Engine
-    from islands.evolution.problem import Problem
+    from islands.evolution.protocol import SearchProblem
     from islands.progress import Stop
 
 log = structlog.get_logger()
@@ -260,7 +260,9 @@ class HangGuard:
     def __init__(self, engine: "Engine", heartbeat: Heartbeat) -> None:
         self._engine, self._heartbeat = engine, heartbeat
 
-    def run(self, problem: "Problem", start: "Archipelago", stop: "Stop") -> Generator["ArchipelagoEpoch"]:
+    def run(
+        self, problem: "SearchProblem", start: "Archipelago", stop: "Stop"
+    ) -> Generator["ArchipelagoEpoch"]:
         """Run the wrapped engine."""
         with self._heartbeat.search():
             yield from self._engine.run(problem, start, stop)

@@ -7,7 +7,7 @@ import structlog
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine, SerialEngine
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.evolution.settings import Settings
 from islands.io.models import NARX
 from islands.progress import ProgressCallback, Stop
@@ -90,7 +90,7 @@ class JobEngine:
         self._lease, self._short, self._connect = lease, short, connect
         self._progress, self._autoscaling, self._observe = progress, autoscaling, observe
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield the epochs of a search; see `islands.evolution.engine.Engine`.
 
         Raises

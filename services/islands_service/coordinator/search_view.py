@@ -12,9 +12,10 @@ from typing import Any
 import structlog
 
 from islands.data.channel_names import parse_channel_name
-from islands.evolution.individual import Individual, Population
+from islands.data.input_lead import advance_all_inputs
+from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.migration.topology import parse_topology
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation
@@ -51,13 +52,13 @@ class SearchFront:
     """
 
     def __init__(self) -> None:
-        self._problem: Problem | None = None
+        self._problem: SearchProblem | None = None
         self._best: Mapping[int, float] = {}
         self._front: list[dict[str, Any]] = []
         self._due = 0.0
         self.free_run: SearchFreeRun | None = None
 
-    def begin(self, problem: Problem) -> None:
+    def begin(self, problem: SearchProblem) -> None:
         """Begin with the front of another search."""
         self._problem, self._best, self._front, self._due = problem, {}, [], 0.0
         self.free_run = None
@@ -85,16 +86,18 @@ class SearchFront:
         return self._front
 
 
-def _find_small(front: Population) -> Individual:
+def _find_small(front: AnyPopulation) -> AnyIndividual:
     """Return the smallest model whose error is near the least one."""
     most = _SHOWN_RATIO**2 * min(each.fitness for each in front)
     return next(each for each in front if each.fitness <= most)
 
 
-def _simulate(individual: Individual, problem: Problem, generation: int) -> SearchFreeRun:
+def _simulate(individual: AnyIndividual, problem: SearchProblem, generation: int) -> SearchFreeRun:
     offset = problem.offsets[0] if problem.offsets else 0.0
-    model = _make_model(individual, problem)
-    return simulate_searched(model, problem.record, offset, generation, sqrt(individual.fitness))
+    model, record = problem.make_model(individual), problem.record
+    if model.input_names != record.input_names:
+        record = advance_all_inputs(record)
+    return simulate_searched(model, record, offset, generation, sqrt(individual.fitness))
 
 
 def describe_migration(state: SearchState, settings: Settings, seed: int) -> dict[str, Any] | None:
@@ -118,35 +121,27 @@ def describe_migration(state: SearchState, settings: Settings, seed: int) -> dic
     return {"generation": generation, "emigrants": emigrants, "sources": [list(each) for each in sources]}
 
 
-def _thin_out(front: tuple[Individual, ...]) -> Iterable[Individual]:
+def _thin_out(front: AnyPopulation) -> Iterable[AnyIndividual]:
     """Return at most `MAX_MODELS` models of a front, among them the first and the last one."""
     last, count = len(front) - 1, min(len(front), MAX_MODELS)
     return (front[round(at * last / max(1, count - 1))] for at in range(count))
 
 
-def _describe(individual: Individual, problem: Problem) -> dict[str, Any]:
+def _describe(individual: AnyIndividual, problem: SearchProblem) -> dict[str, Any]:
     text = _write_equation(individual, problem)
     if len(text) > MAX_CHARACTERS:
         text = f"{text[: MAX_CHARACTERS - 1]}…"
     return {"size": individual.size, "error": sqrt(individual.fitness), "equation": text}
 
 
-def _write_equation(individual: Individual, problem: Problem) -> str:
-    """Write the equation of a model with the names of the columns."""
-    record, model = problem.record, _make_model(individual, problem)
+def _write_equation(individual: AnyIndividual, problem: SearchProblem) -> str:
+    """Write the equation of a model with the names of the columns, or the structure of a state space."""
+    record, model = problem.record, problem.make_model(individual)
+    if not isinstance(model, Model):
+        return " · ".join(individual.niche)
     names = (record.output_name, *(parse_channel_name(name).base for name in record.input_names))
     statement = ", ".join(
         f"{name} minus {offset:g}" for name, offset in zip(names, problem.offsets, strict=False) if offset
     )
     line = named_equation(model, _DIGITS)
     return f"{line}, with {statement}" if statement else line
-
-
-def _make_model(individual: Individual, problem: Problem) -> Model:
-    record = problem.record
-    return Model(
-        individual.regressors,
-        individual.theta,
-        input_names=record.input_names,
-        output_name=record.output_name,
-    )

@@ -5,7 +5,7 @@ from contextlib import closing
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.progress import Stop
 
 
@@ -28,12 +28,12 @@ class StoppableEngine:
     """
 
     def __init__(
-        self, engine: Engine, is_stopped: Stop, on_problem: Callable[[Problem], None], least: int = 0
+        self, engine: Engine, is_stopped: Stop, on_problem: Callable[[SearchProblem], None], least: int = 0
     ) -> None:
         self._engine, self._is_stopped, self._on_problem = engine, is_stopped, on_problem
         self._least = least
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
         self._on_problem(problem)
         reached, least = start.generation, min(self._least, problem.settings.generations)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
 from islands.facade.coupled.result import FittedCoupledModel
-from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run
@@ -55,13 +55,13 @@ class SearchFreeRun:
 
 
 def simulate_searched(
-    model: Model, data: Dataset, offset: float, generation: int, error: float
+    model: DynamicModel, data: Dataset, offset: float, generation: int, error: float
 ) -> SearchFreeRun:
     """Simulate a model of a running search over its estimation data, from the measured first outputs.
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     data : Dataset
     offset : float
         Constant that was subtracted from the output of ``data``.

@@ -11,7 +11,7 @@ from ray import cloudpickle
 from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.expressions.primitives import PRIMITIVES
 from islands.progress import ProgressCallback
 from islands_service.runtime.cluster import LOSS_ERRORS, check_version, cluster_cpus, reserved_cpus
@@ -61,7 +61,7 @@ class IslandActorPool:
 
     Parameters
     ----------
-    problem : Problem
+    problem : SearchProblem
     islands : int
     progress : ProgressCallback
         Receives a message if an actor is lost or must wait for a CPU.
@@ -80,7 +80,7 @@ class IslandActorPool:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: SearchProblem,
         islands: int,
         progress: ProgressCallback,
         title: str = "",
@@ -253,7 +253,7 @@ class IslandActorPool:
                 self._report(line)
 
 
-def put_problem(problem: Problem) -> "ray.ObjectRef[Problem]":
+def put_problem(problem: SearchProblem) -> "ray.ObjectRef[SearchProblem]":
     """Put a problem into the object store, with the code of the user's functions.
 
     By default Ray sends the name of a function, and a worker may be unable to import its module.

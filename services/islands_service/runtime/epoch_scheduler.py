@@ -12,7 +12,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import make_topology
 from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
 from islands.evolution.island import Island
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.evolution.settings import Settings
 
 #: Data that is kept of an island's epoch.
@@ -128,13 +128,16 @@ class EpochScheduler(Generic[T]):
         return next_stop(generation, self._settings)
 
 
-def begin_epoch(problem: Problem, island: Island) -> IslandEpoch:
+def begin_epoch(problem: SearchProblem, island: Island) -> IslandEpoch:
     """Return an island of a start with its emigrants, as if an epoch had ended there."""
     return IslandEpoch(island, select_migrants(island, problem.settings_of(island.index)), ())
 
 
 def schedule_islands(
-    problem: Problem, start: Archipelago, keep: Callable[[IslandEpoch], T], ahead: int = MAX_EPOCHS_AHEAD
+    problem: SearchProblem,
+    start: Archipelago,
+    keep: Callable[[IslandEpoch], T],
+    ahead: int = MAX_EPOCHS_AHEAD,
 ) -> EpochScheduler[T]:
     """Return a scheduler of all islands of a search.
 

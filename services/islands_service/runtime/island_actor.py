@@ -10,9 +10,8 @@ import ray
 
 from islands.distribution import read_version
 from islands.evolution.epoch import run_epoch
-from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import Island
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.facade.warm_up import warm_up
 from islands.processes.settings import freeze_garbage_collector
 from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_individuals, unpack_island
@@ -23,11 +22,11 @@ class IslandActor:
 
     Parameters
     ----------
-    problem : Problem
+    problem : SearchProblem
         From the object store: all actors of a machine share one copy of its record.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: SearchProblem) -> None:
         self._problem, self._primitives = problem, problem.settings.primitive_table
         self._islands: dict[int, tuple[bytes, Island]] = {}
         self._name = str(ray.get_runtime_context().get_actor_id())
@@ -37,7 +36,7 @@ class IslandActor:
         """Do nothing. The reference to this call resolves when the actor has a CPU and its process runs."""
 
     def prepare(self, _started: None = None) -> str:
-        """Compile kernels, build the evaluator, and return the version of islands.
+        """Compile kernels, prepare the evaluation, and return the version of islands.
 
         An error in the problem is raised here.
 
@@ -47,7 +46,7 @@ class IslandActor:
             Result of `confirm_start`, so that this call begins after that one has ended.
         """
         warm_up(lambda _line: None)
-        self._evaluator = Evaluator(self._problem.record, self._problem.settings)
+        self._evolution = self._problem.open()
         freeze_garbage_collector()
         return read_version()
 
@@ -62,9 +61,9 @@ class IslandActor:
         began = monotonic()
         immigrants = [unpack_individuals(packed, self._primitives) for packed in arriving]
         # A search that ends kills its actors, so no stop function is needed.
-        epoch = run_epoch(self._island(before), immigrants, self._evaluator, self._problem, lambda: False)
+        epoch = run_epoch(self._island(before), immigrants, self._evolution, lambda: False)
         assert epoch is not None
-        report = pack_epoch(epoch, self._name, self._evaluator.memory, monotonic() - began)
+        report = pack_epoch(epoch, self._name, self._evolution.memory, monotonic() - began)
         self._islands[report.index] = report.packed, epoch.island
         return report, report.emigrants
 

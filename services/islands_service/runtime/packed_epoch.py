@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, overload
 
-from islands.evolution.engine import Caches
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.island import Island, StepInfo
+from islands.evolution.protocol import Caches
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 
@@ -81,9 +81,9 @@ def unpack_island(packed: bytes, primitives: Mapping[str, Primitive]) -> Island:
     return island
 
 
-def unpack_individuals(packed: bytes, primitives: Mapping[str, Primitive]) -> Population:
+def unpack_individuals(packed: bytes, primitives: Mapping[str, Primitive]) -> AnyPopulation:
     """Unpickle emigrants, or the best individuals, with the primitives of their problem."""
-    individuals: Population = _Unpickler(packed, primitives).load()
+    individuals: AnyPopulation = _Unpickler(packed, primitives).load()
     return individuals
 
 
@@ -174,7 +174,7 @@ class PackedIslands(LazyIslands):
         super().__init__(len(reports))
         self._reports, self._primitives = tuple(reports), primitives
 
-    def find_best(self) -> Iterator[Individual]:
+    def find_best(self) -> Iterator[AnyIndividual]:
         """Yield the best individual of every size; see `islands.evolution.archipelago.StoredIslands`.
 
         Only the islands that have one by their statistics are unpacked, or all if there are no statistics.

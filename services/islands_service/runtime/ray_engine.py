@@ -6,7 +6,7 @@ from ray.exceptions import RayError
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.expressions.tree import Primitive
 from islands.progress import ProgressCallback, Stop, ignore_progress
 from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement
@@ -44,7 +44,7 @@ class RayEngine:
         self._progress, self._title, self._autoscaling = progress, title, autoscaling
         self._observe = observe
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
         islands = len(start.islands)
         cpus = islands if self._autoscaling else int(cluster_cpus())

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 import ray
 
 from islands.distribution import read_version
-from islands.evolution.engine import Caches
 from islands.evolution.island import StepInfo
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import Caches, SearchProblem
 from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.epoch_deadline import EpochDeadlines
 from islands_service.runtime.epoch_scheduler import EpochScheduler
@@ -67,7 +66,7 @@ class RegionActor:
 
     Parameters
     ----------
-    problem : Problem
+    problem : SearchProblem
     sources : sequence of sequences of int
         For every island of the search, the islands that it receives from.
     border : frozenset of int
@@ -84,7 +83,7 @@ class RegionActor:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: SearchProblem,
         sources: Sequence[Sequence[int]],
         border: frozenset[int],
         generation: int,

@@ -7,9 +7,9 @@ from typing import Any
 import ray
 from ray.exceptions import RayError, RayTaskError
 
-from islands.evolution.individual import Individual
+from islands.evolution.individual import AnyIndividual
 from islands.evolution.island import Island
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.packed_epoch import (
     LazyIslands,
@@ -21,12 +21,12 @@ from islands_service.runtime.packed_epoch import (
 
 
 def _render(
-    problem: Problem, state: tuple[PackedEpoch, ...], function: Callable[[Island], bytes]
+    problem: SearchProblem, state: tuple[PackedEpoch, ...], function: Callable[[Island], bytes]
 ) -> list[bytes]:
     return [*map(function, PackedIslands(state, problem.settings.primitive_table))]
 
 
-def _pack_best(problem: Problem, state: tuple[PackedEpoch, ...]) -> bytes:
+def _pack_best(problem: SearchProblem, state: tuple[PackedEpoch, ...]) -> bytes:
     return pack_best(state, problem.settings.primitive_table)
 
 
@@ -46,8 +46,8 @@ class RegionIslands(LazyIslands):
         Number of islands.
     states : sequence of references to tuples of PackedEpoch
         Islands of every region.
-    problem : Problem
-    shared : reference to Problem
+    problem : SearchProblem
+    shared : reference to SearchProblem
         The problem in the object store.
 
     Raises
@@ -61,8 +61,8 @@ class RegionIslands(LazyIslands):
         starts: Sequence[int],
         size: int,
         states: Sequence["ray.ObjectRef"],
-        problem: Problem,
-        shared: "ray.ObjectRef[Problem]",
+        problem: SearchProblem,
+        shared: "ray.ObjectRef[SearchProblem]",
     ) -> None:
         super().__init__(size)
         self._starts, self._states = starts, states
@@ -100,7 +100,7 @@ class RegionIslands(LazyIslands):
             for reference in tasks.values():
                 ray.cancel(reference, force=True)
 
-    def find_best(self) -> Iterator[Individual]:
+    def find_best(self) -> Iterator[AnyIndividual]:
         """Yield the best individual of every size of every region.
 
         Tasks of Ray find them, all at the same time.

@@ -16,7 +16,7 @@ from ray.exceptions import RayError, RayTaskError
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, make_topology
 from islands.evolution.epoch import next_stop
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import SearchProblem
 from islands.progress import ProgressCallback
 from islands_service.runtime.actor_pool import ignore_placement, put_problem
 from islands_service.runtime.cluster import LOSS_ERRORS, check_version
@@ -52,7 +52,7 @@ def count_regions(islands: int, cpus: int) -> int:
 
 
 def run_regions(
-    problem: Problem,
+    problem: SearchProblem,
     start: Archipelago,
     stop: Callable[[], bool],
     regions: int,
@@ -117,7 +117,7 @@ class _Tree:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: SearchProblem,
         start: Archipelago,
         regions: int,
         progress: ProgressCallback,

@@ -9,7 +9,7 @@ from islands.benchmarks.definition import LATENT, LINEAR, NARX
 from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.estimation.latent_search import search_linear_models
+from islands.estimation.latent_models import search_linear_models
 from islands.facade.coupled.identification import fit_coupled
 from islands.facade.fit import fit_record
 from islands.models.coupled_narx import AnyModel, CoupledModel

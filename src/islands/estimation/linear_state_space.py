@@ -15,7 +15,7 @@ from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.estimation.linear_simulation import find_start, minimise, project
 from islands.estimation.output_error import make_problem
-from islands.kernels.state_space import simulate_state_space
+from islands.kernels.state_space import simulate_states
 from islands.models.latent import StateSpaceLayout
 
 #: The steps end when one reduces the squared error by a smaller relative amount.
@@ -121,7 +121,7 @@ def _normalise(model: LinearStateSpace, record: Dataset) -> LinearStateSpace | N
     """Return the model with states of the standard deviation 1 for the inputs of a record."""
     # An input that is read one sample early only shifts the states.
     first, none = record.samples // 10, np.zeros(0, np.int64)
-    by = measure_deviations(model.theta, none, model.layout, record.u, np.zeros(len(model.a)), first)
+    by = measure_deviations(model.theta, none, record.u, np.zeros(len(model.a)), first)
     if by is None:
         return None
     return LinearStateSpace(
@@ -132,7 +132,6 @@ def _normalise(model: LinearStateSpace, record: Dataset) -> LinearStateSpace | N
 def measure_deviations(
     theta: NDArray[np.float64],
     codes: NDArray[np.int64],
-    layout: StateSpaceLayout,
     u: NDArray[np.float64],
     start: NDArray[np.float64],
     first: int = 0,
@@ -144,7 +143,6 @@ def measure_deviations(
     theta : ndarray, shape (parameters,)
         Parameters in the order of the kernel.
     codes : ndarray of int64, shape (units,)
-    layout : StateSpaceLayout
     u : ndarray, shape (rows, inputs)
     start : ndarray, shape (states,)
         States at the first row.
@@ -156,11 +154,8 @@ def measure_deviations(
     ndarray, shape (states,), or None
         None after a divergence.
     """
-    slices, found = layout.find_slices(), []
-    for output in np.eye(layout.order):
-        probe, y = theta.copy(), np.empty(len(u))
-        probe[slices["C"]], probe[slices["D"]], probe[slices["F"]] = output, 0.0, 0.0
-        if simulate_state_space(probe, codes, u, start.copy(), y) < len(u):
-            return None
-        found.append(float(y[first:].std()) or 1.0)
-    return np.array(found)
+    states = np.empty((len(u), len(start)))
+    if simulate_states(theta, codes, u, start, states) < len(u):
+        return None
+    found = states[first:].std(axis=0)
+    return np.where(found > 0.0, found, 1.0)

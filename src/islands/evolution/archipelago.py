@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from islands.evolution.hall_of_fame import HallOfFame, merge, pareto_front
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.island import Island
 
 
@@ -22,7 +22,7 @@ class RemoteIslands(Protocol):
 class StoredIslands(Protocol):
     """Interface of sequences of islands that are expensive to read, and know where their best models are."""
 
-    def find_best(self) -> Iterator[Individual]:
+    def find_best(self) -> Iterator[AnyIndividual]:
         """Yield, among others, the best individual of every size; of equal ones that of the first island."""
         ...
 
@@ -49,7 +49,7 @@ class Archipelago:
         """Merged halls of fame of all islands."""
         return merge(island.hall_of_fame for island in self.islands)
 
-    def find_front(self) -> Population:
+    def find_front(self) -> AnyPopulation:
         """Return the Pareto front of error and size, smallest first.
 
         Islands in other processes are not fetched.

@@ -1,20 +1,16 @@
 """Engines: they run the epochs of a search. All engines yield the same archipelagos, bit for bit."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from islands.available_cpus import count_cpus
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
-from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import StepInfo
 from islands.evolution.migration.topology import Topology, parse_topology
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import Caches, SearchProblem
 from islands.progress import Stop
-
-#: Bytes in use and byte limit of each cache, by name.
-Caches = Mapping[str, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +38,7 @@ class Engine(Protocol):
     from an archipelago that it yielded earlier continues with the same archipelagos.
     """
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield every epoch after ``start``, up to the settings' last generation.
 
         Parameters
@@ -56,11 +52,11 @@ class Engine(Protocol):
 
 
 class SerialEngine:
-    """Engine that runs the islands one after the other in this process, with one evaluator."""
+    """Engine that runs the islands one after the other in this process, with one set of caches."""
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield every epoch after ``start``."""
-        evaluator = Evaluator(problem.record, problem.settings, threads=count_cpus())
+        evolution = problem.open(count_cpus())
         sources = make_topology(problem, start).sources
         archipelago = start
         leaving = [select_migrants(island, problem.settings_of(island.index)) for island in start.islands]
@@ -68,16 +64,16 @@ class SerialEngine:
             epochs: list[IslandEpoch] = []
             for island in archipelago.islands:
                 arriving = [leaving[source] for source in sources[island.index]]
-                epoch = run_epoch(island, arriving, evaluator, problem, stop)
+                epoch = run_epoch(island, arriving, evolution, stop)
                 if epoch is None:
                     return
                 epochs.append(epoch)
             archipelago = Archipelago(tuple(epoch.island for epoch in epochs))
             leaving = [epoch.emigrants for epoch in epochs]
-            yield ArchipelagoEpoch(archipelago, tuple(epoch.steps for epoch in epochs), evaluator.memory)
+            yield ArchipelagoEpoch(archipelago, tuple(epoch.steps for epoch in epochs), evolution.memory)
 
 
-def make_topology(problem: Problem, archipelago: Archipelago) -> Topology:
+def make_topology(problem: SearchProblem, archipelago: Archipelago) -> Topology:
     """Return the topology for the number of islands and the seed of an archipelago."""
     islands = archipelago.islands
     return parse_topology(problem.settings.topology, len(islands), islands[0].seed)

@@ -8,14 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual, Population, unique_structures
-from islands.evolution.island import Island, StepInfo, first_generation, select_elite, step
+from islands.evolution.individual import AnyPopulation, unique_structures
+from islands.evolution.island import Island, StepInfo
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.problem import Problem
+from islands.evolution.protocol import Evolution
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.simulation.outcome import Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +30,14 @@ class IslandEpoch:
     """
 
     island: Island
-    emigrants: Population
+    emigrants: AnyPopulation
     steps: tuple[StepInfo, ...]
 
 
 def run_epoch(
     island: Island,
-    arriving: Sequence[Population],
-    evaluator: Evaluator,
-    problem: Problem,
+    arriving: Sequence[AnyPopulation],
+    evolution: Evolution,
     stop: Callable[[], bool],
 ) -> IslandEpoch | None:
     """Run an island up to the next migration.
@@ -57,17 +54,17 @@ def run_epoch(
     IslandEpoch or None
         None if ``stop`` returned true. The generations of the unfinished epoch are discarded.
     """
-    settings = problem.settings_of(island.index)
+    settings = evolution.problem.settings_of(island.index)
     last = next_stop(island.generation, settings)
-    island = receive_migrants(island, arriving, evaluator, settings)
+    island = receive_migrants(island, arriving, evolution)
     steps = []
     while island.generation < last:
         if stop():
             return None
         if island.generation < 0:
-            island, info = first_generation(island.index, island.seed, evaluator, problem.seeds, settings)
+            island, info = evolution.first_generation(island.index, island.seed)
         else:
-            island, info = step(island, evaluator, problem.pool, settings)
+            island, info = evolution.step(island)
         steps.append(info)
     return IslandEpoch(island, select_migrants(island, settings), tuple(steps))
 
@@ -77,7 +74,7 @@ def next_stop(generation: int, settings: Settings) -> int:
     return 0 if generation < 0 else min(settings.generations, settings.stops.next_stop(generation))
 
 
-def select_migrants(island: Island, settings: Settings) -> Population:
+def select_migrants(island: Island, settings: Settings) -> AnyPopulation:
     """Return copies of the emigrants of an island; none if no migration is scheduled at its generation.
 
     Every emigrant has a known fitness: abandoned individuals are not selected.
@@ -89,9 +86,7 @@ def select_migrants(island: Island, settings: Settings) -> Population:
     return SELECTION_POLICIES[settings.emigrants](island.elite, count, rng)
 
 
-def receive_migrants(
-    island: Island, arriving: Sequence[Population], evaluator: Evaluator, settings: Settings
-) -> Island:
+def receive_migrants(island: Island, arriving: Sequence[AnyPopulation], evolution: Evolution) -> Island:
     """Return the island after immigration.
 
     Immigrants replace individuals chosen by the replacement policy and compete for the elite. The population
@@ -103,21 +98,14 @@ def receive_migrants(
     if not immigrants:
         return island
     rng = Stream(island.seed, island.index, island.generation, Purpose.IMMIGRATION)
-    places = REPLACEMENT_POLICIES[settings.replaced](
-        len(island.population), lambda: _fitness(island.population, evaluator), len(immigrants), rng
+    places = REPLACEMENT_POLICIES[evolution.problem.settings_of(island.index).replaced](
+        len(island.population),
+        lambda: evolution.complete_fitness(island.population),
+        len(immigrants),
+        rng,
     )
     population = list(island.population)
     for place, each in zip(places, immigrants, strict=True):
         population[place] = each
-    elite = select_elite((*island.elite, *immigrants), settings.elites, settings.distinct, settings.niches)
+    elite = evolution.select_elite((*island.elite, *immigrants), island.index)
     return replace(island, population=tuple(population), elite=elite)
-
-
-def _fitness(population: Sequence[Individual], evaluator: Evaluator) -> list[float]:
-    """Return the fitness of each individual; abandoned individuals are evaluated completely."""
-    fitness = [each.fitness for each in population]
-    places = [place for place, each in enumerate(population) if each.outcome.verdict is Status.ABANDONED]
-    evaluated = evaluator.evaluate_abandoned([population[place] for place in places])
-    for place, each in zip(places, evaluated, strict=True):
-        fitness[place] = each.fitness
-    return fitness

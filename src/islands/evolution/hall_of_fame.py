@@ -8,20 +8,20 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf, isfinite
+from typing import TypeVar
 
-from islands.evolution.individual import Individual
+from islands.evolution.individual import AnyIndividual, AnyPopulation, Individual
 
-#: Models kept for every size; validation selects among them.
-DEPTH = 8
+_Kind = TypeVar("_Kind", bound=AnyIndividual)
 
 
 @dataclass(frozen=True, slots=True)
 class HallOfFame:
     """Individuals ordered by size, then by fitness; each structure occurs once."""
 
-    entries: tuple[Individual, ...] = ()
+    entries: AnyPopulation = ()
 
-    def ranked(self) -> Iterator[tuple[int, Individual]]:
+    def ranked(self) -> Iterator[tuple[int, AnyIndividual]]:
         """Yield each individual with its rank among those of its size, starting at 1."""
         ranks: Counter[int] = Counter()
         for entry in self.entries:
@@ -33,20 +33,20 @@ class HallOfFame:
 
         Individuals with a higher fitness of that size cannot enter.
         """
-        return {entry.size: entry.fitness for rank, entry in self.ranked() if rank == DEPTH}
+        return {entry.size: entry.fitness for rank, entry in self.ranked() if rank == entry.kept}
 
-    def best(self) -> dict[int, Individual]:
+    def best(self) -> dict[int, AnyIndividual]:
         """Return the best individual of every size."""
-        best: dict[int, Individual] = {}
+        best: dict[int, AnyIndividual] = {}
         for entry in self.entries:
             best.setdefault(entry.size, entry)
         return best
 
 
-def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfFame:
+def with_entries(hall: HallOfFame, individuals: Iterable[AnyIndividual]) -> HallOfFame:
     """Return the hall with individuals added; individuals without a finite fitness are ignored."""
     thresholds = hall.entry_thresholds()
-    found: dict[tuple[str, ...], Individual] = {}
+    found: dict[tuple[str, ...], AnyIndividual] = {}
     for entry in chain(hall.entries, individuals):
         if not isfinite(entry.fitness) or entry.fitness > thresholds.get(entry.size, inf):
             continue
@@ -56,18 +56,20 @@ def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfF
     ordered = HallOfFame(tuple(sorted(found.values(), key=_order)))
     # Store genes in canonical form, so that the result does not depend on which notation came first.
     return HallOfFame(
-        tuple(_with_canonical_genes(entry) for rank, entry in ordered.ranked() if rank <= DEPTH)
+        tuple(_with_canonical_genes(entry) for rank, entry in ordered.ranked() if rank <= entry.kept)
     )
 
 
-def _with_canonical_genes(entry: Individual) -> Individual:
+def _with_canonical_genes(entry: AnyIndividual) -> AnyIndividual:
+    if not isinstance(entry, Individual):
+        return entry
     genes = tuple([item.expression for item in entry.regressors])
     return entry if entry.genes == genes else replace(entry, genes=genes)
 
 
-def pareto_front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
+def pareto_front(individuals: Iterable[_Kind]) -> tuple[_Kind, ...]:
     """Return the Pareto front of error and size, smallest first."""
-    found: list[Individual] = []
+    found: list[_Kind] = []
     for each in sorted(individuals, key=lambda each: (each.size, each.fitness)):
         if not found or each.fitness < found[-1].fitness:
             found.append(each)
@@ -79,5 +81,5 @@ def merge(halls: Iterable[HallOfFame]) -> HallOfFame:
     return with_entries(HallOfFame(), (entry for hall in halls for entry in hall.entries))
 
 
-def _order(entry: Individual) -> tuple[int, float, tuple[str, ...], tuple[float, ...]]:
+def _order(entry: AnyIndividual) -> tuple[int, float, tuple[str, ...], tuple[float, ...]]:
     return entry.size, entry.fitness, entry.key, entry.theta

@@ -5,8 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf, isnan
+from typing import ClassVar, TypeAlias, TypeVar
 
 from islands.errors import ModelError
+from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.expressions.tree import Expression
 from islands.models.regressor import CanonicalForms, Regressor, regressor
 from islands.simulation.outcome import OK, EvaluationOutcome
@@ -29,6 +31,9 @@ class Individual:
         NaN compares as false and would win if it came first.
     outcome : EvaluationOutcome
     """
+
+    #: Individuals of every size in a hall of fame; validation selects among them.
+    kept: ClassVar[int] = 8
 
     genes: tuple[Expression, ...]
     regressors: tuple[Regressor, ...] = ()
@@ -62,21 +67,27 @@ class Individual:
         return tuple(sorted(_erase_lags(item.text) for item in self.regressors))
 
 
-Population = tuple[Individual, ...]
+Population: TypeAlias = tuple[Individual, ...]
+
+#: Individual of any class of models.
+AnyIndividual: TypeAlias = Individual | FittedStateSpace
+AnyPopulation: TypeAlias = tuple[AnyIndividual, ...]
+
+_Kind = TypeVar("_Kind", bound=AnyIndividual)
 
 
-def unique_structures(individuals: Iterable[Individual]) -> Population:
+def unique_structures(individuals: Iterable[_Kind]) -> tuple[_Kind, ...]:
     """Return the first individual of every structure."""
     return _keep_first((each.key, each) for each in individuals)
 
 
-def unique_niches(individuals: Iterable[Individual]) -> Population:
+def unique_niches(individuals: Iterable[_Kind]) -> tuple[_Kind, ...]:
     """Return the first individual of every niche."""
     return _keep_first((each.niche, each) for each in individuals)
 
 
-def _keep_first(labelled: Iterable[tuple[tuple[str, ...], Individual]]) -> Population:
-    first: dict[tuple[str, ...], Individual] = {}
+def _keep_first(labelled: Iterable[tuple[tuple[str, ...], _Kind]]) -> tuple[_Kind, ...]:
+    first: dict[tuple[str, ...], _Kind] = {}
     for label, each in labelled:
         first.setdefault(label, each)
     return tuple(first.values())
@@ -85,6 +96,21 @@ def _keep_first(labelled: Iterable[tuple[tuple[str, ...], Individual]]) -> Popul
 @lru_cache(1 << 14)
 def _erase_lags(text: str) -> str:
     return re.sub(r"\(k-\d+\)", "(k)", text)
+
+
+def require_genes(individual: AnyIndividual) -> Individual:
+    """Return an individual that is a vector of genes.
+
+    Raises
+    ------
+    ModelError
+        It is a state space.
+    """
+    if not isinstance(individual, Individual):
+        raise ModelError(
+            "the individual is a state space and has no genes: pass one of a search for NARX models"
+        )
+    return individual
 
 
 def make_regressor(gene: Expression, known: CanonicalForms | None = None) -> Regressor | None:

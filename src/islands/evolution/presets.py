@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.errors import SettingsError, lookup, suggest
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
-from islands.evolution.settings import Settings
+from islands.evolution.settings import LATENT, Settings
 
 #: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5. What the paper leaves open is as
 #: in the authors' toolbox: tournaments of two, a distinct elite, parents in place of children that are too
@@ -82,6 +82,20 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
             library="polynomial",
             library_degree=3,
         ),
+        LATENT: Settings(
+            model=LATENT,
+            structure="auto",
+            constraints="none",
+            population=24,
+            generations=12,
+            elite=1.0,
+            crossover=0.25,
+            islands=2,
+            topology="ring",
+            migrate_every=3,
+            migrants=2,
+            emigrants="front",
+        ),
     }
 )
 
@@ -95,9 +109,26 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
         "paper-appendix-s2": "Appendix A of the paper, system S2: as for S1, with larger models",
         "hysteresis": "Systems with hysteresis: seeded by constrained forward selection, refined",
         "narx": "Smooth systems: seeded by forward selection, without constraints, refined",
+        LATENT: "States that are not measured: linear state spaces with static curves in their feedback",
     }
 )
 
+
+#: Settings of latent models. A change of any other one has no effect on them.
+LATENT_SETTINGS = frozenset(
+    {
+        *("model", "structure", "population", "generations", "elite", "crossover", "tournament", "islands"),
+        *(
+            "topology",
+            "migrate_every",
+            "migrants",
+            "emigrants",
+            "replaced",
+            "max_evaluations",
+            "target_error",
+        ),
+    }
+)
 
 #: Preset that is chosen among `KINDS` by trials on the record. It is the default of all commands.
 AUTO = "auto"
@@ -207,6 +238,11 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     base = lookup({AUTO: _PAPER, **PRESETS}, preset, "preset")
     for name in changes:
         lookup(_SETTING_NAMES, name, "setting")
+        if base.model == LATENT and name not in LATENT_SETTINGS:
+            raise SettingsError(
+                f"{name} is a setting of NARX models, not of the preset {preset}: leave it out, or take "
+                "another preset"
+            )
     if "max_terms" in changes and "initial_terms" not in changes:
         fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
         changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}
@@ -224,6 +260,8 @@ def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Setting
         As for `resolve_settings`, or a setting is for one output.
     """
     name = COUPLED_PRESET if preset == AUTO else preset
+    if lookup({AUTO: _PAPER, **PRESETS}, name, "preset").model == LATENT:
+        raise SettingsError(f"the preset {name} is for one output: name one output, or take another preset")
     settings = resolve_settings(name, {"feedthrough": "no", **changes})
     check_coupled_settings(settings.constraints, settings.feedthrough)
     if settings.select != "validation":

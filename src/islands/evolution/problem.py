@@ -1,8 +1,9 @@
-"""Search problem: the record, the settings, the seeds and the gene pool."""
+"""Search problem of genes: record, settings, seeds and gene pool; the steps of its islands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from typing import cast
 
 from islands.available_cpus import count_cpus
 from islands.data.dataset import Dataset
@@ -12,14 +13,19 @@ from islands.estimation.structure_selection.deviations import Offsets
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import with_phi
+from islands.evolution.generation import first_generation, select_elite, step
+from islands.evolution.individual import AnyIndividual, Individual, Population, require_genes
+from islands.evolution.island import Island, StepInfo
 from islands.evolution.island_profiles import ISLAND_PROFILES
+from islands.evolution.protocol import Caches
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.evolution.variation import Genes
 from islands.expressions.tree import Expression, height
+from islands.models.narx import Model
 from islands.models.regressor import Regressor
 from islands.progress import Steps
-from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.outcome import EvaluationOutcome, Status
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +58,62 @@ class Problem:
         if not profiles:
             return self.settings
         return replace(self.settings, **ISLAND_PROFILES[profiles[island % len(profiles)]])
+
+    def make_model(self, individual: AnyIndividual) -> Model:
+        """Return the model of an individual for the signals minus the offsets; see `SearchProblem`."""
+        genes, record = require_genes(individual), self.record
+        return Model(
+            genes.regressors, genes.theta, input_names=record.input_names, output_name=record.output_name
+        )
+
+    def open(self, threads: int = 1) -> "GeneEvolution":
+        """Return the steps of the islands in this process; see `SearchProblem`."""
+        return GeneEvolution(self, Evaluator(self.record, self.settings, threads=threads))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GeneEvolution:
+    """Steps of the islands of a problem of genes in one process.
+
+    Attributes
+    ----------
+    problem : Problem
+    evaluator : Evaluator
+        Of the record of the problem.
+    """
+
+    problem: Problem
+    evaluator: Evaluator
+
+    @property
+    def memory(self) -> Caches:
+        """Memory of the caches."""
+        return self.evaluator.memory
+
+    def first_generation(self, index: int, seed: int) -> tuple[Island, StepInfo]:
+        """Draw and evaluate the first population of an island."""
+        settings = self.problem.settings_of(index)
+        return first_generation(index, seed, self.evaluator, self.problem.seeds, settings)
+
+    def step(self, island: Island) -> tuple[Island, StepInfo]:
+        """Breed and evaluate one generation."""
+        return step(island, self.evaluator, self.problem.pool, self.problem.settings_of(island.index))
+
+    def complete_fitness(self, population: Sequence[AnyIndividual]) -> list[float]:
+        """Return the fitness of each individual; abandoned individuals are evaluated completely."""
+        genes = cast("Sequence[Individual]", population)
+        fitness = [each.fitness for each in genes]
+        places = [place for place, each in enumerate(genes) if each.outcome.verdict is Status.ABANDONED]
+        evaluated = self.evaluator.evaluate_abandoned([genes[place] for place in places])
+        for place, each in zip(places, evaluated, strict=True):
+            fitness[place] = each.fitness
+        return fitness
+
+    def select_elite(self, contenders: Sequence[AnyIndividual], island: int) -> Population:
+        """Return the elite of an island among contenders, fittest first."""
+        settings = self.problem.settings_of(island)
+        genes = cast("Sequence[Individual]", contenders)
+        return select_elite(genes, settings.elites, settings.distinct, settings.niches)
 
 
 def make_problem(record: Dataset, settings: Settings, steps: Steps | None = None) -> Problem:

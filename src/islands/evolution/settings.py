@@ -33,6 +33,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.expressions.user_primitive import primitive_table
 from islands.models.candidate_library import get_library
+from islands.models.latent import ZERO_BLOCKS, LatentModel
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000
@@ -49,6 +50,10 @@ SELECTIONS: Mapping[str, str] = MappingProxyType(
         "fitness": "the error of the search on the estimation data",
     }
 )
+
+#: Class of the models of a search, by name, with its structures.
+NARX, LATENT = "narx", LatentModel.kind
+_STRUCTURES: Mapping[str, Mapping[str, Any]] = MappingProxyType({NARX: STRUCTURES, LATENT: ZERO_BLOCKS})
 
 T = TypeVar("T")
 
@@ -84,6 +89,9 @@ class Settings:
 
     Attributes
     ----------
+    model : str
+        Class of the models: ``narx`` or ``latent``. Latent models have the settings of the populations, of
+        the islands and of the end of a search, and `structure`; all others are those of NARX models.
     population, generations : int
         Offspring of each generation; number of generations.
     elite : float
@@ -110,7 +118,8 @@ class Settings:
     primitives : tuple of str or Primitive
         Functions that genes may contain: names of built-in ones, and your own (`islands.primitive`).
     structure : str
-        An entry of ``STRUCTURES``: constraint on the form of genes.
+        An entry of ``STRUCTURES``: constraint on the form of genes. Of latent models an entry of
+        ``ZERO_BLOCKS``: the blocks of parameters that are zero.
     constraints : str
         Constraints on the parameters: ``hysteresis``, ``none``, or statements with semicolons between them,
         such as ``odd; fixed-point = 0, 0; gain = 2.5; [u(k-1)] >= 0``.
@@ -186,6 +195,7 @@ class Settings:
         output; 0 for no target.
     """
 
+    model: str = NARX
     population: int = _option(500, "Individuals of an island.")
     generations: int = _option(500, "Generations of a search, at most.")
     elite: float = _option(0.1, "Fraction of the population that is kept as elite.")
@@ -289,7 +299,8 @@ class Settings:
         check_delays(self.library_delays)
         check_average(self.average)
         check_feedthrough(self.feedthrough)
-        lookup(STRUCTURES, self.structure, "structure")
+        structures = lookup(_STRUCTURES, self.model, "class of models")
+        lookup(structures, self.structure, "structure")
         check_texts(constraints=self.constraints)
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")

@@ -1,16 +1,14 @@
 """Fit of a class of models by the error of the free run, from the starting models of the class."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import isfinite
 
-from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_all_inputs
 from islands.data.split import Split
 from islands.errors import SettingsError, lookup
 from islands.estimation.estimator_table import refinement_criterion
-from islands.estimation.latent_search import search_latent_models
 from islands.estimation.refinement import refine
+from islands.evolution.presets import resolve_settings
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
@@ -18,6 +16,8 @@ from islands.evolution.search_result import (
     with_bands,
     with_linear_comparison,
 )
+from islands.evolution.settings import LATENT
+from islands.facade.latent_identification import identify_latent
 from islands.facade.results.model_simulation import SHOOTING
 from islands.io.models import MODEL_CLASSES, NARX
 from islands.models.latent import LatentModel
@@ -42,7 +42,7 @@ def fit_class(
     """Fit the models of a class.
 
     Every starting model of the class is refined on the free run of the estimation data. The model with the
-    least error is kept. Latent models are searched instead (see `search_latent_models`).
+    least error is kept. Latent models are evolved instead (see `identify_latent`).
 
     Parameters
     ----------
@@ -67,13 +67,10 @@ def fit_class(
     entry = MODEL_CLASSES[kind]
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
     if issubclass(entry, LatentModel):
-        latent = search_latent_models(split.estimation, seed, steps, structure)
-        if any(each.reads_at_once for each in latent):
-            split = Split(advance_all_inputs(split.estimation), advance_all_inputs(split.validation))
-        models: Sequence[DynamicModel] = latent
-    else:
-        found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
-        models = [model for _, model in found[:1]]
+        searched = resolve_settings(LATENT, {"structure": structure})
+        return identify_latent(record, split, searched, seed, steps, {"method": "fit"})
+    found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
+    models = [model for _, model in found[:1]]
     if not models:
         raise SettingsError(
             f"no model {kind} was found: the record is too short, a column is constant, or the free run of "
@@ -82,12 +79,10 @@ def fit_class(
     steps.report("assessment of the models", 0.9)
     assessed = [assess(model, split, interval, criterion=_CRITERION) for model in models]
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
-    if structure != AUTO:
-        settings["structure"] = structure
     counts = {"ok": len(models)}
     search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
     result = SearchResult(record, split, seed, settings, search, rank_models(assessed))
-    validated = [
+    validated: list[ValidatedModel[DynamicModel]] = [
         ValidatedModel(model, _CRITERION, free_run(model, split.validation).mean_squared_error)
         for model in models
     ]

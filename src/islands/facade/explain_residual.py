@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from islands.evolution.search_state import SearchState
     from islands.evolution.settings import Settings
     from islands.facade.engine_choice import Ray
-    from islands.facade.identify import SearchCallback
+    from islands.facade.evolution_run import SearchCallback
 
 #: Name of this step of a diagnosis.
 FORMULA = "a formula for the unexplained residual"

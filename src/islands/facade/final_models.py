@@ -22,7 +22,7 @@ from islands.estimation.structure_selection.deviations import Offsets, estimate_
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.individual import Individual, unique_structures
+from islands.evolution.individual import Individual, require_genes, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import Settings
@@ -209,7 +209,7 @@ def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Can
 
 
 def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[Individual, ...]:
-    structures = [*(entry.genes for entry in hall_of_fame.entries), *problem.seeds]
+    structures = [*(require_genes(entry).genes for entry in hall_of_fame.entries), *problem.seeds]
     evaluated, _ = Evaluator(problem.record, problem.settings).evaluate(
         [(Individual(genes), False) for genes in structures]
     )

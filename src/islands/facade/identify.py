@@ -1,7 +1,6 @@
 """Identification by evolution (MGGP/FROE), refinement and validation."""
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -20,9 +19,9 @@ from islands.estimation.structure_selection.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine
 from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import require_genes
 from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with_tuples
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.search_result import (
@@ -32,15 +31,17 @@ from islands.evolution.search_result import (
     with_bands,
     with_linear_comparison,
 )
-from islands.evolution.search_state import SearchState, advance, stop_reason
-from islands.evolution.settings import Settings
+from islands.evolution.search_state import SearchState, stop_reason
+from islands.evolution.settings import LATENT, Settings
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.expressions.user_primitive import get_source
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.engine_choice import Ray, open_engine
+from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.final_models import estimate_candidates, select_final_models
+from islands.facade.latent_identification import identify_latent
 from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.feedthrough_selection import select_feedthrough
@@ -70,9 +71,6 @@ FEASIBLE_OUTCOMES = ("ok", "abandoned")
 
 #: Smallest number of predictions on the validation data that the residual tests need.
 _MIN_RESIDUALS = 3
-
-#: Receives the state of a search after every epoch, and its settings.
-SearchCallback = Callable[[SearchState, Settings], None]
 
 
 def identify(
@@ -208,6 +206,17 @@ def identify_record(
         settings = resolve_kind(preset.kind, preset.delays, with_tuples(changes))
     else:
         settings = resolve_settings(preset, with_tuples(changes))
+    held_out = record_document(validation) if isinstance(validation, Dataset) else validation
+    if settings.model == LATENT:
+        described = {"method": "identify", "preset": preset, "validation": held_out}
+        return Result.from_search(
+            identify_latent(
+                *(record, parts, settings, seed, steps, described),
+                start=start,
+                engine=engine,
+                on_epoch=on_epoch or ignore_epoch,
+            )
+        )
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
     steps("sampling rate and direct feedthrough", 0.0)
@@ -224,15 +233,9 @@ def identify_record(
     search_problem = replace(
         make_problem(subtract_offsets(split.estimation, offsets), scaled, steps), offsets=offsets
     )
-    state = start or SearchState(empty_archipelago(settings.islands, seed))
-    if [(island.index, island.seed) for island in state.archipelago.islands] != [
-        (index, seed) for index in range(settings.islands)
-    ]:
-        raise SettingsError(
-            "the start state has other islands or another seed: pass the settings and the seed of its run"
-        )
+    state = begin_search(start, settings.islands, seed)
     with open_engine(engine, progress) as opened:
-        state = _evolve(search_problem, state, settings, opened, steps, on_epoch or _ignore_epoch)
+        state = evolve(search_problem, state, settings, opened, steps, on_epoch or ignore_epoch)
     if state.archipelago.generation < 0 and not search_problem.seeds:
         raise StoppedError("first populations")
     hall_of_fame = state.archipelago.hall_of_fame
@@ -247,37 +250,12 @@ def identify_record(
     described = {"method": "identify", "preset": preset, **_describe(settings)}
     if isinstance(preset, Choice):
         described.update(preset=AUTO, choice=preset.to_document())
-    described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
+    described["validation"] = held_out
     statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
     found = with_linear_comparison(found, scaled.library_delays, scaled.shooting, steps)
     banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
     return Result.from_search(with_average(banded, count))
-
-
-def _evolve(
-    problem: Problem,
-    state: SearchState,
-    settings: Settings,
-    engine: Engine,
-    steps: Steps,
-    on_epoch: SearchCallback,
-) -> SearchState:
-    """Run the epochs, which are an optional step; return the state after the last one."""
-    with closing(engine.run(problem, state.archipelago, steps.stop)) as epochs:
-        # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
-        while not (steps.stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
-            state = advance(state, epoch)
-            on_epoch(state, settings)
-    if not stop_reason(state, settings):
-        # Also an engine may end the epochs, without a stop of the steps after them.
-        done = max(0, state.archipelago.generation)
-        steps.leave_out(f"search from generation {done} to {settings.generations}")
-    return state
-
-
-def _ignore_epoch(_state: SearchState, _settings: Settings) -> None:
-    """Ignore the state after an epoch."""
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:
@@ -332,6 +310,6 @@ def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Prob
 
 def _maximum_lag_and_degree(hall_of_fame: HallOfFame) -> tuple[int, int]:
     """Return the largest lag and the largest degree of a regressor in the hall of fame."""
-    regressors = [item for entry in hall_of_fame.entries for item in entry.regressors]
+    regressors = [item for entry in hall_of_fame.entries for item in require_genes(entry).regressors]
     maximum_lag = max((item.maximum_lag for item in regressors), default=1)
     return max(1, maximum_lag), max((item.degree for item in regressors), default=1)

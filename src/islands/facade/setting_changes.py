@@ -9,6 +9,7 @@ from islands.expressions.tree import Primitive
 class SettingChanges(TypedDict, total=False):
     """Settings that differ from those of a preset. `Settings` describes each of them."""
 
+    model: str
     population: int
     generations: int
     elite: float

@@ -129,6 +129,30 @@ def simulate_state_space(
     return u.shape[0]
 
 
+@kernel
+def simulate_states(
+    theta,
+    codes,  # int64 [unit]
+    u,  # float64 [row, input]
+    x,  # float64 [state]: states at the first row
+    states,  # out, float64 [row, state]
+):
+    """Simulate the states at the rows; return the number of rows before a divergence."""
+    n, inputs, units = x.size, u.shape[1], codes.size
+    _, _, _, _, _, at_w, at_bias, _, _ = _place(n, inputs, units)
+    signals, after = np.empty(n + inputs), np.empty(n)
+    h, slope = np.empty(units), np.empty(units)
+    signals[:n] = x
+    for k in range(u.shape[0]):
+        signals[n:] = u[k]
+        states[k] = signals[:n]
+        _evaluate_units(theta, at_w, at_bias, codes, signals, h, slope)
+        if not _advance(theta, n, signals, h, after):
+            return k
+        signals[:n] = after
+    return u.shape[0]
+
+
 @kernel(forceinline=True)
 def _add(slopes, at, place, value):
     """Add a value to the derivative with respect to a parameter, if it is free."""

@@ -12,9 +12,9 @@ from cmath import log
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi
+from math import pi, prod
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,8 @@ ZERO_BLOCKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 #: Text of units in equations for readers, if it is another one.
 _NAMED_POWERS: Mapping[str, str] = MappingProxyType({"square": "square({0})", "cube": "cube({0})"})
+
+_Entry = TypeVar("_Entry", bound=np.generic)
 
 #: Writes the product of a parameter, given by name, and the text of a factor; the parameter for no factor.
 Factor = Callable[[str, str], str]
@@ -103,12 +105,26 @@ class StateSpaceLayout:
         """Names of all parameters."""
         return tuple(name for names in self.blocks.values() for name in names)
 
-    def find_slices(self) -> dict[str, slice]:
-        """Return the positions of the entries of each matrix."""
+    def split(self, values: NDArray[_Entry]) -> dict[str, NDArray[_Entry]]:
+        """Return views of the entries of each matrix in its shape, of a value for each parameter."""
+        order, inputs, units = self.order, self.inputs, self.units
+        shapes: dict[str, tuple[int, ...]] = {
+            "A": (order, order),
+            "B": (order, inputs),
+            "C": (order,),
+            "D": (inputs,),
+            "E": (order, units),
+            "F": (units,),
+            "W": (units, order + inputs),
+            "s": (units,),
+            "o": (order,),
+            "level": (1,),
+        }
         found, at = {}, 0
-        for name, names in self.blocks.items():
-            found[name] = slice(at, at + len(names))
-            at += len(names)
+        for name, shape in shapes.items():
+            size = prod(shape)
+            found[name] = values[at : at + size].reshape(shape)
+            at += size
         return found
 
 
@@ -202,15 +218,12 @@ class LatentModel(ParametricModel):
         # A command that does not simulate loads no kernels.
         from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415
 
-        theta, slices, n = self.theta, self.layout.find_slices(), self.order
-        a, b = theta[slices["A"]].reshape(n, n), theta[slices["B"]].reshape(n, self.inputs)
-        e = theta[slices["E"]].reshape(n, len(self.units))
-        w = theta[slices["W"]].reshape(len(self.units), n + self.inputs)
-        u = np.array(self.operating_inputs)
-        arguments = w @ np.concatenate([x, u]) + theta[slices["s"]]
+        blocks, u = self.layout.split(self.theta), np.array(self.operating_inputs)
+        a, e, w = blocks["A"], blocks["E"], blocks["W"]
+        arguments = w @ np.concatenate([x, u]) + blocks["s"]
         pairs = [evaluate_unit(code, s) for code, s in zip(self.codes, arguments, strict=True)]
         values, slopes = np.array(pairs).reshape(-1, 2).T
-        return a @ x + b @ u + e @ values + theta[slices["o"]], a + (e * slopes) @ w[:, :n]
+        return a @ x + blocks["B"] @ u + e @ values + blocks["o"], a + (e * slopes) @ w[:, : self.order]
 
     @property
     def reads_at_once(self) -> bool:

@@ -20,7 +20,7 @@ from scipy import stats
 from islands.data.dataset import Dataset
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.individual import Individual
+from islands.evolution.individual import Individual, require_genes
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import make_problem
 from islands.figures.monte_carlo import MonteCarloGroup, ScanLine, draw_groups, draw_scan
@@ -213,7 +213,8 @@ def _measure(run: Simulation, record: Dataset) -> float | None:
 
 def _fittest(archipelago: Archipelago) -> Individual:
     """Return the individual of least training error; ties are broken by size, then by text."""
-    return min(archipelago.hall_of_fame.entries, key=lambda entry: (entry.fitness, entry.size, entry.key))
+    entries = map(require_genes, archipelago.hall_of_fame.entries)
+    return min(entries, key=lambda entry: (entry.fitness, entry.size, entry.key))
 
 
 def plan(options: ReproductionOptions) -> list[Task]:

@@ -5,8 +5,9 @@ from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual
-from islands.evolution.island import Island, first_generation, step
+from islands.evolution.generation import first_generation, step
+from islands.evolution.individual import Individual, require_genes
+from islands.evolution.island import Island
 from islands.evolution.presets import resolve_settings, with_tuples
 from islands.expressions.parsing import parse
 from islands.models.equations import plain_text
@@ -102,7 +103,7 @@ def search_island(
         report(generation / settings.generations)
         if generation % stride == 0 or generation == settings.generations:
             trace.append(_trace(island, evaluator))
-    models = [_make_model(entry, record) for entry in island.hall_of_fame.entries]
+    models = [_make_model(require_genes(entry), record) for entry in island.hall_of_fame.entries]
     selecting = list(validation)[-1]
     ranked = []
     for model in models:
@@ -143,7 +144,9 @@ def _trace(island: Island, evaluator: Evaluator) -> Document:
     return {
         "generation": island.generation,
         "models": len(entries),
-        "converging": sum(has_equilibria(_make_model(entry, evaluator.record)) for entry in entries),
+        "converging": sum(
+            has_equilibria(_make_model(require_genes(entry), evaluator.record)) for entry in entries
+        ),
         "rmse": min((entry.fitness for entry in entries), default=0.0) ** 0.5,
     }
 

@@ -4,8 +4,9 @@ import inspect
 from collections import defaultdict
 
 import islands
+from islands.facade.evolution_run import SearchCallback
 from islands.facade.fit import fit
-from islands.facade.identify import SearchCallback, identify
+from islands.facade.identify import identify
 from islands.progress import ProgressCallback
 from support.repository import ROOT
 

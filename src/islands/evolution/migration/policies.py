@@ -9,28 +9,28 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from islands.evolution.hall_of_fame import pareto_front
-from islands.evolution.individual import Population, unique_structures
+from islands.evolution.individual import AnyPopulation, unique_structures
 from islands.evolution.rng import Stream
 
 T = TypeVar("T")
 
 
-def _best(elite: Population, count: int, _rng: Stream) -> Population:
+def _best(elite: AnyPopulation, count: int, _rng: Stream) -> AnyPopulation:
     """Select the best of the elite, each structure once."""
     return _unique_structures(elite)[:count]
 
 
-def _random(elite: Population, count: int, rng: Stream) -> Population:
+def _random(elite: AnyPopulation, count: int, rng: Stream) -> AnyPopulation:
     """Select from the elite at random, each structure once."""
     return _sample(_unique_structures(elite), count, rng)
 
 
-def _front(elite: Population, count: int, rng: Stream) -> Population:
+def _front(elite: AnyPopulation, count: int, rng: Stream) -> AnyPopulation:
     """Select at random from the Pareto front of error and size, so that small models migrate, too."""
     return _sample(pareto_front(_unique_structures(elite)), count, rng)
 
 
-def _unique_structures(elite: Population) -> Population:
+def _unique_structures(elite: AnyPopulation) -> AnyPopulation:
     return unique_structures(each for each in elite if isfinite(each.fitness))
 
 
@@ -53,7 +53,7 @@ def _sample(pool: Sequence[T], count: int, rng: Stream) -> tuple[T, ...]:
 
 
 #: Selects emigrants from: the elite, the maximum number, the random stream.
-SELECTION_POLICIES: Mapping[str, Callable[[Population, int, Stream], Population]] = MappingProxyType(
+SELECTION_POLICIES: Mapping[str, Callable[[AnyPopulation, int, Stream], AnyPopulation]] = MappingProxyType(
     {"best": _best, "random": _random, "front": _front}
 )
 

@@ -26,8 +26,9 @@ from islands.facade.coupled.bands import make_bands
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
+from islands.facade.evolution_run import SearchCallback
 from islands.facade.fit import fit_record
-from islands.facade.identify import SearchCallback, identify_record
+from islands.facade.identify import identify_record
 from islands.facade.library_fit import FitChanges
 from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges

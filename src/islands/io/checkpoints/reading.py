@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from islands.errors import ModelError
+from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.individual import Individual
+from islands.evolution.individual import AnyIndividual, Individual
 from islands.evolution.island import Island
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
@@ -127,7 +128,9 @@ class _IslandReader:
             inf if document["bar"] is None else float(document["bar"]),
         )
 
-    def _read_individual(self, document: Mapping[str, Any]) -> Individual:
+    def _read_individual(self, document: Mapping[str, Any]) -> AnyIndividual:
+        if "genes" not in document:
+            return _read_state_space(document)
         verdict, reason = document["outcome"]
         return Individual(
             tuple(map(self._parse, document["genes"])),
@@ -136,3 +139,16 @@ class _IslandReader:
             inf if document["fitness"] is None else float(document["fitness"]),
             EvaluationOutcome(Status[verdict], str(reason)),
         )
+
+
+def _read_state_space(document: Mapping[str, Any]) -> FittedStateSpace:
+    return FittedStateSpace(
+        int(document["order"]),
+        int(document["inputs"]),
+        tuple(map(str, document["units"])),
+        tuple(map(float, document["theta"])),
+        tuple(each == "1" for each in document["free"]),
+        tuple(tuple(map(float, each)) for each in document["states"]),
+        float(document["fitness"]),
+        float(document["mean_square"]),
+    )

@@ -7,14 +7,16 @@ import gzip
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict
 from functools import partial
 from math import inf
 from pathlib import Path
 from typing import Any
 
+from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.individual import Individual
+from islands.evolution.individual import AnyIndividual
 from islands.evolution.island import Island
 from islands.expressions.printing import plain
 
@@ -92,7 +94,9 @@ def _island(island: Island) -> dict[str, Any]:
     }
 
 
-def _individual(individual: Individual, texts: dict[int, str]) -> dict[str, Any]:
+def _individual(individual: AnyIndividual, texts: dict[int, str]) -> dict[str, Any]:
+    if isinstance(individual, FittedStateSpace):
+        return {**asdict(individual), "free": "".join("01"[each] for each in individual.free)}
     # Individuals share most of their genes. Texts are kept by id, since 0 and -0 are equal.
     for gene in individual.genes:
         if id(gene) not in texts:

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from islands.estimation.latent_search import search_latent_models, search_linear_models
 
 from islands.data.dataset import Dataset
-from islands.estimation.latent_search import search_latent_models, search_linear_models
 from islands.progress import Steps, StoppedError, ignore_progress, never_stop
 from islands.simulation.predictors import free_run
 from support.latent_systems import smooth_input, spring_record

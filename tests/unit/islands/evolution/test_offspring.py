@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from islands.evolution.evaluation import Evaluator, Limits
-from islands.evolution.island import first_generation, step
+from islands.evolution.generation import first_generation, step
 from islands.evolution.offspring import Offspring
 from support.searches import SMALL, islands_of, record
 

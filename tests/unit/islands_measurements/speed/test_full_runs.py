@@ -7,7 +7,7 @@ import pytest
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.island import first_generation, step
+from islands.evolution.generation import first_generation, step
 from islands.evolution.problem import Problem
 from islands_measurements.speed.full_runs import Run, run_in_processes, run_island
 from islands_measurements.speed.workload import ISLAND, benchmark_record

@@ -1,0 +1,155 @@
+"""State space with units and estimated parameters, the individual of a search for latent models."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.estimation.latent_data import LatentData, measure_held_out
+from islands.estimation.state_space_fit import StateSpaceFit
+from islands.models.latent import StateSpaceLayout, find_codes, read_at_once
+from islands.simulation.initial_states import Segment
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
+
+
+@dataclass(frozen=True, slots=True)
+class FittedStateSpace:
+    """State space with units, with parameters for signals of the standard deviation 1.
+
+    Attributes
+    ----------
+    order, inputs : int
+        Numbers of states and inputs.
+    units : tuple of str
+        Function of each unit, an entry of ``UNITS``.
+    theta : tuple of float
+        All parameters in the order of `StateSpaceLayout`.
+    free : tuple of bool
+        Which of them are estimated; the others are zero.
+    states : tuple of tuple of float
+        States at the first row of each block.
+    fitness : float
+        Mean squared error of the held-out rows, in the squared unit of the output.
+    mean_square : float
+        Mean squared error of the rows of the estimation, of the scaled output.
+    """
+
+    #: Systems of every size in a hall of fame. There are many sizes.
+    kept: ClassVar[int] = 1
+
+    order: int
+    inputs: int
+    units: tuple[str, ...]
+    theta: tuple[float, ...]
+    free: tuple[bool, ...]
+    states: tuple[tuple[float, ...], ...]
+    fitness: float
+    mean_square: float
+
+    @property
+    def layout(self) -> StateSpaceLayout:
+        """Sizes and names of all parameters."""
+        return StateSpaceLayout(self.order, self.inputs, len(self.units))
+
+    @property
+    def outcome(self) -> EvaluationOutcome:
+        """Outcome of the estimation, which has succeeded."""
+        return OK
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return sum(self.free)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Structure as text; equal keys mean equal structures."""
+        return f"order {self.order}", *self.units, "".join("01"[each] for each in self.free)
+
+    @property
+    def niche(self) -> tuple[str, ...]:
+        """Order and units: systems of one niche differ in their zeros and in the order of their units."""
+        return f"order {self.order}", *sorted(self.units)
+
+    @property
+    def reads_at_once(self) -> bool:
+        """Whether the output reads an input at the same row."""
+        named = zip(self.layout.names, self.theta, strict=True)
+        return read_at_once([name for name, value in named if value != 0.0])
+
+    def draft(self) -> "Draft":
+        """Return a draft with this structure and these parameters."""
+        return Draft(
+            self.layout, self.units, np.array(self.theta), np.array(self.free), np.array(self.states)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """State space with units before its parameters are estimated.
+
+    Attributes
+    ----------
+    layout : StateSpaceLayout
+    units : tuple of str
+    theta : ndarray, shape (parameters,)
+        Starting values; parameters that are not free are zero.
+    free : ndarray of bool, shape (parameters,)
+    states : ndarray, shape (blocks, states)
+        Starting values of the states at the first row of each block.
+    steps : int
+        Steps of the estimation of all parameters.
+    effect_steps : int
+        Steps of the estimation of all parameters outside of the arguments of the units, before the others.
+    """
+
+    layout: StateSpaceLayout
+    units: tuple[str, ...]
+    theta: NDArray[np.float64]
+    free: NDArray[np.bool_]
+    states: NDArray[np.float64]
+    steps: int = 0
+    effect_steps: int = 0
+
+    def begin(self, segments: tuple[Segment, ...]) -> StateSpaceFit:
+        """Return the fit of the free parameters to segments, without any step."""
+        theta = np.where(self.free, self.theta, 0.0)
+        return StateSpaceFit(theta, number(self.free), find_codes(self.units), segments, self.states)
+
+    def estimate(self, data: LatentData) -> "FittedStateSpace | EvaluationOutcome":
+        """Estimate the parameters and measure the error of the held-out rows."""
+        fit = self.begin(data.used)
+        try:
+            if self.effect_steps:
+                effects = self.free.copy()
+                blocks = self.layout.split(effects)
+                blocks["W"][...] = blocks["s"][...] = False
+                fit.release(number(effects))
+                fit.advance(self.effect_steps)
+                fit.release(number(self.free))
+            fit.advance(self.steps)
+            error = measure_held_out(fit, data)
+        except np.linalg.LinAlgError:
+            return EvaluationOutcome(Status.SINGULAR, "the parameters depend on each other")
+        if not np.isfinite([error, fit.mean_square]).all():
+            return EvaluationOutcome(Status.DIVERGED, "a free run of the state space diverges")
+        return self.describe(fit, error)
+
+    def describe(self, fit: StateSpaceFit, error: float) -> FittedStateSpace:
+        """Return the system of a fit of this structure, with its error on the held-out rows."""
+        return FittedStateSpace(
+            self.layout.order,
+            self.layout.inputs,
+            self.units,
+            tuple(fit.theta.tolist()),
+            tuple(self.free.tolist()),
+            tuple(map(tuple, fit.states.tolist())),
+            error,
+            fit.mean_square,
+        )
+
+
+def number(free: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the columns of the free parameters, -1 for the others."""
+    return np.where(free, np.cumsum(free) - 1, -1)

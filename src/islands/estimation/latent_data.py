@@ -1,0 +1,163 @@
+"""Blocks of a record on which state spaces are estimated, and the error on their held-out rows.
+
+The blocks are spread over the record. The last rows of each are held out, because the least error on the
+estimation data prefers models that are too large.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.estimation.linear_state_space import measure_deviations
+from islands.estimation.state_space_fit import StateSpaceFit
+from islands.simulation.initial_states import Segment, estimate_states, simulate_errors
+
+#: Blocks of a record, samples of a block at least and at most, and the part of each that is held out. Slow
+#: states are not visible in short blocks.
+BLOCKS, SMALLEST_BLOCK, LARGEST_BLOCK, HELD_OUT = 5, 500, 2_000, 0.2
+
+#: Samples from which the initial states of a block are estimated, at least for a state and at most.
+SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
+
+#: Simulations of the held-out rows from disturbed states, the standard deviation of the disturbance relative
+#: to that of the states, and the rows before the held-out ones at which the states are disturbed, at most.
+_DISTURBED, _DISTURBANCE, _FORGETTING = 2, 1.5, 1_500
+
+#: Seed of the disturbances: all models are compared with the same ones.
+_SEED = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LatentData:
+    """A record with the standard deviation 1 of all signals, in blocks.
+
+    Attributes
+    ----------
+    record : Dataset
+    used : tuple of Segment
+        Blocks for the estimation.
+    whole : tuple of Segment
+        The same blocks with the rows after them, which are held out for the comparison of models.
+    variance : float
+        Of the output, by which mean squared errors of the scaled output are multiplied.
+    """
+
+    record: Dataset
+    used: tuple[Segment, ...]
+    whole: tuple[Segment, ...]
+    variance: float
+
+
+def make_latent_data(record: Dataset) -> LatentData:
+    """Scale a record and cut blocks out of it.
+
+    Parameters
+    ----------
+    record : Dataset
+        All inputs are read one sample early, so that the first row of a segment lacks them.
+    """
+    height = deviation(record.y)
+    scaled = replace(
+        record,
+        u=(record.u - record.u.mean(axis=0)) / deviation(record.u),
+        y=(record.y - record.y.mean()) / height,
+        preprocessing=None,
+    )
+    used: list[Segment] = []
+    whole: list[Segment] = []
+    for begin, end in _cut_blocks(scaled):
+        cut = end - round(HELD_OUT * (end - begin))
+        used.append(_take(scaled, begin, cut))
+        whole.append(_take(scaled, begin, end))
+    return LatentData(scaled, tuple(used), tuple(whole), float(height**2))
+
+
+def deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviation of each column, 1 for a constant."""
+    found = values.std(axis=0)
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _cut_blocks(record: Dataset) -> Iterator[tuple[int, int]]:
+    """Yield the first and the last row of each block; blocks do not cross segments."""
+    share = max(SMALLEST_BLOCK, record.samples // BLOCKS)
+    for begin, end in record.bounds:
+        count = max(1, round((end - begin) / share))
+        cuts = np.linspace(begin, end, count + 1).astype(int).tolist()
+        for first, last in pairwise(cuts):
+            yield first, min(last, first + LARGEST_BLOCK)
+
+
+def _take(record: Dataset, begin: int, end: int) -> Segment:
+    """Return rows with the inputs at the same samples."""
+    first = begin + 1 if begin in {bounds[0] for bounds in record.bounds} else begin
+    return Segment(np.ascontiguousarray(record.u[first - 1 : end - 1]), record.y[first:end].copy())
+
+
+def count_memory(segment: Segment, order: int) -> int:
+    """Return the number of rows from which initial states are estimated."""
+    return min(len(segment.y) // 3, max(SAMPLES_PER_STATE * order, LARGEST_MEMORY))
+
+
+def estimate_start(
+    theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, order: int
+) -> NDArray[np.float64]:
+    """Estimate the states at the first row of a block."""
+    rows = count_memory(segment, order)
+    return estimate_states(theta, codes, Segment(segment.u[:rows], segment.y[:rows]), np.zeros(order))
+
+
+def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
+    """Return the mean squared error of the held-out rows of all blocks; infinite after a divergence.
+
+    It is the largest one of several free runs. That of the block goes on, since a start at the held-out rows
+    would hide the error of slow states. Another one starts there from estimated states, as a simulation of
+    the model does. The others start in the block from disturbed states, which a model with a second
+    equilibrium does not forget. The error is in the squared unit of the output.
+    """
+    scales = measure_deviations(fit.theta, fit.codes, data.used[0].u, fit.states[0])
+    if scales is None:
+        return np.inf
+    rng = np.random.default_rng(_SEED)
+    blocks = []
+    for segment, used, states in zip(data.whole, data.used, fit.states, strict=True):
+        disturbed = _DISTURBANCE * scales * rng.standard_normal((_DISTURBED, len(states)))
+        runs = _simulate_held_out(fit, segment, len(used.y), states, disturbed)
+        if runs is None:
+            return np.inf
+        blocks.append(runs)
+    errors = [np.concatenate(run) for run in zip(*blocks, strict=True)]
+    return max(_mean_square(each) for each in errors) * data.variance
+
+
+def _simulate_held_out(
+    fit: StateSpaceFit,
+    segment: Segment,
+    cut: int,
+    states: NDArray[np.float64],
+    disturbed: NDArray[np.float64],
+) -> list[NDArray[np.float64]] | None:
+    """Return the errors of the rows of a block from row ``cut`` on, by free run; None after a divergence."""
+    held_out = Segment(segment.u[cut:], segment.y[cut:])
+    memory, first = count_memory(held_out, len(states)), max(0, cut - _FORGETTING)
+    start = estimate_start(fit.theta, fit.codes, held_out, len(states))
+    late = Segment(segment.u[first:], segment.y[first:])
+    runs = [(segment, states, cut), (held_out, start, memory)]
+    runs += [(late, each, cut - first) for each in disturbed]
+    found = []
+    for rows, begin, scored in runs:
+        errors = simulate_errors(fit.theta, fit.codes, rows, begin)
+        if errors is None:
+            return None
+        found.append(errors[scored:])
+    return found
+
+
+def _mean_square(errors: NDArray[np.float64]) -> float:
+    """Return the mean square of the errors of measured outputs."""
+    measured = errors[~np.isnan(errors)]
+    return float(np.mean(measured**2)) if measured.size else 0.0

@@ -1,0 +1,258 @@
+"""Models of state spaces: linear systems of several orders, and the final estimation of a front.
+
+Of the systems that no other one exceeds in size and held-out error, blocks of parameters that the error does
+not need are removed. The others are estimated on all blocks and written in the units of the record.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_all_inputs
+from islands.estimation.fitted_state_space import Draft, FittedStateSpace
+from islands.estimation.latent_data import (
+    BLOCKS,
+    LARGEST_BLOCK,
+    LARGEST_MEMORY,
+    SAMPLES_PER_STATE,
+    LatentData,
+    deviation,
+    estimate_start,
+    make_latent_data,
+    measure_held_out,
+)
+from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
+from islands.estimation.modal_form import find_modal_form
+from islands.models.latent import LatentModel, StateSpaceLayout, find_codes
+from islands.progress import Steps
+from islands.simulation.outcome import EvaluationOutcome
+
+#: Numbers of states of the linear systems.
+ORDERS = (1, 2, 3, 4, 6)
+
+#: Steps of a linear system, of a system without some parameters, and of the final estimation.
+_LINEAR_STEPS, _REDUCED_STEPS, _FINAL_STEPS = 10, 15, 100
+
+#: Gain of the held-out error, as a fraction, that justifies further parameters; increase by a removal, and
+#: by the final estimation.
+_NEGLIGIBLE, _LARGEST_INCREASE, _LARGEST_FINAL_INCREASE = 0.01, 0.02, 0.5
+
+#: Largest part of a segment that gives the initial states of a free run of the result.
+_LARGEST_PART = 0.05
+
+#: Part to which a mode decays in the warm-up.
+_DECAY = 0.01
+
+
+def search_linear_models(record: Dataset, steps: Steps) -> list[LatentModel]:
+    """Search state spaces without units: the linear models of the same data.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record without missing values.
+    steps : Steps
+
+    Returns
+    -------
+    list of LatentModel
+        Models that no other one exceeds in both the number of parameters and the held-out error, the smallest
+        first; the last one has the least error. Empty if the record is too short.
+    """
+    data = make_latent_data(advance_all_inputs(record))
+    return estimate_models(find_front(fit_linear_systems(data, steps)), data, record, steps)
+
+
+def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]:
+    """Fit linear systems of several orders.
+
+    Raises
+    ------
+    StoppedError
+        A stop is requested before the first one.
+    """
+    steps.check("linear state spaces")
+    found: list[FittedStateSpace] = []
+    for order in ORDERS:
+        if found and steps.skip("linear state spaces of larger orders"):
+            break
+        steps.report(f"linear state space of order {order}", 0.0)
+        model = fit_linear_state_space(data.record[: BLOCKS * LARGEST_BLOCK], order)
+        if model is None:
+            continue
+        theta, codes = model.theta, find_codes(())
+        states = np.array([estimate_start(theta, codes, each, order) for each in data.used])
+        draft = Draft(model.layout, (), theta, np.ones(theta.size, bool), states, steps=_LINEAR_STEPS)
+        system = draft.estimate(data)
+        if not isinstance(system, EvaluationOutcome):
+            found.append(system)
+    return found
+
+
+def find_front(systems: Sequence[FittedStateSpace], gain: float = _NEGLIGIBLE) -> list[FittedStateSpace]:
+    """Return the systems each of which has a smaller error, by a fraction, than all smaller ones."""
+    front: list[FittedStateSpace] = []
+    for each in sorted(systems, key=lambda each: (each.size, each.fitness, each.key, each.theta)):
+        if not front or each.fitness < (1.0 - gain) * front[-1].fitness:
+            front.append(each)
+    return front
+
+
+def estimate_models(
+    front: Sequence[FittedStateSpace], data: LatentData, record: Dataset, steps: Steps
+) -> list[LatentModel]:
+    """Reduce the systems of a front, estimate them on all blocks, and return the models.
+
+    If the output of the system with the least error reads an input at sample k, the inputs of all models are
+    read one sample early. The output of no model reads one otherwise.
+
+    Parameters
+    ----------
+    front : sequence of FittedStateSpace
+        The smallest first. No models if it is empty.
+    data : LatentData
+        Blocks of the record with all inputs one sample early.
+    record : Dataset
+        The record itself.
+    steps : Steps
+    """
+    if not front:
+        return []
+    steps.report("final estimation of state spaces", 0.7)
+    with ThreadPoolExecutor() as threads:
+        best = _remove_blocks(front[-1], data, direct=True)
+        direct = best.reads_at_once
+        left = front[:-1] if direct else front
+        reduced = list(threads.map(partial(_remove_blocks, data=data, direct=direct), left))
+        reduced += [best] if direct else []
+        finished = threads.map(partial(_finish, data=data, steps=steps), reduced)
+        advanced = advance_all_inputs(record)
+        models = [make_latent_model(each, data, advanced) for each in finished]
+    return models if direct else [replace(each, input_names=record.input_names) for each in models]
+
+
+def _remove_blocks(system: FittedStateSpace, data: LatentData, direct: bool) -> FittedStateSpace:
+    """Return the system without the blocks of parameters that the held-out error does not need.
+
+    Without ``direct``, the output reads no input at the same row: the units read none, or it reads no unit.
+    """
+    blocks = system.layout.split(np.arange(len(system.theta)))
+    of_states, of_inputs = blocks["W"][:, : system.order].ravel(), blocks["W"][:, system.order :].ravel()
+    through, past = blocks["D"], blocks["F"]
+    if not direct:
+        tried = [_fit_without(system, np.append(through, each), data) for each in (past, of_inputs)]
+        system = min(tried, key=lambda each: each.fitness)
+    for block in (past, through, of_inputs, of_states):
+        if np.array(system.free)[block].any():
+            found = _fit_without(system, block, data)
+            if found.fitness <= (1.0 + _LARGEST_INCREASE) * system.fitness:
+                system = replace(found, fitness=min(found.fitness, system.fitness))
+    return system
+
+
+def _fit_without(system: FittedStateSpace, block: NDArray[np.int64], data: LatentData) -> FittedStateSpace:
+    """Return the system without some parameters; its error is infinite if it cannot be estimated."""
+    draft = system.draft()
+    free = draft.free.copy()
+    free[block] = False
+    found = replace(draft, free=free, steps=_REDUCED_STEPS).estimate(data)
+    if isinstance(found, EvaluationOutcome):
+        theta = tuple(np.where(free, draft.theta, 0.0).tolist())
+        return replace(system, theta=theta, free=tuple(free.tolist()), fitness=np.inf)
+    return found
+
+
+def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedStateSpace:
+    """Estimate on all blocks, with the held-out rows, unless the model then no longer forgets its states."""
+    draft = system.draft()
+    fit = draft.begin(data.whole)
+    fit.advance(_FINAL_STEPS, lambda: steps.skip("refinement of parameters"))
+    error = measure_held_out(fit, data)
+    if not error <= (1.0 + _LARGEST_FINAL_INCREASE) * system.fitness:
+        return system
+    return draft.describe(fit, error)
+
+
+def _write_in_modes(system: FittedStateSpace, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the parameters with one or two states for each mode, of the standard deviation 1 for inputs."""
+    theta, layout = np.array(system.theta), system.layout
+    found = find_modal_form(layout.split(theta)["A"])
+    if found is None:
+        return theta
+    blocks, forward = found
+    modal = _transform(theta, layout, forward)
+    layout.split(modal)["A"][...] = blocks
+    start = np.linalg.solve(forward, np.array(system.states[0]))
+    scales = measure_deviations(modal, find_codes(system.units), u, start)
+    if scales is None:
+        return theta
+    for state, next_state in pairwise(range(system.order)):
+        if blocks[state, next_state]:  # both states of a pair have one scale
+            scales[[state, next_state]] = np.hypot(*scales[[state, next_state]])
+    scaled = _transform(modal, layout, np.diag(scales))
+    layout.split(scaled)["A"][...] = blocks
+    return scaled if np.isfinite(scaled).all() else theta
+
+
+def _transform(
+    theta: NDArray[np.float64], layout: StateSpaceLayout, forward: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the parameters for the states z of ``x = T z``."""
+    found = theta.copy()
+    blocks = layout.split(found)
+    for name in ("A", "B", "E", "o"):
+        block = blocks[name]
+        block[...] = np.linalg.solve(forward, block.reshape(layout.order, -1)).reshape(block.shape)
+    blocks["A"][...] = blocks["A"] @ forward
+    blocks["C"][...] = blocks["C"] @ forward
+    blocks["W"][:, : layout.order] = blocks["W"][:, : layout.order] @ forward
+    return found
+
+
+def make_latent_model(system: FittedStateSpace, data: LatentData, record: Dataset) -> LatentModel:
+    """Return the model of a system in the units of a record.
+
+    Parameters
+    ----------
+    system : FittedStateSpace
+    data : LatentData
+        Blocks of the record.
+    record : Dataset
+        The record with all inputs one sample early.
+    """
+    theta, layout = _write_in_modes(system, data.used[0].u), system.layout
+    blocks = layout.split(theta)
+    mean, scale = record.u.mean(axis=0), deviation(record.u)
+    level, height = float(record.y.mean()), float(deviation(record.y))
+    for block in (blocks["B"], blocks["W"][:, layout.order :], blocks["D"]):
+        block[...] = block / scale
+    blocks["o"] -= blocks["B"] @ mean
+    blocks["s"] -= blocks["W"][:, layout.order :] @ mean
+    for name in ("C", "D", "F", "level"):
+        blocks[name] *= height
+    blocks["level"] += level - blocks["D"] @ mean
+    wiring = tuple(name for name, value in zip(layout.names, theta, strict=True) if value != 0.0)
+    radius = float(np.abs(np.linalg.eigvals(blocks["A"])).max())
+    decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
+    shortest = min(record.segments) * _LARGEST_PART
+    # The first sample of a segment lacks its input.
+    memory = 1 + round(max(SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
+    return LatentModel(
+        order=layout.order,
+        units=system.units,
+        wiring=wiring,
+        memory=memory,
+        operating_inputs=tuple(mean.tolist()),
+        parameters=tuple(value for value in theta.tolist() if value != 0.0),
+        input_names=record.input_names,
+        output_name=record.output_name,
+        dt=record.dt,
+        preprocessing=record.preprocessing,
+    )

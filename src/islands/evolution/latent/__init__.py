@@ -1,0 +1,1 @@
+"""Evolution of state spaces with static units."""

@@ -1,0 +1,121 @@
+"""Identification of latent models: state spaces with static units, evolved on the islands."""
+
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_all_inputs
+from islands.data.split import Split
+from islands.errors import SettingsError
+from islands.estimation.estimator_table import refinement_criterion
+from islands.estimation.fitted_state_space import FittedStateSpace
+from islands.estimation.latent_data import make_latent_data
+from islands.estimation.latent_models import estimate_models, find_front
+from islands.evolution.engine import Engine
+from islands.evolution.latent.problem import LatentProblem, make_latent_problem
+from islands.evolution.presets import LATENT_SETTINGS
+from islands.evolution.search_result import (
+    SearchResult,
+    SearchStatistics,
+    rank_models,
+    with_bands,
+    with_linear_comparison,
+)
+from islands.evolution.search_state import SearchState, stop_reason
+from islands.evolution.settings import Settings
+from islands.facade.engine_choice import Ray, open_engine
+from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
+from islands.facade.results.model_simulation import SHOOTING
+from islands.models.latent import LatentModel
+from islands.models.protocol import DynamicModel
+from islands.progress import Steps
+from islands.simulation.predictors import free_run
+from islands.validation.assessment import assess
+from islands.validation.ensemble import ValidatedModel
+
+#: Gain of the held-out error, as a fraction, that justifies a larger model of the result, and most models.
+_GAIN, _MOST_MODELS = 0.15, 10
+
+#: Latent models are estimated by the error of the free run.
+_CRITERION = refinement_criterion(None)
+
+
+def identify_latent(
+    record: Dataset,
+    split: Split,
+    settings: Settings,
+    seed: int,
+    steps: Steps,
+    described: dict[str, Any],
+    *,
+    start: SearchState | None = None,
+    engine: Engine | Ray | str | None = None,
+    on_epoch: SearchCallback = ignore_epoch,
+) -> SearchResult:
+    """Identify latent models of a record by evolution.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record as passed by the user, which the result contains.
+    split : Split
+        Estimation data and validation data at the rate of the record.
+    settings : Settings
+        Settings of latent models.
+    seed : int
+    steps : Steps
+    described : dict
+        Settings of the result; those of the search are added.
+    start, engine, on_epoch
+        As for `identify`.
+
+    Raises
+    ------
+    SettingsError
+        No model was found.
+    """
+    problem = make_latent_problem(split.estimation, settings, steps)
+    if not problem.linear:
+        raise SettingsError(
+            "no latent model was found: the record is too short, or a column is constant or depends on "
+            "others; take another record or another class"
+        )
+    state = begin_search(start, settings.islands, seed)
+    with open_engine(engine, steps.report) as opened:
+        state = evolve(problem, state, settings, opened, steps, on_epoch)
+    models = _estimate(problem, state, steps)
+    if any(each.reads_at_once for each in models):
+        split = Split(advance_all_inputs(split.estimation), advance_all_inputs(split.validation))
+    steps.report("assessment of the models", 0.9)
+    interval = min(SHOOTING, max(1, split.estimation.samples // 10))
+    assessed = [assess(model, split, interval, criterion=_CRITERION) for model in models]
+    described |= {name: getattr(settings, name) for name in sorted(LATENT_SETTINGS)}
+    described |= {"constraints": "none", "average": 1, "shooting": interval}
+    search = SearchStatistics(
+        state.evaluations,
+        dict(state.outcomes),
+        {"candidates": state.evaluations, "bytes": 0},
+        None,
+        state.archipelago.generation,
+        state.duplicates,
+        state.outcomes.get("ok", 0) / max(1, state.evaluations),
+        state.history,
+        state.caches,
+        stop_reason(state, settings) or "stopped",
+    )
+    found = SearchResult(record, split, seed, described, search, rank_models(assessed))
+    validated: list[ValidatedModel[DynamicModel]] = [
+        ValidatedModel(model, _CRITERION, free_run(model, split.validation).mean_squared_error)
+        for model in models
+    ]
+    warm_up = max(model.maximum_lag for model in models)
+    found = with_linear_comparison(found, (), interval, steps)
+    return with_bands(found, validated, "none", warm_up, steps)
+
+
+def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> list[LatentModel]:
+    """Estimate the models of the front of size and held-out error."""
+    entries = state.archipelago.hall_of_fame.entries
+    evolved = [each for each in entries if isinstance(each, FittedStateSpace)]
+    front = find_front([*problem.linear, *evolved], _GAIN)[-_MOST_MODELS:]
+    data = make_latent_data(advance_all_inputs(problem.record))
+    return estimate_models(front, data, problem.record, steps)
