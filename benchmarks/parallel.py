@@ -22,7 +22,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import run_epoch
-from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
@@ -60,9 +59,9 @@ def alone(problem: Problem, index: int) -> float:
 
 
 def _epochs(problem: Problem, island: Island):
-    evaluator = Evaluator(problem.record, problem.settings)
+    evolution = problem.open()
     while island.generation < problem.settings.generations:
-        island = run_epoch(island, [], evaluator, problem, never).island
+        island = run_epoch(island, [], evolution, never).island
         yield island
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.generation import _abandon_threshold, _thresholds_by_size, first_generation, step
-from islands.evolution.hall_of_fame import DEPTH
 from islands.evolution.individual import Individual
 from islands.evolution.problem import make_problem
 from islands.simulation.outcome import Status
@@ -153,7 +152,7 @@ def test_threshold_admits_candidates_of_elite_and_hall_of_fame(setting, history)
         assert len(thresholds) == setting.max_terms + 1
         for size, allowed in enumerate(thresholds):
             known = [entry.fitness for entry in island.hall_of_fame.entries if entry.size == size]
-            assert allowed == (max(threshold, known[-1]) if len(known) == DEPTH else inf)
+            assert allowed == (max(threshold, known[-1]) if len(known) == Individual.kept else inf)
 
 
 def test_threshold_is_the_80_percent_quantile_of_known_parents():
@@ -198,5 +197,5 @@ def test_nothing_is_abandoned_while_the_elite_is_not_full():
         assert {each.key for each in island.elite} == seen
         assert len(island.elite) < setting.elites
         assert not abandoned(island)
-    assert len(seen) > DEPTH
+    assert len(seen) > Individual.kept
     assert island.abandon_threshold == inf

@@ -9,11 +9,11 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island
-from islands.evolution.problem import Problem, make_problem
+from islands.evolution.problem import GeneEvolution, Problem, make_problem
 from support.migrations import (
     SETTINGS,
-    evaluator,
     every_replacement_policy,
+    evolution,
     keys,
     models,
     recorded,
@@ -75,9 +75,7 @@ def test_epoch_begins_with_immigration(search_problem, replaced):
     )
     here, there = run_first_epochs(search_problem, 0)[1], run_first_epochs(search_problem, 1)[1]
     own_evaluator = Evaluator(search_problem.record, search_problem.settings)
-    after_immigration = receive_migrants(
-        here.island, [there.emigrants], own_evaluator, search_problem.settings_of(0)
-    )
+    after_immigration = receive_migrants(here.island, [there.emigrants], search_problem.open())
     assert after_immigration != here.island
     after = run_next_epoch(here.island, search_problem, [there.emigrants])
     infos = []
@@ -136,7 +134,10 @@ def test_stopped_epoch_returns_none(search_problem, calls):
         Evaluator(search_problem.record, search_problem.settings),
         iter([False] * (calls - 1) + [True]),
     )
-    assert run_epoch(initial.island, [], own_evaluator, search_problem, lambda: next(answers)) is None
+    assert (
+        run_epoch(initial.island, [], GeneEvolution(search_problem, own_evaluator), lambda: next(answers))
+        is None
+    )
     assert list(answers) == []
     # The unfinished epoch is discarded and does not affect later epochs.
     assert exactly(
@@ -147,14 +148,8 @@ def test_stopped_epoch_returns_none(search_problem, calls):
 def test_stop_is_called_before_every_generation_only(search_problem):
     initial, first, _ = run_first_epochs(search_problem)
     answers = iter([False] * 3)
-    epoch = run_epoch(
-        initial.island,
-        [],
-        Evaluator(search_problem.record, search_problem.settings),
-        search_problem,
-        lambda: next(answers),
-    )
+    epoch = run_epoch(initial.island, [], search_problem.open(), lambda: next(answers))
     assert list(answers) == []
     assert exactly(epoch.island) == exactly(first.island)
     before_the_first = Island(0, 7, -1, (), (), HallOfFame())
-    assert run_epoch(before_the_first, [], evaluator(), Problem(recorded(), SETTINGS), lambda: True) is None
+    assert run_epoch(before_the_first, [], evolution(SETTINGS), lambda: True) is None

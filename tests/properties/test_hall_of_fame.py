@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.hall_of_fame import DEPTH, HallOfFame, merge, pareto_front, with_entries
+from islands.evolution.hall_of_fame import HallOfFame, merge, pareto_front, with_entries
 from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged, Shift
@@ -92,7 +92,7 @@ def test_hall_keeps_the_best_distinct_structures_of_every_size(found):
         if each.fitness < inf:
             best[each.key] = min(each.fitness, best.get(each.key, inf))
     for size in (1, 2, 3):
-        expected = sorted(value for key, value in best.items() if len(key) == size)[:DEPTH]
+        expected = sorted(value for key, value in best.items() if len(key) == size)[: Individual.kept]
         kept = [entry for entry in hall.entries if entry.size == size]
         assert [entry.fitness for entry in kept] == expected
         assert [best[entry.key] for entry in kept] == expected
@@ -115,7 +115,7 @@ def test_division_into_generations_does_not_matter(found, generation):
 
 
 def test_ties_with_the_last_of_a_full_size_are_broken_by_text():
-    full = with_entries(HallOfFame(), [entry(1.0, f"y(k-{lag})") for lag in range(1, DEPTH + 1)])
+    full = with_entries(HallOfFame(), [entry(1.0, f"y(k-{lag})") for lag in range(1, Individual.kept + 1)])
     early, late = entry(1.0, "u(k-1)"), entry(1.0, "y(k-9)")
     assert with_entries(full, [late]) == full
     assert [each.key for each in with_entries(full, [early]).entries] == [
@@ -171,7 +171,7 @@ def test_ties_of_fitness_are_broken_by_text():
 
 
 def test_at_most_eight_models_of_a_size_are_kept():
-    assert DEPTH == 8
+    assert Individual.kept == 8
     many = [entry(float(lag), f"y(k-{lag})") for lag in range(1, 20)]
     hall = with_entries(HallOfFame(), many[::-1])
     assert [each.fitness for each in hall.entries] == [float(lag) for lag in range(1, 9)]

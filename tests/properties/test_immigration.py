@@ -16,14 +16,14 @@ from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES
 from islands.evolution.migration.topology import parse_topology
-from islands.evolution.problem import Problem
+from islands.evolution.problem import GeneEvolution, Problem
 from islands.evolution.rng import Purpose, Stream
 from islands.simulation.outcome import Status
 from support.migrations import (
     SETTINGS,
     arrivals,
-    evaluator,
     every_replacement_policy,
+    evolution,
     islands,
     keys,
     known_fitness,
@@ -51,7 +51,7 @@ def expected(island, arriving):
 def test_immigration_conserves_sizes_and_individuals_not_replaced(replaced, distinct, data, arriving):
     island = data.draw(islands(distinct))
     setting = replace(SETTINGS, replaced=replaced, distinct=distinct)
-    after = receive_migrants(island, arriving, evaluator(), setting)
+    after = receive_migrants(island, arriving, evolution(setting))
     immigrants = expected(island, arriving)
     assert len(after.population) == len(island.population)
     fresh = [new for new, old in zip(after.population, island.population, strict=True) if new is not old]
@@ -67,7 +67,7 @@ def test_immigration_conserves_sizes_and_individuals_not_replaced(replaced, dist
 def test_elite_is_the_best_of_elite_and_immigrants(replaced, distinct, data, arriving):
     island = data.draw(islands(distinct))
     setting = replace(SETTINGS, replaced=replaced, distinct=distinct)
-    after = receive_migrants(island, arriving, evaluator(), setting)
+    after = receive_migrants(island, arriving, evolution(setting))
     contenders = [*island.elite, *expected(island, arriving)]
     # Immigrants have structures that differ from all contenders, so distinct elites stay distinct.
     ordered = sorted(each.fitness for each in contenders)
@@ -87,12 +87,12 @@ def test_structures_in_the_elite_do_not_immigrate_again():
     one, two, *others = models()
     population = tuple(others[: SETTINGS.population])
     island = Island(0, 3, 6, population, (one,), HallOfFame())
-    assert receive_migrants(island, [(replace(one),), (replace(one),)], evaluator(), SETTINGS) == island
+    assert receive_migrants(island, [(replace(one),), (replace(one),)], evolution(SETTINGS)) == island
     # Structures that are only in the population do immigrate, because the population may lose them.
-    after = receive_migrants(island, [(replace(one), replace(population[0]))], evaluator(), SETTINGS)
+    after = receive_migrants(island, [(replace(one), replace(population[0]))], evolution(SETTINGS))
     assert one not in after.population
     assert population[0] in after.elite
-    assert two in receive_migrants(island, [(two, one)], evaluator(), SETTINGS).population
+    assert two in receive_migrants(island, [(two, one)], evolution(SETTINGS)).population
 
 
 @every_replacement_policy
@@ -101,13 +101,13 @@ def test_first_immigrants_are_taken_of_equal_or_too_many(replaced):
     island = Island(0, 3, 6, tuple(others[:2]), (others[3],), HallOfFame())
     again = replace(one, genes=one.genes[::-1])
     setting = replace(SETTINGS, replaced=replaced)
-    after = receive_migrants(island, [(), (one,), (again, two), (three,)], evaluator(), setting)
+    after = receive_migrants(island, [(), (one,), (again, two), (three,)], evolution(setting))
     assert {id(each) for each in after.population} == {id(one), id(two)}
 
 
 @given(islands(), arrivals())
 def test_worst_policy_evaluates_abandoned_individuals(island, arriving):
-    after = receive_migrants(island, arriving, evaluator(), replace(SETTINGS, replaced="worst"))
+    after = receive_migrants(island, arriving, evolution(replace(SETTINGS, replaced="worst")))
     fitness = [known_fitness(each.genes) for each in island.population]
     places = sorted(range(len(fitness)), key=lambda place: (-fitness[place], place))
     for place, each in zip(places, expected(island, arriving), strict=False):
@@ -120,7 +120,7 @@ def test_random_policy_replaces_every_position():
     setting = replace(SETTINGS, replaced="random")
 
     def place(**changes):
-        after = receive_migrants(replace(island, **changes), [(newcomer,)], evaluator(), setting)
+        after = receive_migrants(replace(island, **changes), [(newcomer,)], evolution(setting))
         return after.population.index(newcomer)
 
     for name in ("index", "generation", "seed"):
@@ -136,14 +136,14 @@ def test_random_policy_replaces_every_position():
 @given(islands(), arrivals())
 def test_immigration_does_not_depend_on_the_cache(replaced, island, arriving):
     setting = replace(SETTINGS, replaced=replaced)
-    after = exactly(receive_migrants(island, arriving, evaluator(), setting))
+    after = exactly(receive_migrants(island, arriving, evolution(setting)))
     fresh = Evaluator(recorded(), SETTINGS)
     complete = Evaluator(recorded(), SETTINGS, Limits(pairs=0, genes=0, structures=0), abandon=False)
     with_thresholds = Evaluator(recorded(), SETTINGS)
     # All individuals are cached as abandoned.
     with_thresholds.evaluate([(Individual(each.genes), False) for each in island.population], [1e-9] * 9)
     for other in (fresh, complete, with_thresholds, fresh):
-        assert exactly(receive_migrants(island, arriving, other, setting)) == after
+        assert exactly(receive_migrants(island, arriving, evolution(setting, other))) == after
 
 
 def run_epochs(setting, abandon, seed=5):
@@ -163,8 +163,7 @@ def run_epochs(setting, abandon, seed=5):
             run_epoch(
                 island,
                 [leaving[source] for source in sources[island.index]],
-                own_evaluator,
-                search_problem,
+                GeneEvolution(search_problem, own_evaluator),
                 never_stop,
             )
             for island in archipelago

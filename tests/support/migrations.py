@@ -15,6 +15,7 @@ from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.problem import GeneEvolution, Problem
 from support.searches import SMALL, islands_of, record
 
 #: Some individuals fail, and the elite may contain copies.
@@ -45,6 +46,11 @@ def recorded():
 @cache
 def evaluator():
     return Evaluator(recorded(), SETTINGS)
+
+
+def evolution(settings, evaluator_of_run=None):
+    """Return the steps of the islands of a problem without seeds."""
+    return GeneEvolution(Problem(recorded(), settings), evaluator_of_run or evaluator())
 
 
 @cache
@@ -92,7 +98,8 @@ def run_next_epoch(island, search_problem, arriving=(), evaluator_of_run=None):
     return run_epoch(
         island,
         arriving,
-        evaluator_of_run or Evaluator(search_problem.record, search_problem.settings),
-        search_problem,
+        GeneEvolution(
+            search_problem, evaluator_of_run or Evaluator(search_problem.record, search_problem.settings)
+        ),
         never_stop,
     )

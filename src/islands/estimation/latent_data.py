@@ -1,7 +1,8 @@
 """Blocks of a record on which state spaces are estimated, and the error on their held-out rows.
 
-The blocks are spread over the record. The last rows of each are held out, because the least error on the
-estimation data prefers models that are too large.
+The blocks are spread over the record. The rows after each are held out, because the least error on the
+estimation data prefers models that are too large. A simulation takes much less time than an estimation, so
+that all other rows of a long record are held out.
 """
 
 from collections.abc import Iterator
@@ -16,16 +17,19 @@ from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.simulation.initial_states import Segment, estimate_states, simulate_errors
 
-#: Blocks of a record, samples of a block at least and at most, and the part of each that is held out. Slow
+#: Blocks of a record, samples of a block at least, and the part of each that is held out at least. Slow
 #: states are not visible in short blocks.
-BLOCKS, SMALLEST_BLOCK, LARGEST_BLOCK, HELD_OUT = 5, 500, 2_000, 0.2
+_BLOCKS, _SMALLEST_BLOCK, _HELD_OUT = 5, 500, 0.2
+
+#: Rows of each block for the estimation in a search, and for the final one, at most.
+_USED_ROWS, _FINAL_ROWS = 1_200, 4_000
 
 #: Samples from which the initial states of a block are estimated, at least for a state and at most.
 SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
 
-#: Simulations of the held-out rows from disturbed states, the standard deviation of the disturbance relative
-#: to that of the states, and the rows before the held-out ones at which the states are disturbed, at most.
-_DISTURBED, _DISTURBANCE, _FORGETTING = 2, 1.5, 1_500
+#: Simulations of held-out rows from disturbed states, the standard deviation of the disturbance relative to
+#: that of the states, and the rows before and after the first held-out one, at most.
+_DISTURBED, _DISTURBANCE, _FORGETTING, _DISTURBED_ROWS = 2, 1.5, 1_500, 500
 
 #: Seed of the disturbances: all models are compared with the same ones.
 _SEED = 5
@@ -40,14 +44,17 @@ class LatentData:
     record : Dataset
     used : tuple of Segment
         Blocks for the estimation.
+    final : tuple of Segment
+        The same blocks with further rows, for the final estimation.
     whole : tuple of Segment
-        The same blocks with the rows after them, which are held out for the comparison of models.
+        The same blocks with all rows up to the next one, which are held out for the comparison of models.
     variance : float
         Of the output, by which mean squared errors of the scaled output are multiplied.
     """
 
     record: Dataset
     used: tuple[Segment, ...]
+    final: tuple[Segment, ...]
     whole: tuple[Segment, ...]
     variance: float
 
@@ -68,12 +75,14 @@ def make_latent_data(record: Dataset) -> LatentData:
         preprocessing=None,
     )
     used: list[Segment] = []
+    final: list[Segment] = []
     whole: list[Segment] = []
     for begin, end in _cut_blocks(scaled):
-        cut = end - round(HELD_OUT * (end - begin))
-        used.append(_take(scaled, begin, cut))
+        cut = end - round(_HELD_OUT * (end - begin))
+        used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS)))
+        final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS)))
         whole.append(_take(scaled, begin, end))
-    return LatentData(scaled, tuple(used), tuple(whole), float(height**2))
+    return LatentData(scaled, tuple(used), tuple(final), tuple(whole), float(height**2))
 
 
 def deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -84,12 +93,10 @@ def deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _cut_blocks(record: Dataset) -> Iterator[tuple[int, int]]:
     """Yield the first and the last row of each block; blocks do not cross segments."""
-    share = max(SMALLEST_BLOCK, record.samples // BLOCKS)
+    share = max(_SMALLEST_BLOCK, record.samples // _BLOCKS)
     for begin, end in record.bounds:
         count = max(1, round((end - begin) / share))
-        cuts = np.linspace(begin, end, count + 1).astype(int).tolist()
-        for first, last in pairwise(cuts):
-            yield first, min(last, first + LARGEST_BLOCK)
+        yield from pairwise(np.linspace(begin, end, count + 1).astype(int).tolist())
 
 
 def _take(record: Dataset, begin: int, end: int) -> Segment:
@@ -145,7 +152,7 @@ def _simulate_held_out(
     held_out = Segment(segment.u[cut:], segment.y[cut:])
     memory, first = count_memory(held_out, len(states)), max(0, cut - _FORGETTING)
     start = estimate_start(fit.theta, fit.codes, held_out, len(states))
-    late = Segment(segment.u[first:], segment.y[first:])
+    late = Segment(*(signal[first : cut + _DISTURBED_ROWS] for signal in (segment.u, segment.y)))
     runs = [(segment, states, cut), (held_out, start, memory)]
     runs += [(late, each, cut - first) for each in disturbed]
     found = []

@@ -1,7 +1,7 @@
 """Models of state spaces: linear systems of several orders, and the final estimation of a front.
 
 Of the systems that no other one exceeds in size and held-out error, blocks of parameters that the error does
-not need are removed. The others are estimated on all blocks and written in the units of the record.
+not need are removed. The others are estimated on longer blocks and written in the units of the record.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,6 @@ from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
-    BLOCKS,
-    LARGEST_BLOCK,
     LARGEST_MEMORY,
     SAMPLES_PER_STATE,
     LatentData,
@@ -37,8 +35,11 @@ from islands.simulation.outcome import EvaluationOutcome
 #: Numbers of states of the linear systems.
 ORDERS = (1, 2, 3, 4, 6)
 
+#: Rows of the first estimation of a linear system, at most.
+_LINEAR_ROWS = 20_000
+
 #: Steps of a linear system, of a system without some parameters, and of the final estimation.
-_LINEAR_STEPS, _REDUCED_STEPS, _FINAL_STEPS = 10, 15, 100
+_LINEAR_STEPS, _REDUCED_STEPS, _FINAL_STEPS = 10, 15, 50
 
 #: Gain of the held-out error, as a fraction, that justifies further parameters; increase by a removal, and
 #: by the final estimation.
@@ -84,7 +85,7 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
         if found and steps.skip("linear state spaces of larger orders"):
             break
         steps.report(f"linear state space of order {order}", 0.0)
-        model = fit_linear_state_space(data.record[: BLOCKS * LARGEST_BLOCK], order)
+        model = fit_linear_state_space(data.record[:_LINEAR_ROWS], order)
         if model is None:
             continue
         theta, codes = model.theta, find_codes(())
@@ -108,7 +109,7 @@ def find_front(systems: Sequence[FittedStateSpace], gain: float = _NEGLIGIBLE) -
 def estimate_models(
     front: Sequence[FittedStateSpace], data: LatentData, record: Dataset, steps: Steps
 ) -> list[LatentModel]:
-    """Reduce the systems of a front, estimate them on all blocks, and return the models.
+    """Reduce the systems of a front, estimate them on longer blocks, and return the models.
 
     If the output of the system with the least error reads an input at sample k, the inputs of all models are
     read one sample early. The output of no model reads one otherwise.
@@ -170,9 +171,9 @@ def _fit_without(system: FittedStateSpace, block: NDArray[np.int64], data: Laten
 
 
 def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedStateSpace:
-    """Estimate on all blocks, with the held-out rows, unless the model then no longer forgets its states."""
+    """Estimate on longer blocks, unless the error of other rows or of disturbed states increases much."""
     draft = system.draft()
-    fit = draft.begin(data.whole)
+    fit = draft.begin(data.final)
     fit.advance(_FINAL_STEPS, lambda: steps.skip("refinement of parameters"))
     error = measure_held_out(fit, data)
     if not error <= (1.0 + _LARGEST_FINAL_INCREASE) * system.fitness:

@@ -89,9 +89,6 @@ class Settings:
 
     Attributes
     ----------
-    model : str
-        Class of the models: ``narx`` or ``latent``. Latent models have the settings of the populations, of
-        the islands and of the end of a search, and `structure`; all others are those of NARX models.
     population, generations : int
         Offspring of each generation; number of generations.
     elite : float
@@ -193,9 +190,11 @@ class Settings:
     target_error : float
         The run ends after the first epoch in which an individual has at most this RMSE, in the unit of the
         output; 0 for no target.
+    model : str
+        Class of the models: ``narx`` or ``latent``. Latent models have the settings of the populations, of
+        the islands and of the end of a search, and `structure`; all others are those of NARX models.
     """
 
-    model: str = NARX
     population: int = _option(500, "Individuals of an island.")
     generations: int = _option(500, "Generations of a search, at most.")
     elite: float = _option(0.1, "Fraction of the population that is kept as elite.")
@@ -264,6 +263,7 @@ class Settings:
     )
     max_evaluations: int = _option(0, "Stop after the epoch that reaches this number of individuals.")
     target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE, in the output's unit.")
+    model: str = NARX
 
     def __post_init__(self) -> None:
         check_sequences(

@@ -9,7 +9,6 @@ from islands.expressions.tree import Primitive
 class SettingChanges(TypedDict, total=False):
     """Settings that differ from those of a preset. `Settings` describes each of them."""
 
-    model: str
     population: int
     generations: int
     elite: float
@@ -55,3 +54,4 @@ class SettingChanges(TypedDict, total=False):
     characters: Sequence[str]
     max_evaluations: int
     target_error: float
+    model: str

@@ -12,7 +12,7 @@ smaller than that of a smaller model.
 The setting ``select`` can replace this rule by the paper's choice of Appendix A: the least training error.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, isnan, sqrt
 
@@ -35,7 +35,8 @@ NEGLIGIBLE_EXCESS = 0.01
 #: Excess of an RMSE over the least, as a fraction, of a model that is as good on the estimation data.
 _EXCESS_BY_CHANCE = 0.5
 
-#: Largest error on the estimation data, relative to the least of all models, of a model that is compared.
+#: Largest error on the validation data, and then on the estimation data, relative to the least, of a model
+#: that is compared.
 _LARGEST_RATIO = 2.0
 
 #: RMSE as a fraction of the output range below which errors count as equal.
@@ -74,9 +75,10 @@ def recommend(
 
     Candidates are the models whose free run on the validation data is bounded and which pass the physics
     checks: holds and excursions stay bounded and, if the search constrains models of hysteresis, Property 1
-    holds. Those whose free-run error on the estimation data exceeds twice the least are left out. Of the
-    others, the one with the least RMSE is the reference. A model is as good as the reference if its RMSE
-    exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds it by
+    holds. Those whose error on the validation data exceeds twice the least are left out, and of the others
+    those whose free-run error on the estimation data exceeds twice the least of them. Of the rest, the one
+    with the least RMSE is the reference. A model is as good as the reference if its RMSE exceeds that of the
+    reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds that of the reference by
     at most 20 % and the mean squared errors differ by at most three standard errors. The standard error is
     that of the mean difference over blocks of the validation data. A model is also as good if its RMSE on the
     estimation data exceeds that of the reference by at most 1 %, and that on the validation data by at most
@@ -102,7 +104,8 @@ def recommend(
     sound = [at for at in bounded if is_sound(assessments[at].physics, hysteresis)]
     candidates = sound or bounded
     best = min(candidates, key=lambda at: (assessments[at].validation_error, at))
-    close = _pass_over(candidates, assessments, _LARGEST_RATIO)
+    comparable = _pass_over(candidates, assessments, _LARGEST_RATIO, _measure_validation)
+    close = _pass_over(comparable, assessments, _LARGEST_RATIO)
     lucky = best not in close
     best = min(close, key=lambda at: (assessments[at].validation_error, at))
     equal = [
@@ -179,20 +182,25 @@ def _is_as_good_in_estimation(entry: Assessment, reference: Assessment) -> bool:
 
     The reference may have the least error on the validation data by chance.
     """
-    error, smallest = _estimation_error(entry), _estimation_error(reference)
+    error, smallest = _measure_estimation(entry), _measure_estimation(reference)
     if isinf(error) or error > (1.0 + NEGLIGIBLE_EXCESS) * smallest:
         return False
     return entry.validation_error <= (1.0 + _EXCESS_BY_CHANCE) * reference.validation_error
 
 
-def _pass_over(places: Sequence[int], assessments: Sequence[Assessment], ratio: float) -> list[int]:
-    """Return the models whose error on the estimation data is at most a multiple of the least of them."""
-    errors = {at: _estimation_error(assessments[at]) for at in places}
+def _pass_over(
+    places: Sequence[int],
+    assessments: Sequence[Assessment],
+    ratio: float,
+    measure: Callable[[Assessment], float] | None = None,
+) -> list[int]:
+    """Return the models whose error is at most a multiple of the least; by default on the estimation data."""
+    errors = {at: (measure or _measure_estimation)(assessments[at]) for at in places}
     limit = ratio * min(errors.values())
     return [at for at, error in errors.items() if error <= limit]
 
 
-def _estimation_error(entry: Assessment) -> float:
+def _measure_estimation(entry: Assessment) -> float:
     """Return the free-run error on the estimation data relative to the standard deviation of the output.
 
     Infinite after a divergence. Errors up to rounding are equal, and those of a constant output.
@@ -201,6 +209,12 @@ def _estimation_error(entry: Assessment) -> float:
     if isnan(found.rmse):
         return inf
     return ROUNDING if isnan(found.fit_percent) else max(ROUNDING, 1.0 - found.fit_percent / 100.0)
+
+
+def _measure_validation(entry: Assessment) -> float:
+    """Return the free-run error on the validation data relative to the output range."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return max(ROUNDING, float(np.sqrt(np.mean(entry.squared_errors))))
 
 
 def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

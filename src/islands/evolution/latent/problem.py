@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
+from math import log
 from typing import cast
 
 import numpy as np
@@ -38,6 +39,9 @@ _FIRST_UNITS = (
 #: Orders whose linear system has larger mean squared errors than this multiple of the least are left out of
 #: the first population. On held-out rows, a linear system may drift whose units would not.
 _LARGEST_RATIO = 4.0
+
+#: Least error in the criterion: of a record without noise it has no limit.
+_LEAST_FITNESS = 1e-300
 
 #: Probability that a parent is drawn from the front of size and error.
 _FROM_FRONT = 0.3
@@ -105,6 +109,7 @@ class LatentEvolution:
     def __init__(self, problem: LatentProblem, threads: int) -> None:
         self.problem, self._threads = problem, threads
         self._data: LatentData = make_latent_data(advance_all_inputs(problem.record))
+        self._rows = sum(len(block.y) for block in self._data.used)
 
     @property
     def memory(self) -> Caches:
@@ -141,7 +146,7 @@ class LatentEvolution:
     def select_elite(self, contenders: Sequence[AnyIndividual], _island: int) -> AnyPopulation:
         """Return the elite among contenders; see `select_latent_elite`."""
         systems = cast("Sequence[FittedStateSpace]", contenders)
-        return select_latent_elite(systems, self.problem.settings.elites)
+        return select_latent_elite(systems, self.problem.settings.elites, self._rows)
 
     def _vary(self, island: Island, rng: Generator) -> Draft:
         settings, elite = self.problem.settings, cast("Sequence[FittedStateSpace]", island.elite)
@@ -174,17 +179,39 @@ class LatentEvolution:
         return replace(island, population=population, elite=elite, hall_of_fame=hall), info
 
 
-def select_latent_elite(systems: Iterable[FittedStateSpace], count: int) -> tuple[FittedStateSpace, ...]:
-    """Return the fittest systems, each structure once, among them those of the front of size and error."""
-    ordered = unique_structures(sorted(systems, key=lambda each: (each.fitness, each.size, each.key)))
+def select_latent_elite(
+    systems: Iterable[FittedStateSpace], count: int, rows: int
+) -> tuple[FittedStateSpace, ...]:
+    """Return the systems of the least criterion, each structure once, with the front of size and error.
+
+    Parameters
+    ----------
+    systems : iterable of FittedStateSpace
+    count : int
+    rows : int
+        Rows of the estimation.
+
+    Returns
+    -------
+    tuple of FittedStateSpace
+        Least criterion first. It is the logarithm of the error with the penalty of the number of parameters
+        of the Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978) 461-464): without it,
+        systems grow.
+    """
+
+    def order(system: FittedStateSpace) -> tuple[float, int, tuple[str, ...]]:
+        criterion = log(max(system.fitness, _LEAST_FITNESS)) + system.size * log(rows) / rows
+        return criterion, system.size, system.key
+
+    ordered = unique_structures(sorted(systems, key=order))
     front = find_front(ordered)[-count:]
     keys = {each.key for each in front}
     others = [each for each in ordered if each.key not in keys][: count - len(front)]
-    return tuple(sorted((*front, *others), key=lambda each: (each.fitness, each.size, each.key)))
+    return tuple(sorted((*front, *others), key=order))
 
 
 def _select_parent(elite: Sequence[FittedStateSpace], settings: Settings, rng: Generator) -> FittedStateSpace:
-    """Return a system of the front, or the fittest one of a tournament."""
+    """Return a system of the front, or the best one of a tournament."""
     if rng.random() < _FROM_FRONT:
         front = find_front(elite)
         return front[int(rng.integers(len(front)))]

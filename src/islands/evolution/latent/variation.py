@@ -21,10 +21,10 @@ from islands.models.latent import UNITS, ZERO_BLOCKS, StateSpaceLayout, find_cod
 
 #: Steps of the estimation of an offspring, before them of the effects of a new unit, and of a system that is
 #: estimated further.
-STEPS, EFFECT_STEPS, FURTHER_STEPS = 10, 6, 30
+STEPS, EFFECT_STEPS, FURTHER_STEPS = 8, 5, 24
 
 #: Most states and units of a system.
-MOST_STATES, MOST_UNITS = 8, 8
+MOST_STATES, MOST_UNITS = 8, 6
 
 #: Standard deviations of the offset of a new unit, of its first effects, and of a disturbance of arguments.
 _OFFSET, _EFFECT, _DISTURBANCE = 0.7, 1e-3, 0.3

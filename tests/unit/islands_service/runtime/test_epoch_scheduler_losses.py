@@ -8,7 +8,6 @@ import pytest
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
-from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual
 from islands.evolution.problem import make_problem
 from islands_service.runtime.epoch_scheduler import EpochTask, schedule_islands
@@ -121,9 +120,9 @@ def test_islands_evolve_as_in_the_serial_engine_despite_losses(evolving, first, 
     whole = list(SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False))
     start = empty_archipelago(3, SEED) if first is None else whole[first].archipelago
     whole = whole if first is None else whole[first + 1 :]
-    scheduler, evaluator, choose = (
+    scheduler, evolution, choose = (
         schedule_islands(evolving, start, keep_epoch),
-        Evaluator(evolving.record, evolving.settings),
+        evolving.open(),
         random.Random(seed),
     )
     out, found, losses = [], [], 0
@@ -149,7 +148,7 @@ def test_islands_evolve_as_in_the_serial_engine_despite_losses(evolving, first, 
             scheduler.known[source][task.begin].emigrants for source in scheduler.sources[task.island]
         ]
         island = scheduler.known[task.island][task.begin].island
-        scheduler.complete(task, run_epoch(island, arriving, evaluator, evolving, lambda: False))
+        scheduler.complete(task, run_epoch(island, arriving, evolution, lambda: False))
         found += scheduler.completed_epochs()
     assert losses > 0
     assert len(found) == len(whole)
