@@ -83,7 +83,7 @@ def fit(
         Class of the models: ``narx``, or an entry of ``MODEL_CLASSES``.
     structure : str
         Structure of latent models, which has zeros: ``wiener``, ``hammerstein``, ``feedback``, or ``auto``
-        for any. See `search_latent_models`.
+        for any.
     library : str
         An entry of ``LIBRARIES``, such as ``phi-polynomial`` for hysteresis or ``polynomial`` for smooth
         systems. ``auto`` fits several libraries and takes the best one, as the preset ``auto`` does.

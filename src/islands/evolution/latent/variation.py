@@ -33,7 +33,7 @@ _OFFSET, _EFFECT, _DISTURBANCE = 0.7, 1e-3, 0.3
 _INHERITED = 0.5
 
 #: Least and largest pole of a new state, and the coupling with the others.
-_POLES, _COUPLING = (0.3, 0.9995), 1e-2
+_POLES, _COUPLING = (0.3, 0.9995), 1e-3
 
 #: Rows of a block on which the states of two systems are compared, at most.
 _COMPARED_ROWS = 1_500

@@ -1,0 +1,66 @@
+"""Blocks of a record and the error on held-out rows."""
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset, join
+from islands.data.input_lead import advance_all_inputs
+from islands.estimation.fitted_state_space import Draft
+from islands.estimation.latent_data import make_latent_data, measure_held_out
+from islands.models.latent import StateSpaceLayout
+from support.latent_systems import spring_record
+
+
+def make(record):
+    return make_latent_data(advance_all_inputs(record))
+
+
+@pytest.mark.parametrize("samples", [240, 3000, 30_000])
+def test_every_row_is_in_one_block(samples):
+    record = spring_record(samples)
+    data = make(record)
+    # The first sample lacks its input.
+    assert sum(len(block.y) for block in data.whole) == samples - 1
+    assert max(len(block.y) for block in data.used) <= 1200
+    assert max(len(block.y) for block in data.final) <= 4000
+    for used, final, whole in zip(data.used, data.final, data.whole, strict=True):
+        assert len(used.y) <= 0.8 * len(whole.y) + 1
+        assert np.array_equal(used.y, whole.y[: len(used.y)])
+        assert np.array_equal(final.u, whole.u[: len(final.u)])
+
+
+def test_blocks_do_not_cross_segments():
+    data = make(join([spring_record(700), spring_record(300, seed=3)]))
+    assert [len(block.y) for block in data.whole] == [699, 299]
+
+
+def test_signals_have_the_standard_deviation_1():
+    data = make(spring_record(500))
+    assert data.record.y.std() == pytest.approx(1.0)
+    assert data.record.u.std() == pytest.approx(1.0)
+
+
+def fit_bistable(weight, data):
+    """Return a fit of a state with the gain 0.5 + 1.2 weight at zero: above 1 it has two equilibria."""
+    layout = StateSpaceLayout(1, 1, 1)
+    theta = np.zeros(len(layout.names))
+    values = {"a1_1": 0.5, "b1": 0.01, "c1": 1.0, "e1_1": 1.2, "w1_1": weight}
+    for name, value in values.items():
+        theta[layout.names.index(name)] = value
+    free = theta != 0.0
+    return Draft(layout, ("tanh",), theta, free, np.zeros((len(data.used), 1))).begin(data.used)
+
+
+def test_a_second_equilibrium_has_a_large_error():
+    u = np.random.default_rng(0).standard_normal(1000)
+    data = make(Dataset(u, u, 1.0))
+    one, two = (measure_held_out(fit_bistable(weight, data), data) for weight in (0.2, 1.0))
+    assert one < 1.5 * np.var(u)
+    assert two > 3.0 * np.var(u)
+
+
+def test_the_error_is_in_the_squared_unit_of_the_output():
+    u = np.random.default_rng(0).standard_normal(1000)
+    small, large = (make(Dataset(u, factor * u, 1.0)) for factor in (1.0, 1e3))
+    errors = [measure_held_out(fit_bistable(0.2, each), each) for each in (small, large)]
+    assert errors[1] == pytest.approx(1e6 * errors[0])

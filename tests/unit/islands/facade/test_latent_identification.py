@@ -1,0 +1,128 @@
+"""Identification of latent models: the structure of the system, the same result every time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.evolution.presets import resolve_settings
+from islands.facade.identify import identify_record
+from islands.progress import StoppedError
+from islands.simulation.predictors import free_run
+from support.latent_systems import smooth_input, spring_record
+
+#: A search that takes a second.
+SHORT = {"population": 8, "generations": 4, "migrate_every": 2}
+
+
+def identify(record, **changes):
+    return identify_record(record, preset="latent", **{**SHORT, **changes})
+
+
+def rmse(model, record):
+    run = free_run(model, record, 100)
+    return float(np.sqrt(np.mean((run.y - record.y)[100:] ** 2)))
+
+
+def saturated_record(samples, seed):
+    """Return a record of two lags behind a saturation of the input, with noise of 0.01."""
+    u, x, y = 1.5 * smooth_input(samples, seed), np.zeros(2), np.empty(samples)
+    for k in range(samples):
+        y[k] = x[0]
+        x = np.array([0.9 * x[0] + 0.2 * x[1], 0.7 * x[1] + 0.3 * np.clip(u[k], -1.0, 1.0)])
+    return Dataset(u, y + 0.01 * np.random.default_rng(seed + 50).standard_normal(samples), 0.01)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return identify(spring_record(400, noise=0.02))
+
+
+@pytest.mark.ci
+def test_the_cubic_spring_is_found():
+    found = identify_record(spring_record(1200, noise=0.02), preset="latent")
+    best = found.best.model
+    assert (best.order, best.units) == (2, ("cube",))
+    assert rmse(best, spring_record(1500, noise=0.02, seed=9)) == pytest.approx(0.02, rel=0.1)
+    assert "resonance at 5.1" in best.equation().plain
+    # The unit reads the states, so the system is no Hammerstein system.
+    assert any(name.startswith("w1") for name in best.names)
+
+
+@pytest.mark.nightly
+def test_a_saturation_of_the_input_is_found():
+    best = identify_record(saturated_record(1200, 1), preset="latent").best.model
+    assert rmse(best, saturated_record(1500, 7)) == pytest.approx(0.01, rel=0.15)
+
+
+@pytest.mark.ci
+def test_the_same_seed_gives_the_same_models(result):
+    again = identify(spring_record(400, noise=0.02))
+    assert [each.model for each in again.models] == [each.model for each in result.models]
+    assert again.search_result.search.history == result.search_result.search.history
+
+
+@pytest.mark.ci
+def test_a_search_that_continues_has_the_same_result(result):
+    states = []
+    identify(spring_record(400, noise=0.02), on_epoch=lambda state, _settings: states.append(state))
+    assert [state.archipelago.generation for state in states] == [0, 2, 4]
+    continued = identify(spring_record(400, noise=0.02), start=states[1])
+    assert [each.model for each in continued.models] == [each.model for each in result.models]
+    with pytest.raises(SettingsError, match="another seed"):
+        identify(spring_record(400, noise=0.02), start=states[1], seed=1)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(("structure", "absent"), [("wiener", "e"), ("hammerstein", "w"), ("feedback", "f")])
+def test_a_structure_has_its_zeros(structure, absent):
+    found = identify(saturated_record(400, 1), structure=structure)
+    assert any(each.model.units for each in found.models)
+    for each in found.models:
+        assert not any(name.startswith(absent) for name in each.model.names)
+        assert np.isfinite(rmse(each.model, saturated_record(300, 7)))
+
+
+@pytest.mark.ci
+def test_a_fit_of_latent_models_has_the_models_of_the_preset():
+    record = spring_record(160, noise=0.02)
+    fitted, searched = islands.fit(record, model="latent"), identify_record(record, preset="latent")
+    assert [each.model for each in fitted.models] == [each.model for each in searched.models]
+    assert (fitted.settings["method"], searched.settings["method"]) == ("fit", "identify")
+
+
+@pytest.mark.ci
+def test_a_stop_keeps_the_models_so_far():
+    calls = iter(range(10_000))
+    found = identify(spring_record(400, noise=0.02), stop=lambda: next(calls) > 8)
+    assert found.models
+    assert all(np.isfinite(each.model.parameters).all() for each in found.models)
+    assert found.search_result.search.ended_by == "stopped"
+    with pytest.raises(StoppedError):
+        identify(spring_record(400, noise=0.02), stop=lambda: True)
+
+
+@pytest.mark.nightly
+def test_units_of_the_record_do_not_matter():
+    record = spring_record(400, noise=0.02)
+    scaled = replace(record, u=1e3 * record.u + 5.0, y=1e-6 * record.y - 2.0)
+    models = [identify(each).models[0].model for each in (record, scaled)]
+    runs = [free_run(each, data, 60).y[60:] for each, data in zip(models, (record, scaled), strict=True)]
+    assert runs[1] == pytest.approx(1e-6 * runs[0] - 2.0, abs=1e-10)
+
+
+def test_a_record_that_is_too_short_has_no_models():
+    with pytest.raises(SettingsError, match="the record is too short, or a column is constant"):
+        identify(spring_record(16))
+
+
+def test_settings_of_narx_models_are_refused():
+    with pytest.raises(
+        SettingsError, match="max_terms is a setting of NARX models, not of the preset latent"
+    ):
+        resolve_settings("latent", {"max_terms": 3})
+    with pytest.raises(SettingsError, match="unknown structure 'phi'"):
+        resolve_settings("latent", {"structure": "phi"})
