@@ -83,7 +83,7 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
             library_degree=3,
         ),
         LATENT: Settings(
-            model=LATENT,
+            model_class=LATENT,
             structure="auto",
             constraints="none",
             population=24,
@@ -114,10 +114,10 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 )
 
 
-#: Settings of latent models. A change of any other one has no effect on them.
+#: Settings of latent models. Any other one has no effect on them, and cannot be changed.
 LATENT_SETTINGS = frozenset(
     {
-        *("model", "structure", "population", "generations", "elite", "crossover", "tournament", "islands"),
+        *("model_class", "structure", "population", "generations", "elite", "crossover", "tournament", "islands"),
         *(
             "topology",
             "migrate_every",
@@ -236,9 +236,9 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     if preset == AUTO:
         raise SettingsError("the preset auto needs the record of one output: name another preset")
     base = lookup({AUTO: _PAPER, **PRESETS}, preset, "preset")
-    for name in changes:
+    for name, value in changes.items():
         lookup(_SETTING_NAMES, name, "setting")
-        if base.model == LATENT and name not in LATENT_SETTINGS:
+        if base.model_class == LATENT and name not in LATENT_SETTINGS and value != getattr(base, name):
             raise SettingsError(
                 f"{name} is a setting of NARX models, not of the preset {preset}: leave it out, or take "
                 "another preset"
@@ -260,7 +260,7 @@ def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Setting
         As for `resolve_settings`, or a setting is for one output.
     """
     name = COUPLED_PRESET if preset == AUTO else preset
-    if lookup({AUTO: _PAPER, **PRESETS}, name, "preset").model == LATENT:
+    if lookup({AUTO: _PAPER, **PRESETS}, name, "preset").model_class == LATENT:
         raise SettingsError(f"the preset {name} is for one output: name one output, or take another preset")
     settings = resolve_settings(name, {"feedthrough": "no", **changes})
     check_coupled_settings(settings.constraints, settings.feedthrough)

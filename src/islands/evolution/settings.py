@@ -190,7 +190,7 @@ class Settings:
     target_error : float
         The run ends after the first epoch in which an individual has at most this RMSE, in the unit of the
         output; 0 for no target.
-    model : str
+    model_class : str
         Class of the models: ``narx`` or ``latent``. Latent models have the settings of the populations, of
         the islands and of the end of a search, and `structure`; all others are those of NARX models.
     """
@@ -263,7 +263,7 @@ class Settings:
     )
     max_evaluations: int = _option(0, "Stop after the epoch that reaches this number of individuals.")
     target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE, in the output's unit.")
-    model: str = NARX
+    model_class: str = NARX
 
     def __post_init__(self) -> None:
         check_sequences(
@@ -299,7 +299,7 @@ class Settings:
         check_delays(self.library_delays)
         check_average(self.average)
         check_feedthrough(self.feedthrough)
-        structures = lookup(_STRUCTURES, self.model, "class of models")
+        structures = lookup(_STRUCTURES, self.model_class, "class of models")
         lookup(structures, self.structure, "structure")
         check_texts(constraints=self.constraints)
         constraint(self.constraints)

@@ -207,7 +207,7 @@ def identify_record(
     else:
         settings = resolve_settings(preset, with_tuples(changes))
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
-    if settings.model == LATENT:
+    if settings.model_class == LATENT:
         described = {"method": "identify", "preset": preset, "validation": held_out}
         return Result.from_search(
             identify_latent(

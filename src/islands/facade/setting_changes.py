@@ -54,4 +54,4 @@ class SettingChanges(TypedDict, total=False):
     characters: Sequence[str]
     max_evaluations: int
     target_error: float
-    model: str
+    model_class: str
