@@ -8,11 +8,10 @@ Hammerstein and feedback systems are structures of one class (nonlinear linear-f
 Schoukens and Toth, Automatica 113 (2020) 108731).
 """
 
-from cmath import log
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi, prod
+from math import prod
 from types import MappingProxyType
 from typing import Any, ClassVar, TypeVar
 
@@ -21,6 +20,8 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
 from islands.errors import ModelError
+from islands.models.equations import signal_names
+from islands.models.linear_system import LinearSystem, describe_poles
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
@@ -196,34 +197,69 @@ class LatentModel(ParametricModel):
         """The states rest at the operating point before the first prediction, unless they are estimated."""
         return tuple(repr(float(value)) for value in self.rest)
 
-    @cached_property
+    @property
     def rest(self) -> NDArray[np.float64]:
         """States at rest at the operating point, shape (states,); zeros if they are not found."""
+        return np.zeros(self.order) if self._rest is None else self._rest
+
+    @cached_property
+    def _rest(self) -> NDArray[np.float64] | None:
         x = np.zeros(self.order)
         for _ in range(_REST_STEPS):
-            change, jacobian = self._linearise(x)
+            after, system = self._linearise(x)
             try:
-                step = np.linalg.solve(np.eye(self.order) - jacobian, change - x)
+                step = np.linalg.solve(np.eye(self.order) - system.a, after - x)
             except np.linalg.LinAlgError:
-                break
+                return None
             x = x + step
             if not np.isfinite(x).all():
-                break
+                return None
             if np.abs(step).max() <= _STILL * max(1.0, np.abs(x).max()):
                 return x
-        return np.zeros(self.order)
+        return None
 
-    def _linearise(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the next states at the operating point, and their derivatives."""
+    @property
+    def operating_point(self) -> str:
+        """Where the model is linearised, with the columns of the record: ``rest at u_V = 0.1``."""
+        return self._name_point(signal_names(self)[1:])
+
+    def _name_point(self, names: Sequence[str]) -> str:
+        pairs = zip(names, self.operating_inputs, strict=True)
+        where = "rest" if self._rest is not None else "states of zero, since no rest was found,"
+        return f"{where} at {', '.join(f'{name} = {value:.4g}' for name, value in pairs)}"
+
+    @cached_property
+    def matrices(self) -> Mapping[str, NDArray[np.float64]]:
+        """Blocks of the parameters by name, as in the equations, with the weights W and V apart.
+
+        The shapes are (states, states) of A, (states, inputs) of B, (states, units) of E, (units, states) of
+        W, (units, inputs) of V, and one dimension for C, D, F, s, o and level.
+        """
+        blocks = self.layout.split(self.theta)
+        weights = blocks["W"]
+        return {**blocks, "W": weights[:, : self.order], "V": weights[:, self.order :]}
+
+    def linearise(self, x: NDArray[np.float64]) -> LinearSystem:
+        """Return the linear system of small deviations from the operating point with the states ``x``."""
+        return self._linearise(x)[1]
+
+    def _linearise(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], LinearSystem]:
+        """Return the next states at the operating point, and the linear system there."""
         # A command that does not simulate loads no kernels.
         from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415
 
-        blocks, u = self.layout.split(self.theta), np.array(self.operating_inputs)
-        a, e, w = blocks["A"], blocks["E"], blocks["W"]
-        arguments = w @ np.concatenate([x, u]) + blocks["s"]
+        of, u = self.matrices, np.array(self.operating_inputs)
+        arguments = of["W"] @ x + of["V"] @ u + of["s"]
         pairs = [evaluate_unit(code, s) for code, s in zip(self.codes, arguments, strict=True)]
         values, slopes = np.array(pairs).reshape(-1, 2).T
-        return a @ x + blocks["B"] @ u + e @ values + blocks["o"], a + (e * slopes) @ w[:, : self.order]
+        on_states, on_output = of["E"] * slopes, of["F"] * slopes
+        system = LinearSystem(
+            a=of["A"] + on_states @ of["W"],
+            b=of["B"] + on_states @ of["V"],
+            c=of["C"] + on_output @ of["W"],
+            d=of["D"] + on_output @ of["V"],
+        )
+        return of["A"] @ x + of["B"] @ u + of["E"] @ values + of["o"], system
 
     @property
     def reads_at_once(self) -> bool:
@@ -249,18 +285,19 @@ class LatentModel(ParametricModel):
     def equation(self) -> EquationText:
         """Return the equations as text, with the values of the parameters and with the units as signals."""
         written = self.write_equation(*self._display())
-        modes = self.describe_modes()
-        ends = f"\n{modes}" if modes else ""
-        return replace(written, plain=written.plain + ends, named=written.named + ends)
+        if not (modes := self.describe_modes()):
+            return written
+        plain, named = (
+            f"\nabout {self._name_point(names)}: {'; '.join(modes)}"
+            for names in (symbols(self.inputs)[1:], signal_names(self)[1:])
+        )
+        return replace(written, plain=written.plain + plain, named=written.named + named)
 
-    def describe_modes(self) -> str:
+    def describe_modes(self) -> tuple[str, ...]:
         """State the time constants and resonances at rest at the operating point; empty without a time."""
         if self.dt is None:
-            return ""
-        poles = map(complex, np.linalg.eigvals(self._linearise(self.rest)[1]))
-        inputs = zip(symbols(self.inputs)[1:], self.operating_inputs, strict=True)
-        point = ", ".join(f"{name} = {value:.4g}" for name, value in inputs)
-        return f"about rest at {point}: {_describe_poles(poles, self.dt)}"
+            return ()
+        return describe_poles(self.linearise(self.rest).poles, self.dt)
 
     def _display(self) -> tuple[dict[str, str], tuple[str, ...]]:
         """Return the right sides of all displayed signals with numbers, and the names of the units."""
@@ -345,31 +382,19 @@ def read_at_once(names: Sequence[str]) -> bool:
     return any(name[0] == "d" or (name[0] == "v" and name[1:].split("_")[0] in units) for name in names)
 
 
+def evaluate_curve(unit: str, arguments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the values of the function of a unit, an entry of ``UNITS``, for arguments of any shape."""
+    from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415 - see `LatentModel`
+
+    (code,) = find_codes([unit])
+    values = [evaluate_unit(code, s)[0] for s in np.ravel(arguments).tolist()]
+    return np.array(values, dtype=np.float64).reshape(np.shape(arguments))
+
+
 def find_codes(units: Sequence[str]) -> NDArray[np.int64]:
     """Return the codes of units for the kernel."""
     names = list(UNITS)
     return np.array([names.index(unit) for unit in units], np.int64)
-
-
-def _describe_poles(poles: Iterable[complex], dt: float) -> str:
-    """State the time constants and resonances of poles, slowest first."""
-    stated = []
-    for pole in sorted(poles, key=lambda each: (-abs(each), -each.imag)):
-        rate = log(pole) / dt if pole else 0j
-        if pole.imag < 0.0:
-            continue
-        if not pole:
-            stated.append("a delay of one sample")
-        elif pole.imag > 0.0:
-            frequency, damping = abs(rate) / (2.0 * pi), -rate.real / abs(rate)
-            stated.append(f"resonance at {frequency:.4g} Hz with a damping ratio of {damping:.3g}")
-        elif pole.real < 0.0:
-            stated.append(f"an alternating mode (pole {pole.real:.4g})")
-        elif pole.real >= 1.0:
-            stated.append(f"a mode that does not decay (pole {pole.real:.6g})")
-        else:
-            stated.append(f"time constant {-1.0 / rate.real:.4g} s")
-    return "; ".join(stated)
 
 
 def _name_factor(name: str, factor: str) -> str:
