@@ -257,7 +257,8 @@ def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     """Render the figures and the report of a search; return them by artefact name."""
     made = _save_all({name: SEARCH_FIGURES[name](found) for name in search_figures(found)})
     entry = found.recommended
-    model = _save_all({name: FIGURES[name](entry, found.split) for name in model_figures(found)})
+    names = model_figures(found, entry.model)
+    model = _save_all({name: FIGURES[name](entry, found.split) for name in names})
     equation = entry.model.equation().mathml
     report = identification_report(_origin(job), result_document(found), equation, {**model, **made})
     return {**made, REPORT: report}
@@ -270,7 +271,8 @@ def _origin(job: Job) -> Origin:
 def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
-    drawn = {f"{rank}/{name}": FIGURES[name](entry, found.split) for name in model_figures(found)}
+    names = model_figures(found, entry.model)
+    drawn = {f"{rank}/{name}": FIGURES[name](entry, found.split) for name in names}
     return _save_all(drawn) | write_free_run(entry, found.split.validation, rank)
 
 

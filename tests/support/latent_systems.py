@@ -3,7 +3,7 @@
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.models.latent import LatentModel
+from islands.models.latent import LatentModel, StateSpaceLayout
 
 #: Parameters of a resonance with a cubic spring.
 SPRING = {
@@ -29,6 +29,22 @@ def make_model(parameters=SPRING, units=("cube",), order=2, **changes) -> Latent
         wiring=tuple(parameters),
         parameters=tuple(parameters.values()),
         **{"operating_inputs": (0.0,), **fields, **changes},
+    )
+
+
+def make_large_model() -> LatentModel:
+    """Return a stable model of three inputs with long names, six units, and blocks that are zero in part."""
+    layout, rng = StateSpaceLayout(6, 3, 6), np.random.default_rng(1)
+    zero = {*(f"b{row}_3" for row in range(1, 7)), *(f"e{row}_4" for row in range(1, 7)), "f1", "f3"}
+    zero |= {"d1", "d2", *(f"w2_{state}" for state in range(1, 7)), "v1_1", "v1_2", "v1_3", "v3_2"}
+    names = [name for name in layout.names if name not in zero]
+    return make_model(
+        dict(zip(names, (0.1 * rng.standard_normal(len(names))).tolist(), strict=True)),
+        ("tanh", "square", "hinge", "dead zone", "saturation", "bell"),
+        6,
+        input_names=("u0_V+1", "ambient temperature (degC)+1", "u2_V+1"),
+        output_name="outlet temperature (degC)",
+        operating_inputs=(0.1, 0.2, 0.3),
     )
 
 

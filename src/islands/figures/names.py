@@ -8,8 +8,17 @@ from islands.errors import SettingsError
 
 FREE_RUN = "free-run"
 
-#: Figures of a model on its validation data; ``loop`` if the output over the input is a loop.
-MODEL_FIGURES = (FREE_RUN, "loop", "hold", "residuals")
+#: The figure of a model that needs a loop.
+LOOP = "loop"
+
+#: The figure of a latent model that needs units.
+CURVES = "curves"
+
+#: Figures of a latent model: block diagram, curves of the units, frequency response of the linear part.
+LATENT_FIGURES = ("structure", CURVES, "bode")
+
+#: Figures of a model on its data; see `islands.figures.availability`.
+MODEL_FIGURES = (FREE_RUN, *LATENT_FIGURES, LOOP, "hold", "residuals")
 
 #: Figures of a search: ``convergence`` of an evolution, ``islands`` of several islands.
 SEARCH_FIGURES = ("record", "front", "convergence", "islands")

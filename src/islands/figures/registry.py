@@ -10,14 +10,19 @@ from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError, lookup
+from islands.errors import ModelError, SettingsError, lookup
 from islands.evolution.search_result import SearchResult
+from islands.figures.availability import list_model_figures
+from islands.figures.bode import draw_bode
 from islands.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
+from islands.figures.latent_structure import draw_structure
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
+from islands.figures.unit_curves import draw_unit_curves
+from islands.models.latent import LatentModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment, assess_residual
@@ -45,6 +50,29 @@ def _hold_on(model: DynamicModel, record: Dataset, _warm_up: int, _bands: Predic
     return draw_holds(model, record)
 
 
+def _structure_on(
+    model: DynamicModel, _record: Dataset, _warm_up: int, _bands: PredictionBands | None
+) -> Figure:
+    return draw_structure(_require_latent(model))
+
+
+def _curves_on(model: DynamicModel, record: Dataset, warm_up: int, bands: PredictionBands | None) -> Figure:
+    ensemble = None if bands is None else bands.ensemble
+    return draw_unit_curves(_require_latent(model), record, warm_up, ensemble)
+
+
+def _bode_on(model: DynamicModel, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
+    return draw_bode(_require_latent(model), record)
+
+
+def _require_latent(model: DynamicModel) -> LatentModel:
+    if not isinstance(model, LatentModel):
+        raise ModelError(
+            f"the figures structure, curves and bode are of latent models, not of {model.kind} ones"
+        )
+    return model
+
+
 def _residuals_on(
     model: DynamicModel, record: Dataset, warm_up: int, _bands: PredictionBands | None
 ) -> Figure:
@@ -53,7 +81,15 @@ def _residuals_on(
 
 #: Figures of a model on any record, by the names of `FIGURES`.
 RECORD_FIGURES: Mapping[str, RecordFigure] = MappingProxyType(
-    {"free-run": _free_run_on, "loop": _loop_on, "hold": _hold_on, "residuals": _residuals_on}
+    {
+        "free-run": _free_run_on,
+        "structure": _structure_on,
+        "curves": _curves_on,
+        "bode": _bode_on,
+        "loop": _loop_on,
+        "hold": _hold_on,
+        "residuals": _residuals_on,
+    }
 )
 
 #: Figures that one axes can hold, without their secondary panels.
@@ -110,6 +146,23 @@ def _free_run(entry: Assessment, split: Split) -> Figure:
     return _free_run_on(entry.model, split.validation, entry.warm_up, entry.bands)
 
 
+def _structure(entry: Assessment, _split: Split) -> Figure:
+    """Draw the block diagram of a latent model."""
+    return draw_structure(_require_latent(entry.model))
+
+
+def _curves(entry: Assessment, split: Split) -> Figure:
+    """Draw the curves of the units of a latent model over the arguments of both parts of the data."""
+    ensemble = None if entry.bands is None else entry.bands.ensemble
+    model = _require_latent(entry.model)
+    return draw_unit_curves(model, split.estimation, entry.warm_up, ensemble, split.validation)
+
+
+def _bode(entry: Assessment, split: Split) -> Figure:
+    """Draw the frequency response of a latent model at rest."""
+    return _bode_on(entry.model, split.estimation, entry.warm_up, None)
+
+
 def _loop(entry: Assessment, split: Split) -> Figure:
     """Draw the measured output and the free run against every input."""
     return _loop_on(entry.model, split.validation, entry.warm_up, None)
@@ -133,16 +186,21 @@ def _draw_residuals(tests: ResidualTests, structure: ResidualStructure) -> Figur
 
 
 FIGURES: Mapping[str, ModelFigure] = MappingProxyType(
-    {"free-run": _free_run, "loop": _loop, "hold": _hold, "residuals": _residuals}
+    {
+        "free-run": _free_run,
+        "structure": _structure,
+        "curves": _curves,
+        "bode": _bode,
+        "loop": _loop,
+        "hold": _hold,
+        "residuals": _residuals,
+    }
 )
 
-#: The figure that needs a loop.
-_LOOP = "loop"
 
-
-def model_figures(result: SearchResult) -> tuple[str, ...]:
-    """Return the names of the figures of a model that can be drawn for a result."""
-    return tuple(name for name in FIGURES if name != _LOOP or result.has_loop)
+def model_figures(result: SearchResult, model: DynamicModel) -> tuple[str, ...]:
+    """Return the names of the figures that can be drawn for a model of a result."""
+    return list_model_figures(model, result.has_loop)
 
 
 def _record(result: SearchResult) -> Figure:

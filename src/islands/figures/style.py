@@ -15,6 +15,7 @@ from typing import IO, Any
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter
@@ -169,9 +170,14 @@ def save(figure: Figure, path: str | Path | IO[bytes]) -> None:
 def set_log_scale(axes: Axes) -> None:
     """Set a logarithmic axis of errors, upwards, with plain numbers."""
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    write_plain_numbers(axes.yaxis)
+
+
+def write_plain_numbers(axis: Axis) -> None:
+    """Write the numbers of a logarithmic axis without powers, which the style does not typeset."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     # A range within one decade may contain no power of ten, so label minor ticks, too.
-    axes.yaxis.set_minor_formatter(_PlainLogFormatter(minor_thresholds=(1.0, 0.5)))
+    axis.set_minor_formatter(_PlainLogFormatter(minor_thresholds=(1.0, 0.5)))
 
 
 class _PlainLogFormatter(LogFormatter):

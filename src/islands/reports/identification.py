@@ -25,6 +25,13 @@ from islands.reports.term_table import list_terms
 #: Caption of the figure below the headline.
 _OVERLAY = {"free-run.svg": "Free run of the recommended model over the validation data"}
 
+#: Captions of the figures of latent models, below the equation.
+_LATENT_FIGURES = {
+    "structure.svg": "Structure: an arrow for each block of parameters that is not zero",
+    "curves.svg": "Curves of the units",
+    "bode.svg": "Frequency response for small deviations from rest",
+}
+
 #: Captions of the figures that assess every model, and of those of hysteresis alone.
 _FIGURES = {"residuals.svg": "Correlations of the one-step-ahead residual"}
 _HYSTERESIS_FIGURES = {
@@ -74,6 +81,7 @@ def identification_report(
         equation=Markup(equation),
         plain=_write_equation(facts.model),
         units=describe_units(document),
+        structure=_inline(_LATENT_FIGURES, figures),
         terms=list_terms(facts.model["terms"]),
         unit=facts.unit,
         errors=_list_errors(facts),

@@ -6,6 +6,9 @@ import { makeFileLinks } from "./figure_files.js";
 
 const TITLES = {
   "free-run": "Free run",
+  structure: "Structure",
+  curves: "Curves of the units",
+  bode: "Frequency response at rest",
   loop: "Output over input",
   hold: "Held input",
   residuals: "Residual correlations",

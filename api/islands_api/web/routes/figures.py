@@ -12,7 +12,10 @@ import structlog
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import IslandsError, suggest
+from islands.figures.availability import list_model_figures
 from islands.figures.names import MODEL_FIGURES, SEARCH_FIGURES
+from islands.io.models import model_from_json
+from islands.models.latent import LatentModel
 from islands_api.result_schemas import FreeRun
 from islands_api.schemas import Names
 from islands_api.web.auth import Principal, Reader
@@ -36,6 +39,7 @@ from islands_service.intake.confined_process import REQUESTS
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import StorageFullError, StoreUnavailableError
+from islands_service.store.results import StoredModel
 
 log = structlog.get_logger()
 
@@ -43,9 +47,6 @@ router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES, rou
 
 #: The figure that exists only for searches with several islands.
 _MULTI_ISLAND_FIGURE = "islands"
-
-#: The figure that exists only if the output over the input is a loop.
-_LOOP_FIGURE = "loop"
 
 #: Timeout in seconds of a figure process, which blocks the figures of all other jobs.
 _DRAWING_TIMEOUT = 120.0
@@ -156,17 +157,16 @@ async def search_figure_table(job: Id, figure: SearchFigure, caller: Reader, sta
 @router.get("/{job}/models/{rank}/figures", response_model=Names)
 async def model_figures(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
     """List the names of the figures of a model."""
-    await get_model(state, caller, job, rank)
-    return {"items": await _list_model_figures(state, job)}
+    return {"items": await _list_model_figures(state, job, await get_model(state, caller, job, rank))}
 
 
 @router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG_RESPONSES)
 async def model_figure(
     job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
 ) -> Response:
-    """Return a figure of a model: free run, hysteresis loop, holds, or residual correlations."""
-    await get_model(state, caller, job, rank)
-    _check_figure(figure, await _list_model_figures(state, job))
+    """Return a figure of a model, such as its free run or its residual correlations."""
+    found = await get_model(state, caller, job, rank)
+    _check_figure(figure, await _list_model_figures(state, job, found))
     return await _figure_response(state, caller, job, f"{rank}/{figure}.svg", rank)
 
 
@@ -175,8 +175,8 @@ async def model_figure_table(
     job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
 ) -> Response:
     """Return the points of the lines of a figure of a model."""
-    await get_model(state, caller, job, rank)
-    _check_figure(figure, await _list_model_figures(state, job))
+    found = await get_model(state, caller, job, rank)
+    _check_figure(figure, await _list_model_figures(state, job, found))
     return await _figure_response(state, caller, job, f"{rank}/{figure}.csv", rank, _CSV)
 
 
@@ -234,13 +234,14 @@ async def _list_search_figures(state: AppState, caller: Principal, job: str) -> 
     return tuple(name for name in SEARCH_FIGURES if several or name != _MULTI_ISLAND_FIGURE)
 
 
-async def _list_model_figures(state: AppState, job: str) -> tuple[str, ...]:
+async def _list_model_figures(state: AppState, job: str, found: StoredModel) -> tuple[str, ...]:
     # Results of earlier versions do not say whether there is a loop, and have the figure.
     document = await state.run_blocking(state.store.results.document, job) or {}
     if "outputs" in document:
         return tuple(f"free-run-{number + 1}" for number in range(len(document["outputs"])))
-    loop = document.get("loop", True)
-    return tuple(name for name in MODEL_FIGURES if loop or name != _LOOP_FIGURE)
+    is_latent = found.document.get("kind") == LatentModel.kind
+    model = model_from_json(found.file, f"model {found.rank}") if is_latent else None
+    return list_model_figures(model, document.get("loop", True))
 
 
 async def _count_outputs(state: AppState, job: str) -> int:

@@ -234,7 +234,7 @@ class Result:
 
         folder.mkdir(parents=True, exist_ok=True)
         drawn: dict[str, Callable[[], Figure]] = {
-            kind: partial(self.best.plot, kind) for kind in model_figures(self.search_result)
+            kind: partial(self.best.plot, kind) for kind in model_figures(self.search_result, self.best.model)
         }
         for name in search_figures(self.search_result):
             drawn[name] = partial(SEARCH_FIGURES[name], self.search_result)

@@ -149,7 +149,7 @@ def test_model_draws_every_figure(result, kind):
 
 
 def test_unknown_figure_raises_settings_error(result):
-    with pytest.raises(SettingsError, match=r"unknown figure 'pie': take one of free-run, loop, "):
+    with pytest.raises(SettingsError, match=r"unknown figure 'pie': take one of free-run, structure, "):
         result.best.plot("pie")
 
 

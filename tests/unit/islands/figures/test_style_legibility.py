@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -12,15 +12,19 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.expressions.parsing import parse
+from islands.figures.bode import draw_bode
 from islands.figures.diagnosis import DIAGNOSIS_FIGURES
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop
+from islands.figures.latent_structure import draw_structure
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
+from islands.figures.unit_curves import draw_unit_curves
 from islands.models.narx import Model, make_model
 from islands.validation.residual_tests import residual_tests
 from support.contrast import DARK_PAPER, LINE_CONTRAST, contrast, shown_in_dark
+from support.latent_systems import make_large_model
 
 pytestmark = pytest.mark.ci
 
@@ -60,6 +64,10 @@ def diagnosis(samples: int, scale: float, dt: float):
 SHORT, LONG = record(200), record(20_000)
 TWO = record(600, inputs=2, segments=(350, 250))
 LARGE = record(5_000, scale=12_345.0, start=1e4)
+LATENT = make_large_model()
+NAMED = {"input_names": LATENT.column_names, "output_name": LATENT.output_name}
+NAMED |= {"input_units": ("V", "degC", "V"), "output_unit": "degC"}
+WARM, WARMER = (replace(record(300, 3, scale, 0.01), **NAMED) for scale in (1.0, 1.3))
 FIGURES: dict[str, "Callable[[], Figure]"] = {
     "a short run": lambda: draw_free_run(SHORT, 0.97 * SHORT.y),
     "a long run": lambda: draw_free_run(LONG, 0.97 * LONG.y, LONG_TITLE),
@@ -72,6 +80,9 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
     "a loop of four inputs": lambda: draw_loop(record(300, 4), np.full(300, np.nan), LONG_TITLE),
     "a drifting hold": lambda: draw_holds(leaking(0.9), LONG, LONG_TITLE),
     "a diverging hold": lambda: draw_holds(leaking(1.01), LARGE),
+    "a structure": lambda: draw_structure(LATENT),
+    "curves of six units": lambda: draw_unit_curves(LATENT, WARM, LATENT.memory, further=WARMER),
+    "a frequency response": lambda: draw_bode(LATENT, WARM),
     "residuals": lambda: draw_residual_correlations(residual_tests(SHORT.y, SHORT.u), LONG_TITLE),
     "residuals of two inputs": lambda: draw_residual_correlations(residual_tests(TWO.y, TWO.u)),
     "residuals of a constant": lambda: draw_residual_correlations(residual_tests(SHORT.y, 0 * SHORT.u)),
@@ -105,6 +116,7 @@ def fast(names: Iterable[str]) -> pytest.MarkDecorator:
 LAID_OUT = (
     *("a long run", "a run of two segments", "a loop of four inputs", "a diverging hold"),
     *("residuals of two inputs", DIAGNOSED[1]),
+    *("a structure", "curves of six units", "a frequency response"),
 )
 
 every_figure = fast(LAID_OUT)
@@ -173,9 +185,13 @@ def test_saving_twice_gives_equal_bytes(name, tmp_path):
 @every_figure
 def test_lines_have_a_contrast_of_three_in_both_colour_schemes(name):
     from matplotlib.colors import to_rgb
+    from matplotlib.patches import FancyArrowPatch, PathPatch
 
-    lines = [line for axes in drawn(name).figure.axes for line in axes.lines]
-    colours = {tuple(255 * each for each in to_rgb(line.get_color())) for line in lines}
+    lines = [line.get_color() for axes in drawn(name).figure.axes for line in axes.lines]
+    # A diagram has its lines as patches.
+    patches = [each for axes in drawn(name).figure.axes for each in axes.patches]
+    lines += [each.get_edgecolor() for each in patches if isinstance(each, FancyArrowPatch | PathPatch)]
+    colours = {tuple(255 * each for each in to_rgb(line)) for line in lines}
     assert colours
     for colour in colours:
         assert contrast(colour, (255, 255, 255)) >= LINE_CONTRAST, colour
