@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import islands
+from islands.figures.names import LATENT_FIGURES
 from islands_api.client import Client
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.coordinator.identification_job import run_identification_job
@@ -15,6 +16,7 @@ from islands_service.store.blobs import Blobs
 from support.command_line import succeed
 from support.gain_scheduled import TRUE, GainScheduledModel, make_record
 from support.job_runs import make_run
+from support.latent_systems import spring_record
 from support.stores import LONG, taken
 
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
@@ -45,11 +47,34 @@ def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
         rebuilt = read_search_result(stored, service.store, blobs, model.rank)
         drawn = render_model_figures(rebuilt, model.rank)
         assert {"1/free-run.svg", "1/free-run.json"} <= drawn.keys()
-        assert b"x1(k)" in render_figures(stored, rebuilt)[REPORT]
+        made = render_figures(stored, rebuilt)
+        assert b"x1(k)" in made[REPORT]
+        figures = service.client.get(f"/v1/jobs/{job.id}/figures").json()["items"]
+        assert figures == ["record", "front"]
+        assert {f"{name}.svg" for name in figures} <= made.keys()
         assert "slope = -0." in succeed("jobs", "watch", job.id, "--url", service.url)
         # The model is a simulation of a diagnosis.
         simulation = {"kind": "model", "model": document}
         assert client.diagnose(dataset, "u_V", "y_K", simulation).state == JobState.QUEUED
+
+
+def test_a_latent_model_has_figures_of_its_parts(service, tmp_path):
+    islands.write_record(spring_record(500, noise=0.02), tmp_path / "spring.csv")
+    with Client(service.url) as client:
+        job = client.submit(client.upload(tmp_path / "spring.csv"), "u_V", "y_mm", model="latent")
+        blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
+        outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
+        service.store.leases.finish(lease, outcome)
+        models = client.models(job)
+    assert {"h1(k)" in model.equation for model in models} == {False, True}
+    for model in models:
+        listed = service.client.get(f"/v1/jobs/{job.id}/models/{model.rank}/figures").json()["items"]
+        parts = ("structure", "curves", "bode") if "h1(k)" in model.equation else ("structure", "bode")
+        assert tuple(name for name in listed if name in LATENT_FIGURES) == parts
+        # Names of parameters are positions: they have another meaning in another structure.
+        assert all(term["inclusion"] is None for term in model.terms)
+    rebuilt = read_search_result(service.store.jobs.get(LOCAL_OWNER, job.id), service.store, blobs, 1)
+    assert {f"1/{name}.svg" for name in LATENT_FIGURES} <= render_model_figures(rebuilt, 1).keys()
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,9 @@ They are apart from the functions that draw them: the import of matplotlib would
 start of the service.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from islands.errors import SettingsError
 
 FREE_RUN = "free-run"
@@ -22,6 +25,9 @@ MODEL_FIGURES = (FREE_RUN, *LATENT_FIGURES, LOOP, "hold", "residuals")
 
 #: Figures of a search: ``convergence`` of an evolution, ``islands`` of several islands.
 SEARCH_FIGURES = ("record", "front", "convergence", "islands")
+
+#: Least number of islands of the searches that have a figure; others have it always.
+LEAST_ISLANDS: Mapping[str, int] = MappingProxyType({"convergence": 1, "islands": 2})
 
 #: Responses of a model; of a model with several equilibria, as of hysteresis, there are none.
 RESPONSES = ("characteristic", "step-response")

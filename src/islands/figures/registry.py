@@ -19,6 +19,7 @@ from islands.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
 from islands.figures.latent_structure import draw_structure
+from islands.figures.names import LEAST_ISLANDS
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.unit_curves import draw_unit_curves
@@ -213,12 +214,9 @@ SEARCH_FIGURES: Mapping[str, Callable[[SearchResult], Figure]] = MappingProxyTyp
     {"record": _record, "front": draw_front, "convergence": draw_convergence, "islands": draw_islands}
 )
 
-#: Smallest number of islands in the history that a figure needs.
-_MIN_ISLANDS = {"convergence": 1, "islands": 2}
-
 
 def search_figures(result: SearchResult) -> tuple[str, ...]:
     """Return the names of the search figures that can be drawn for a result."""
     history = result.search.history
     islands = len(history[-1].islands) if history else 0
-    return tuple(name for name in SEARCH_FIGURES if islands >= _MIN_ISLANDS.get(name, 0))
+    return tuple(name for name in SEARCH_FIGURES if islands >= LEAST_ISLANDS.get(name, 0))

@@ -23,6 +23,7 @@ from islands.io.result_text.summary_text import method_text, summary
 from islands.models.coupled_narx import AnyModel
 from islands.models.equations import named_signals, named_statement
 from islands.models.narx import Model, require_narx
+from islands.models.parametric import ParametricModel
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
 from islands.validation.assessment import PARTS, Assessment
@@ -188,10 +189,14 @@ def criterion_document(criterion: Criterion | None) -> dict[str, Any] | None:
 
 
 def terms_in_result(model: AnyModel, ensemble: Ensemble | None) -> list[dict[str, Any]]:
-    """Return the terms of a model as JSON values, with their text for readers and their inclusion."""
+    """Return the terms of a model as JSON values, with their text for readers and their inclusion.
+
+    Parameters with names have no inclusion: a name has another meaning in another structure.
+    """
     texts = zip(terms_document(model), model.equation().terms, model.parameter_names, strict=True)
+    counted = None if isinstance(model, ParametricModel) else ensemble
     return [
-        {**term, "term": text, "inclusion": None if ensemble is None else ensemble.inclusion(name)}
+        {**term, "term": text, "inclusion": None if counted is None else counted.inclusion(name)}
         for term, text, name in texts
     ]
 

@@ -70,6 +70,7 @@ def identification_report(
     verdicts = write_statements(VERDICTS, facts)
     assessing = _FIGURES | (_HYSTERESIS_FIGURES if facts.claims_hysteresis else {})
     rank = facts.recommended["rank"]
+    term_columns, terms = list_terms(facts.model["terms"], facts.has_named_parameters)
     text = TEMPLATES.get_template("report.html").render(
         origin=origin,
         sha256=facts.record["sha256"],
@@ -82,7 +83,8 @@ def identification_report(
         plain=_write_equation(facts.model),
         units=describe_units(document),
         structure=_inline(_LATENT_FIGURES, figures),
-        terms=list_terms(facts.model["terms"]),
+        term_columns=term_columns,
+        terms=terms,
         unit=facts.unit,
         errors=_list_errors(facts),
         sentences=[each for each in describe_findings(document) if each not in verdicts],

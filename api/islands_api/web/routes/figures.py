@@ -13,7 +13,7 @@ from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import IslandsError, suggest
 from islands.figures.availability import list_model_figures
-from islands.figures.names import MODEL_FIGURES, SEARCH_FIGURES
+from islands.figures.names import LEAST_ISLANDS, MODEL_FIGURES, SEARCH_FIGURES
 from islands.io.models import model_from_json
 from islands.models.latent import LatentModel
 from islands_api.result_schemas import FreeRun
@@ -44,9 +44,6 @@ from islands_service.store.results import StoredModel
 log = structlog.get_logger()
 
 router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES, route_class=StrictRoute)
-
-#: The figure that exists only for searches with several islands.
-_MULTI_ISLAND_FIGURE = "islands"
 
 #: Timeout in seconds of a figure process, which blocks the figures of all other jobs.
 _DRAWING_TIMEOUT = 120.0
@@ -230,8 +227,9 @@ async def _list_search_figures(state: AppState, caller: Principal, job: str) -> 
     document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
     if "outputs" in document:
         return ()
-    several = document["settings"]["islands"] > 1
-    return tuple(name for name in SEARCH_FIGURES if several or name != _MULTI_ISLAND_FIGURE)
+    # A fit of a class of models is no evolution.
+    islands = document["settings"].get("islands", 0)
+    return tuple(name for name in SEARCH_FIGURES if islands >= LEAST_ISLANDS.get(name, 0))
 
 
 async def _list_model_figures(state: AppState, job: str, found: StoredModel) -> tuple[str, ...]:

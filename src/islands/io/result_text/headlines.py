@@ -16,7 +16,8 @@ def write_headline(document: Document) -> str:
     """
     facts = ResultFacts(document)
     size, output = facts.model["size"], facts.record["names"]["output"]
-    terms = f"size {size}" if "kind" in facts.model else f"{size} term{'s' * (size != 1)}"
+    counted = "parameter" if facts.has_named_parameters else "term"
+    terms = f"{size} {counted}{'s' * (size != 1)}"
     error = facts.error()
     if error["rmse"] is None:
         return f"The free run of a model of {terms} diverges on the validation data of {output}"

@@ -22,11 +22,10 @@ def table(document: Document) -> list[str]:
 
 def columns(document: Document) -> tuple[str, ...]:
     """Return the headings; those of holds only if a model claims hysteresis."""
-    return (
-        *_COLUMNS[:-1],
-        *(_HYSTERESIS_COLUMNS if ResultFacts(document).claims_hysteresis else ()),
-        _COLUMNS[-1],
-    )
+    facts = ResultFacts(document)
+    rank, size, *errors, residuals = _COLUMNS
+    counted = "parameters" if facts.has_named_parameters else size
+    return rank, counted, *errors, *(_HYSTERESIS_COLUMNS if facts.claims_hysteresis else ()), residuals
 
 
 def rows(document: Document) -> list[tuple[str, ...]]:

@@ -388,6 +388,11 @@ class ResultFacts(RunFacts):
         """Dry friction of a model of a velocity."""
         return find_dry_friction(self.model["terms"], self.unit) if self.counts_samples else None
 
+    @property
+    def has_named_parameters(self) -> bool:
+        """Whether the models are of a class with named parameters in place of terms."""
+        return "kind" in self.model
+
     @cached_property
     def doubtful(self) -> list[tuple[str, float]]:
         """Terms that are not certain, each with the probability of its inclusion."""
@@ -621,6 +626,8 @@ def _describe_uncertainty(facts: ResultFacts) -> str:
     half = facts.write_amount(typical_half_width(facts.bands))
     text = f"Uncertainty: the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
     text += half
+    if facts.has_named_parameters:
+        return f"{text}."
     doubtful = [f"{term} {round_down(share)}" for term, share in facts.doubtful]
     if doubtful:
         return f"{text}; doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}."
@@ -807,8 +814,26 @@ def _describe_unlikely(facts: ResultFacts) -> str:
     )
 
 
+def _suggest_form(facts: ResultFacts) -> str:
+    """Return the hint of a steep nonlinearity that the residual does not show."""
+    form = "terms of another form (a higher degree, another library)"
+    if facts.has_named_parameters:
+        form = _name_other_class(facts)
+    times = f"{facts.one_step_ratio:.3g} times the noise level of {facts.names[0]}"
+    return f"try {form}: the error one step ahead is {times}"
+
+
+def _name_other_class(facts: ResultFacts) -> str:
+    """Return which models to try in place of those of a class with named parameters."""
+    fixed = "structure" in facts.document["settings"]
+    any_structure = f"any structure ({name_option('structure', 'auto')}), or " if fixed else ""
+    return f"{any_structure}another class of models, as NARX ({name_option('model', 'narx')})"
+
+
 def _suggest_terms(facts: ResultFacts) -> str:
     """Return the hint of the test with an input that exceeds its limit by most, or of the one without."""
+    if facts.has_named_parameters:
+        return f"try {_name_other_class(facts)}"
     past, *tests = facts.residual["tests"]
     # The residual of a slow record is correlated in time whatever term is missing.
     excess = [test["largest"] / test["limit"] if test["largest"] and test["limit"] else 0.0 for test in tests]
@@ -1057,10 +1082,7 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         # Correlations do not show what a steep nonlinearity leaves, as that of a titration curve.
         "terms-of-another-form",
         lambda facts: facts.is_unpredictable_ahead and facts.is_far_ahead,
-        lambda facts: (
-            "try terms of another form (a higher degree, another library): the error one step ahead is "
-            f"{facts.one_step_ratio:.3g} times the noise level of {facts.names[0]}"
-        ),
+        _suggest_form,
     ),
     Statement(
         "free-run-estimate",

@@ -28,7 +28,7 @@ def result(error: dict[str, Any], size: int = 2, **entry: Any) -> dict[str, Any]
         ),
         (
             result(FREE, 3, kind="linear"),
-            "A model of size 3 simulates y_um with a mean absolute error of 1.23 % of its range",
+            "A model of 3 parameters simulates y_um with a mean absolute error of 1.23 % of its range",
         ),
         (result(CONSTANT), "A model of 2 terms simulates y_um with a free-run error (RMSE) of 0.25 um"),
         (result(LOST), "The free run of a model of 2 terms diverges on the validation data of y_um"),

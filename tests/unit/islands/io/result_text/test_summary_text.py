@@ -338,6 +338,29 @@ def test_an_error_one_step_ahead_far_above_the_noise_has_structure(findings, one
     assert (stated in advice) == is_far
 
 
+@pytest.mark.parametrize(
+    ("settings", "advice"),
+    [
+        ({}, "try another class of models, as NARX (model="),
+        ({"structure": "wiener"}, "try any structure (structure="),
+    ],
+)
+def test_a_model_with_named_parameters_has_no_terms_in_its_texts(findings, settings, advice):
+    document = result_document(findings)
+    document["settings"] = {"method": "fit", "constraints": "none", **settings}
+    for entry in document["models"]:
+        entry["kind"] = "latent"
+    document["models"][document["recommended"]["rank"] - 1]["residual_tests"] |= {
+        "verdict": "inadequate",
+        "predictable_share": {"one_step_ahead": 0.9, "free_run": 0.9},
+    }
+    sentences = statements.describe(document)
+    assert advice in sentences[-1]
+    assert "terms" not in sentences[-1]
+    assert not any("inclusion" in each for each in sentences)
+    assert table(document)[0].split()[:2] == ["rank", "parameters"]
+
+
 def test_the_advice_to_increase_lags_names_the_option_with_a_value(findings):
     document = result_document(findings)
     document["models"][document["recommended"]["rank"] - 1]["residual_tests"] |= {
