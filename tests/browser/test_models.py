@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import Blobs
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.job_runs import make_run
+from support.latent_systems import spring_record
 from support.played import run_submitted, stored
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
@@ -199,11 +200,18 @@ def coupled(service: ServiceClient) -> str:
     """A succeeded job of two outputs, executed by the test process."""
     record = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
     rows = zip(0.1 * np.arange(200).round(3), record.records[0].u[:, 0], *record.y.T, strict=True)
-    text = "\n".join(["t_s,u_N,y1_mm,y2_mm", *(",".join(map(repr, map(float, row))) for row in rows)])
-    answer = service.ask("POST", "/v1/datasets", files={"file": ("masses.csv", text.encode())})
-    spec = {"dataset": answer.json()["id"], "inputs": ["u_N"], "output": ["y1_mm", "y2_mm"]}
     settings = {"population": 8, "generations": 1, "max_terms": 4, "library_degree": 1}
-    submitted = service.ask("POST", "/v1/jobs", json={**spec, "settings": settings})
+    spec = {"inputs": ["u_N"], "output": ["y1_mm", "y2_mm"], "settings": settings}
+    return run_on_table(service, "t_s,u_N,y1_mm,y2_mm", rows, spec)
+
+
+def run_on_table(
+    service: ServiceClient, header: str, rows: Iterable[Sequence[float]], spec: dict[str, Any]
+) -> str:
+    """Upload a table, and execute a job on it in the test process."""
+    text = "\n".join([header, *(",".join(map(repr, map(float, row))) for row in rows)])
+    answer = service.ask("POST", "/v1/datasets", files={"file": ("table.csv", text.encode())})
+    submitted = service.ask("POST", "/v1/jobs", json={"dataset": answer.json()["id"], **spec})
     assert submitted.status_code == 202, submitted.text
     job: str = submitted.json()["id"]
     with stored(service) as store:
@@ -211,6 +219,16 @@ def coupled(service: ServiceClient) -> str:
         blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
         store.leases.finish(lease, run_identification_job(make_run(lease, store, blobs, lambda: None, LONG)))
     return job
+
+
+@pytest.fixture(scope="module")
+def latent(service: ServiceClient) -> str:
+    """A succeeded job of latent models, executed by the test process."""
+    record = spring_record(1200, noise=0.02)
+    rows = zip(0.01 * np.arange(1200), record.u[:, 0], record.y, strict=True)
+    return run_on_table(
+        service, "t_s,u_V,y_mm", rows, {"inputs": ["u_V"], "output": "y_mm", "model": "latent"}
+    )
 
 
 @pytest.mark.ci
@@ -327,3 +345,29 @@ def test_a_figure_is_saved_as_svg_png_and_csv(
     assert picture.width == 2100  # 7 inches at 300 per inch
     assert picture.getpixel((2, 2)) == (255, 255, 255)
     assert picture.getcolors(maxcolors=1) is None
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+def test_a_latent_model_has_parameters_and_figures_of_its_parts(
+    opened: Callable[..., Any], latent: str, expect: Any, scheme: str, width: int
+) -> None:
+    page = opened(f"#/jobs/{latent}", color_scheme=scheme, width=width)
+    expect(page.locator(".model .equation math").first).to_be_visible()
+    assert page.locator("table.models thead th").nth(1).inner_text() == "Parameters"
+    # Parameters with names have no inclusion, and these have no standard errors.
+    parameters = page.get_by_role("table", name="Parameters of the model")
+    assert parameters.locator("thead th").all_text_contents() == ["Parameter", "Value"]
+    # The equations of the point are one below the other.
+    written = page.locator(".front .equation").inner_text()
+    assert "\nx1(k) = " in written
+    # A fit has no generations.
+    expect(page.get_by_text("Convergence")).to_have_count(0)
+    titles = page.locator(".gallery h4").all_text_contents()
+    assert titles[1:4] == ["Structure", "Curves of the units", "Frequency response at rest"]
+    structure = page.locator(".rendered").nth(1)
+    structure.scroll_into_view_if_needed()
+    expect(structure.locator("img")).to_be_visible(timeout=DRAWN)
+    assert structure.locator(".files a").all_text_contents() == ["SVG", "PNG"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert unreadable(page) == []

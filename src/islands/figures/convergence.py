@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from islands.evolution.search_result import SearchResult
 from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, set_log_scale
+from islands.models.parametric import ParametricModel
 
 #: Entries of a legend column.
 _LEGEND_ROWS = 15
@@ -61,7 +62,7 @@ def draw_islands(result: SearchResult) -> Figure:
 
 @house_style()
 def draw_front(result: SearchResult) -> Figure:
-    """Draw the free-run error of every model against its number of terms, and mark the recommended model."""
+    """Draw the free-run error of every model against its size, and mark the recommended model."""
     figure = blank(3.2)
     axes = figure.subplots()
     for part, colour, marker in (("estimation", MEASURED, "o"), ("validation", SIMULATED, "s")):
@@ -72,7 +73,7 @@ def draw_front(result: SearchResult) -> Figure:
     error = chosen.metrics["validation"]["free_run"].mape
     axes.plot(chosen.model.size, error, "o", ms=13, mfc="none", color=RESIDUAL, label="recommended")
     set_log_scale(axes)
-    axes.set_xlabel("terms")
+    axes.set_xlabel("parameters" if isinstance(chosen.model, ParametricModel) else "terms")
     axes.set_ylabel("free-run MAPE (% of the range)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.legend(frameon=False)

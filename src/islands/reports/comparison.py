@@ -19,7 +19,7 @@ from islands.reports.rendering import TEMPLATES, inline_figure
 LEAST_MODELS, MOST_MODELS = 2, 6
 
 #: Columns of the table of the models.
-_COLUMNS = ("model", "terms", "MAPE est. %", "MAPE val. %", "RMSE val.", "R² val.", "one-step RMSE val.")
+_COLUMNS = ("model", "size", "MAPE est. %", "MAPE val. %", "RMSE val.", "R² val.", "one-step RMSE val.")
 
 
 @dataclass(frozen=True, slots=True)

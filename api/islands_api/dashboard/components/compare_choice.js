@@ -1,6 +1,7 @@
 /** Choice of models of a job that are compared, and the link that starts its job again with changes. */
 
 import { el } from "../lib/dom.js";
+import { formatSize } from "../lib/numbers.js";
 
 /** Models that are marked at first: the recommended one and the one of the least error. */
 const isMarked = ({ rank, recommended }) => recommended || rank === 1;
@@ -28,8 +29,8 @@ export function makeCompareChoice(job, models) {
     el(
       "div",
       { class: "row", on: { change: update } },
-      models.map(({ rank, size }, at) =>
-        el("label", {}, fields[at], ` ${rank} (${size} ${size === 1 ? "term" : "terms"})`),
+      models.map(({ rank, size, kind }, at) =>
+        el("label", {}, fields[at], ` ${rank} (${formatSize(size, kind)})`),
       ),
       link,
     ),

@@ -7,12 +7,11 @@ import { poll } from "../lib/polling.js";
 import {
   formatR2,
   makeEquation,
-  makeExactValue,
   makeExportRow,
   makeGallery,
   makeSentences,
-  makeTermTable,
 } from "./models.js";
+import { makeExactValue, makeTermPanel } from "./term_table.js";
 
 /** Make the table of the errors of every output in the common free run. */
 function makeOutputTable(outputs) {
@@ -55,8 +54,7 @@ function makeCoupledDetail(job, model, outputs, signal) {
     makeExportRow(path, model.rank),
     el("h4", {}, "Outputs"),
     makeScrollable("Errors of the outputs", makeOutputTable(outputs)),
-    el("h4", {}, "Terms"),
-    makeScrollable("Terms", makeTermTable(model)),
+    makeTermPanel(model),
     makeGallery(path, signal),
   ];
 }

@@ -175,7 +175,7 @@ const listDiagnosisFacts = ({ simulation, channels = [], tolerance = {} }) => [
 
 /** List the settings that only an identification has. */
 const listSearchFacts = (spec) => [
-  ["Preset", spec.preset ?? "default"],
+  (spec.model ?? "narx") === "narx" ? ["Preset", spec.preset ?? "default"] : ["Class", spec.model],
   ["Validated on", formatValidation(spec)],
 ];
 

@@ -42,9 +42,9 @@ export function parseMath(source) {
   return equations.map(copyMath);
 }
 
-/** Make a plain equation whose lines break between factors only. */
+/** Make plain equations, one in each line, whose lines break between factors only. */
 export const makeLine = (equation) =>
-  equation.split(/(?<=\*| [+-] |= )/).map((part) => el("span", {}, part));
+  equation.split(/(?<=\*| [+-] |= |\n)|(?=\n)/).map((part) => (part === "\n" ? part : el("span", {}, part)));
 
 /** Load the equations of a model. */
 export async function loadEquations(model, signal) {

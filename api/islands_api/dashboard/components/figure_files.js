@@ -7,7 +7,7 @@ import { showProblem } from "./banner.js";
 /** Pixels per CSS pixel of a saved PNG: 300 per inch of a figure 7 inches wide. */
 const PNG_SCALE = 300 / 96;
 
-/** Make the links of a loaded picture; `table` is the address of its numbers. */
+/** Make the links of a loaded picture; `table` is the address of its numbers, null for a diagram. */
 export function makeFileLinks(table, name, title, picture) {
   const link = (text, attributes) => {
     const file = `${name}.${text.toLowerCase()}`;
@@ -23,7 +23,9 @@ export function makeFileLinks(table, name, title, picture) {
   return [
     link("SVG", { href: picture.src }),
     link("PNG", { href: picture.src, on: { click: intercept(() => savePng(picture, `${name}.png`)) } }),
-    link("CSV", { href: table, on: { click: intercept(() => download(table, `${name}.csv`)) } }),
+    ...(table
+      ? [link("CSV", { href: table, on: { click: intercept(() => download(table, `${name}.csv`)) } })]
+      : []),
   ];
 }
 

@@ -13,10 +13,13 @@ const TITLES = {
   hold: "Held input",
   residuals: "Residual correlations",
   record: "Record",
-  front: "Error against number of terms",
+  front: "Error against size",
   convergence: "Convergence",
   islands: "Islands",
 };
+
+/** Figures without lines of numbers. */
+const DIAGRAMS = new Set(["structure"]);
 
 /** Distance below the viewport at which a figure is loaded. */
 const PRELOAD_MARGIN = "150px";
@@ -44,7 +47,8 @@ export function makeFigure(path, name, signal) {
       const url = URL.createObjectURL(image);
       signal.addEventListener("abort", () => URL.revokeObjectURL(url), { once: true });
       const picture = el("img", { src: url, alt: `${title}, drawn by the service` });
-      files.replaceChildren(...makeFileLinks(`${path}/${name}.csv`, name, title, picture));
+      const table = DIAGRAMS.has(name) ? null : `${path}/${name}.csv`;
+      files.replaceChildren(...makeFileLinks(table, name, title, picture));
       files.hidden = false;
       paper.replaceChildren(picture);
     } catch (error) {

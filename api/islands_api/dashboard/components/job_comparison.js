@@ -24,7 +24,7 @@ export const makeModelTable = (entries) =>
     "Compared models",
     [
       ...["Model", "Data set"],
-      ...["Terms", "Error est.", "Error val.", "RMSE val."].map((name) => [name, "figure"]),
+      ...["Size", "Error est.", "Error val.", "RMSE val."].map((name) => [name, "figure"]),
     ],
     entries.map((entry) => {
       const { model, dataset } = entry;
@@ -82,11 +82,11 @@ export function makeOverlays(entries, signal) {
   return groups.map((group) => makeOverlay(group, groups.length === 1, signal));
 }
 
-/** Make the chart of the errors of all models of each job against their numbers of terms. */
+/** Make the chart of the errors of all models of each job against their sizes. */
 export function makeFrontChart(entries, signal) {
   const chart = makeLineChart({
     title: "Validation error of all models of each job",
-    x: { label: "terms", integer: true },
+    x: { label: "size", integer: true },
     y: { label: "error of the free run (%)", log: true },
     marks: true,
   }, signal);

@@ -50,7 +50,7 @@ export function makeJobRow(job, selection, { showsOwner = false, self = null } =
   const link = el("a", isForeign ? {} : { href: `#/jobs/${job.id}` }, name);
   const rename = makeRenameButton(link, { getJob: () => current, changed: show });
   const [about, tags] = [el("span", { class: "about-job soft small" }), makeTags()];
-  const [error, terms] = ["error", "terms"].map((label) =>
+  const [error, size] = ["error", "size"].map((label) =>
     el("td", { class: "figure", "data-label": label }));
   let lastState = null;
   const node = el(
@@ -66,7 +66,7 @@ export function makeJobRow(job, selection, { showsOwner = false, self = null } =
     ),
     el("td", { class: "wide" }, outcome.nodes),
     error,
-    terms,
+    size,
     el("td", { class: "figure" }, makeAge(job.created)),
   );
 
@@ -81,7 +81,7 @@ export function makeJobRow(job, selection, { showsOwner = false, self = null } =
     setText(name, getName(newJob));
     setText(about, describeJob(newJob, showsOwner));
     showFigure(error, formatPercent(newJob.summary?.metrics?.mape));
-    showFigure(terms, newJob.summary?.size ? String(newJob.summary.size) : NONE);
+    showFigure(size, newJob.summary?.size ? String(newJob.summary.size) : NONE);
     const newState = getState(newJob);
     if (lastState !== null && lastState !== newState) announce(`${getIsolatedName(newJob)}: ${newState}`);
     lastState = newState;

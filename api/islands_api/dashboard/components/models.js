@@ -2,7 +2,7 @@
 
 import { download, getJobPath, getJson } from "../lib/api.js";
 import { el, makeFacts, makeScrollable, makeTable, runOnceAtATime } from "../lib/dom.js";
-import { NONE, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
+import { formatNumber, formatPercent, formatShort, nameSize } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
 import { showProblem } from "./banner.js";
 import { makeCompareChoice } from "./compare_choice.js";
@@ -10,6 +10,7 @@ import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
 import { makeReportButtons } from "./report.js";
 import { makeModelFront } from "./size_front.js";
+import { makeExactValue, makeTermPanel } from "./term_table.js";
 
 /** Display names of the export formats. */
 const EXPORTS = {
@@ -27,12 +28,6 @@ const EXPORTS = {
 
 const PARTS = ["estimation", "validation"];
 
-/** Make an element with a formatted number; its value and title have the full precision. */
-export function makeExactValue(value, format) {
-  if (typeof value !== "number") return NONE;
-  return el("data", { value: String(value), title: String(value) }, format(value));
-}
-
 export const formatR2 = (value) =>
   Math.abs(value) < 100 ? value.toFixed(5).replace("-", "−") : formatNumber(value);
 
@@ -45,9 +40,9 @@ function makeMetric(model, part, name, format) {
   return makeExactValue(value, format);
 }
 
-const HEADINGS = ["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val.", "Free-run residual"];
+const ERRORS = ["MAPE est. %", "R² est.", "MAPE val. %", "R² val."];
 
-/** Headings of models of hysteresis, before the last one. */
+/** Headings of models of hysteresis. */
 const HYSTERESIS_HEADINGS = ["Hold drift %", "Property 1"];
 
 const makeVerdict = (passed, positive, negative) =>
@@ -92,26 +87,14 @@ const claimHysteresis = (models) => models.some((model) => model.physics.propert
 
 function makeModelTable(job, models) {
   const hysteresis = claimHysteresis(models);
-  const names = HEADINGS.toSpliced(-1, 0, ...(hysteresis ? HYSTERESIS_HEADINGS : []));
+  const size = nameSize(models[0]?.kind);
+  const further = hysteresis ? HYSTERESIS_HEADINGS : [];
+  const names = ["Rank", size, ...ERRORS, ...further, "Free-run residual"];
   const headings = names.map((name, at) => [name, at === 0 ? null : "figure"]);
   const rows = models.map((model) => makeRow(job, model, hysteresis));
   const modelTable = makeTable("Models, least error on the validation data first", headings, rows);
   modelTable.classList.add("models");
   return modelTable;
-}
-
-export function makeTermTable(model) {
-  return makeTable(
-    "Terms of the model",
-    ["Term", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
-    model.terms.map((term) => [
-      // Lines break between factors only. Results of earlier versions have no texts with names of columns.
-      el("code", {}, (term.term ?? term.regressor).split(/(?<=\*)/).map((factor) => el("span", {}, factor))),
-      makeExactValue(term.parameter, (value) => formatNumber(value, 6)),
-      makeExactValue(term.standard_error, formatNumber),
-      makeExactValue(term.inclusion ?? null, formatNumber),
-    ]),
-  );
 }
 
 /** Format the name of a residual test in the notation of the literature. */
@@ -209,7 +192,7 @@ function makeDetail(job, model, hysteresis, signal) {
     el(
       "div",
       { class: "pair" },
-      el("div", {}, el("h4", {}, "Terms"), makeScrollable("Terms", makeTermTable(model))),
+      makeTermPanel(model),
       el(
         "div",
         {},
@@ -231,7 +214,8 @@ function makeDetail(job, model, hysteresis, signal) {
 /** Make the figures of the whole search, loaded when the section is opened. */
 function makeSearchFigures(job, islands, signal) {
   const path = getJobPath(job);
-  const title = el("summary", {}, "Figures of the search: record, Pareto front, convergence");
+  const convergence = islands ? ", convergence" : "";
+  const title = el("summary", {}, `Figures of the search: record, Pareto front${convergence}`);
   const node = el("details", { class: "search" }, title);
   // The figure that compares islands needs at least two.
   const open = () => node.append(makeGallery(path, signal, (name) => name === "islands" && islands < 2));

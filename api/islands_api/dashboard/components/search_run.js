@@ -2,7 +2,7 @@
 
 import { getJobPath, getJson } from "../lib/api.js";
 import { el, setText } from "../lib/dom.js";
-import { formatCount, formatShort, formatTerms } from "../lib/numbers.js";
+import { formatCount, formatShort, formatSize } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 
 /** Return the points of a signal, with the least and the greatest value of every part. */
@@ -50,7 +50,7 @@ export function makeSearchRun(job, unit, signal) {
     const outcome = found.outcome === "ok" ? "" : ` (${found.outcome})`;
     setText(
       statement,
-      `${formatTerms(found.size)}, generation ${formatCount(found.generation)}, over the estimation data`
+      `${formatSize(found.size)}, generation ${formatCount(found.generation)}, over the estimation data`
         + `${outcome}. It is the smallest model within 10 % of the least error.`,
     );
     node.hidden = false;

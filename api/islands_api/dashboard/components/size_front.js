@@ -1,17 +1,17 @@
 /** Fronts of size against error: of a running search with its equations, and of a finished job. */
 
 import { el, makeScrollable, setText } from "../lib/dom.js";
-import { formatNumber, formatTerms } from "../lib/numbers.js";
+import { formatNumber, formatSize, nameParts } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeLine } from "./equation.js";
 import { isEnded } from "./job_state.js";
 import { makeSearchRun } from "./search_run.js";
 
-/** Make a chart of errors by size. */
-const makeChart = (title, error, unit, signal) =>
+/** Make a chart of errors by size of models of a class. */
+const makeChart = (title, error, unit, kind, signal) =>
   makeLineChart({
     title,
-    x: { label: "terms", integer: true },
+    x: { label: nameParts(kind), integer: true },
     y: { label: unit ? `${error} / ${unit}` : error, log: true },
     marks: true,
   }, signal);
@@ -51,7 +51,7 @@ export function makeLivePanel(job, unit, signal) {
   const statement = el("p", { class: "soft small" });
   let [front, size, simulated] = [[], null, null];
   const run = makeSearchRun(job, unit, signal);
-  const chart = makeChart("Front of size against error", "RMS error", unit, signal);
+  const chart = makeChart("Front of size against error", "RMS error", unit, job.spec.model, signal);
   letChoose(chart, "shows the equation of a point", (at) => {
     size = at;
     drawFront();
@@ -88,7 +88,7 @@ export function makeLivePanel(job, unit, signal) {
     let which = model === front.at(-1) ? "Model of the least error" : "Smallest model near the least error";
     if (model.size === size) which = "Chosen point";
     const error = `${formatNumber(model.error)} ${unit}`.trim();
-    setText(statement, `${which}: ${formatTerms(model.size)}, error ${error}`);
+    setText(statement, `${which}: ${formatSize(model.size, model.kind)}, error ${error}`);
   }
 
   return {
@@ -127,7 +127,7 @@ function makeFrontSeries(models) {
 /** Make the chart with the equation of a model; `show(model)` marks another model. */
 export function makeModelFront(job, models, unit, signal) {
   const [statement, equation] = [el("p", {}), el("code", { class: "plain" })];
-  const chart = makeChart("Size against error", "RMSE of the free run", unit, signal);
+  const chart = makeChart("Size against error", "RMSE of the free run", unit, job.spec.model, signal);
   letChoose(chart, "opens the model of a point", (size) => {
     const { rank } = models.find((model) => model.size === size);
     location.hash = `#/jobs/${job.id}/models/${rank}`;
@@ -139,7 +139,7 @@ export function makeModelFront(job, models, unit, signal) {
     show(model) {
       const { rmse } = model.metrics.validation.free_run;
       const error = Number.isFinite(rmse) ? `RMSE ${formatNumber(rmse)} ${unit}`.trim() : "diverged";
-      setText(statement, `Model ${model.rank}: ${formatTerms(model.size)}, ${error}`);
+      setText(statement, `Model ${model.rank}: ${formatSize(model.size, model.kind)}, ${error}`);
       equation.replaceChildren(...makeLine(model.equation));
       chart.draw(makeFrontSeries(models), [{ kind: "chosen", at: model.size }]);
     },

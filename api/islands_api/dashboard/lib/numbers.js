@@ -49,8 +49,15 @@ export const labelQuantity = (name, unit) =>
 export const formatCount = (value) =>
   Number.isFinite(value) ? Math.round(value).toLocaleString("en").replaceAll(",", "\u202f") : NONE;
 
-/** Format the size of a model. */
-export const formatTerms = (size) => (size === 1 ? "1 term" : `${size} terms`);
+/** Name what the size of a model counts: models of other classes than NARX have parameters with names. */
+export const nameParts = (kind) => (kind && kind !== "narx" ? "parameters" : "terms");
+
+/** Name the size of a model of a class in a heading. */
+export const nameSize = (kind) => nameParts(kind).replace(/^./, (initial) => initial.toUpperCase());
+
+/** Format the size of a model of a class. */
+export const formatSize = (size, kind) =>
+  `${size} ${size === 1 ? nameParts(kind).slice(0, -1) : nameParts(kind)}`;
 
 /** Format a value in per cent. */
 export const formatPercent = (value, digits = 3) =>

@@ -98,7 +98,7 @@ function makeContent(found, signal) {
       entries.length > 1 ? makeComparisonReportButtons(entries) : [],
     ),
     makeCard("Free runs on the validation data", makeRuns(entries, signal)),
-    makeCard("Error against number of terms", makeFrontChart(entries, signal)),
+    makeCard("Error against size", makeFrontChart(entries, signal)),
     makeCard("Parameters", makeScrollable("Parameters", makeTermTable(entries))),
     makeCard("Settings that differ", makeSettingTable(entries)),
   ];

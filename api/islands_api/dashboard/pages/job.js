@@ -37,10 +37,12 @@ async function deleteJob(job) {
   return null;
 }
 
+/** Return whether a job evolves models: those of other classes than NARX are fitted. */
+const isEvolution = (job) => isSearch(job) && (job.spec.model ?? "narx") === "narx";
+
 /** Return whether the search of a job can end early with its best models. */
 const canStop = (job) =>
-  job.state === "running" && isSearch(job) && (job.spec.model ?? "narx") === "narx"
-  && !job.cancel_requested && !job.stop_requested;
+  job.state === "running" && isEvolution(job) && !job.cancel_requested && !job.stop_requested;
 
 /** Return whether a search is about to end early: its time left does not count then. */
 const isStopping = ({ stop_requested: stopped, progress }) => stopped && progress?.phase === "search";
@@ -179,12 +181,13 @@ export function mountJob(host, { id, rank }, signal) {
   function build(job) {
     const onUnitKnown = (value, found) => {
       [unit, columns] = [value, found];
-      // The errors of several outputs have no common scale.
-      if (!isSearch(job) || hasSeveralOutputs(job)) return;
-      convergence = makeConvergencePanel(id, unit, signal);
-      live = makeLivePanel(job, unit, signal);
-      convergenceHost.replaceChildren(live.node, convergence.node);
-      if (current) show(current);
+      // The errors of several outputs have no common scale; models of other classes are not evolved.
+      if (isEvolution(job) && !hasSeveralOutputs(job)) {
+        convergence = makeConvergencePanel(id, unit, signal);
+        live = makeLivePanel(job, unit, signal);
+        convergenceHost.replaceChildren(live.node, convergence.node);
+      }
+      if (isSearch(job) && current) show(current);
     };
     aboutHost.replaceChildren(makeSettingsPanel(job.spec), makeDatasetPanel(job.spec, onUnitKnown, signal));
     buttons.node.append(makeRunAgainLink(job) ?? "");

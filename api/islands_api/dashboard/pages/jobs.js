@@ -131,7 +131,7 @@ export function mountJobs(host, firstFilters, signal) {
         [selection.all, "choice"],
         ...["State", "Job", "Result"],
         owner ? ["Error", "figure"] : makeSortHeading("Error", "error", "ascending", filters),
-        ["Terms", "figure"],
+        ["Size", "figure"],
         owner ? ["Submitted", "figure"] : makeSortHeading("Submitted", "", "descending", filters),
       ],
       makeRow: (job) => makeJobRow(job, selection, { showsOwner: Boolean(owner), self }),

@@ -90,6 +90,7 @@ FILES = {
     "components/signal_panels.js": _SCRIPT,
     "components/signal_plot.js": _SCRIPT,
     "components/signal_samples.js": _SCRIPT,
+    "components/term_table.js": _SCRIPT,
     "components/try_model.js": _SCRIPT,
     "components/size_front.js": _SCRIPT,
     "lib/api.js": _SCRIPT,
