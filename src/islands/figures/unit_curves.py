@@ -43,18 +43,20 @@ def draw_unit_curves(
     Returns
     -------
     Figure
-        An axes for each unit.
+        An axes for each unit; none if the free run diverges at once.
 
     Raises
     ------
     ModelError
-        The model has no units, or its free run diverges at once.
+        The model has no units.
     RecordError
         The record does not match the model.
     """
     if not model.units:
         raise ModelError("the model has no units, so there are no curves: it is linear")
     curves = trace_unit_curves(model, record, warm_up, ensemble, further)
+    if not curves:
+        return blank(0.6, "the free run of the estimation data diverges at once: the units have no range")
     columns = min(len(curves), _COLUMNS)
     rows = -(-len(curves) // columns)
     figure = blank(0.7 + (_ALONE if columns == 1 else _SMALL) * rows)

@@ -9,7 +9,6 @@ from islands.data.dataset import Dataset
 from islands.data.signal_map import map_signals
 from islands.models.latent import LatentModel
 from islands.simulation.blocks import make_simulator
-from islands.simulation.predictors import find_divergence_bound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,8 +20,8 @@ class UnitRun:
     arguments : ndarray, shape (units, samples)
         Arguments of the units.
     output : ndarray, shape (samples,)
-        Output, less the offset of the model. Both have the samples between the warm-up of a segment and a
-        divergence.
+        Output, less the offset of the model. Both have the samples from the warm-up of a segment until the
+        output leaves the range of the record by more than this range, as in a divergence.
     """
 
     arguments: NDArray[np.float64]
@@ -50,7 +49,8 @@ def simulate_units(
     """
     signals, _ = map_signals(model, record)
     simulate = make_simulator(model, signals, None, warm_up)
-    bound = find_divergence_bound(signals)
+    known = signals.y[~np.isnan(signals.y)]
+    bound = float(np.abs(known).max() + np.ptp(known)) if np.ptp(known) else np.inf
     # An input that is read early is rolled within the warm-up of its segment.
     leads = model.leads[1 + model.order :]
     u = np.array([np.roll(signals.u[:, place], lead) for place, lead in enumerate(leads)])

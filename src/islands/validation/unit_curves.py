@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.errors import ModelError
 from islands.models.latent import LatentModel, evaluate_curve
 from islands.simulation.unit_arguments import UnitRun, simulate_units
 from islands.validation.ensemble import Ensemble
@@ -89,6 +88,8 @@ def trace_unit_curves(
 ) -> tuple[UnitCurve, ...]:
     """Return the curve of every unit over the range of its argument in the free run of a record.
 
+    There is none if the free run diverges at once.
+
     Parameters
     ----------
     model : LatentModel
@@ -103,8 +104,6 @@ def trace_unit_curves(
 
     Raises
     ------
-    ModelError
-        The free run has diverged before two samples.
     RecordError, SettingsError
         As in `free_run`.
     """
@@ -113,8 +112,10 @@ def trace_unit_curves(
     models = [model, *(model.with_parameters(each.tolist()) for each in drawn)]
     runs = simulate_units(model, record, warm_up, np.concatenate([own, drawn]))
     if runs[0].output.size < 2:
-        raise ModelError("the free run of the model diverges at once, so its units have no range")
-    beyond = runs[0] if further is None else simulate_units(model, further, warm_up, own)[0]
+        return ()
+    beyond = runs[0]
+    if further is not None and (found := simulate_units(model, further, warm_up, own)[0]).output.size:
+        beyond = found
     variation = record.u.std(axis=0)
     return tuple(_trace(unit, models, runs, beyond, variation) for unit in range(len(model.units)))
 
@@ -155,8 +156,6 @@ def _trace(
 
 def _find_range(arguments: NDArray[np.float64], scale: _Scale) -> tuple[float, float]:
     """Return the least and the greatest abscissa of arguments; a width of 2 if they are constant."""
-    if not arguments.size:
-        return 0.0, 0.0
     x = (np.array([arguments.min(), arguments.max()]) - scale.offset) / scale.scale
     low, high = float(x.min()), float(x.max())
     return (low, high) if high > low else (low - 1.0, high + 1.0)

@@ -357,7 +357,7 @@ class FittedModel:
         ----------
         kind : str
             A key of ``islands.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in ``metrics``),
-            ``loop``, ``hold``, ``residuals``, ...
+            ``loop``, ``hold``, ``residuals``; of latent models ``structure``, ``curves`` and ``bode``.
         record : Dataset or data frame, optional
             Record that is drawn; by default the validation data. A frame has the columns of the model.
         ax : Axes, optional
@@ -375,7 +375,8 @@ class FittedModel:
         RecordError
             The record does not match the model.
         ModelError
-            The result was read from a folder without the record, and no record is given.
+            The result was read from a folder without the record, and no record is given; or the model lacks
+            what the figure shows, as units.
         """
         # matplotlib takes half a second to import, which every process of a cluster would pay.
         from islands.figures.registry import FIGURES, draw_record_figure  # noqa: PLC0415

@@ -34,7 +34,7 @@ def summary(document: Document, model: DynamicModel) -> str:
 
 
 def method_text(found: SearchResult) -> str:
-    """Return data, settings, number of models, bounds, and the equations of all models, one in a line."""
+    """Return data, settings, number of models, bounds, and the equations of all models."""
     record, search = found.record, found.search
     outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
     full = search.full_set
@@ -46,7 +46,10 @@ def method_text(found: SearchResult) -> str:
         *(line for text in summarise_certificates(found) for line in wrap(text)),
         "",
         *wrap(_describe_names(found)),
-        *(f"{rank:2d}  {entry.model.equation().named}" for rank, entry in enumerate(found.models, start=1)),
+        *(
+            f"{rank:2d}  " + entry.model.equation().named.replace("\n", "\n    ")
+            for rank, entry in enumerate(found.models, start=1)
+        ),
     ]
     return "\n".join(lines) + "\n"
 

@@ -48,3 +48,21 @@ def test_a_linear_model_has_no_curves():
     linear = make_model({name: value for name, value in SPRING.items() if name[0] not in "ew"}, ())
     with pytest.raises(ModelError, match="no units"):
         draw_unit_curves(linear, spring_record(100), 20)
+
+
+def test_a_run_that_leaves_the_range_of_the_record_ends_there():
+    unstable = {"a1_1": 1.05, "b1": 0.1, "c1": 1.0, "e1_1": 0.1, "w1_1": 1.0}
+    record = spring_record(400)
+    (axes,) = draw_unit_curves(make_model(unstable, ("tanh",), 1), record, 20).axes
+    (line,) = [line for line in axes.lines if len(line.get_xdata()) > 2]
+    # The argument is the state, which the output shows.
+    assert axes.get_xlabel().startswith("y_mm, which")
+    assert np.abs(line.get_xdata()).max() <= np.abs(record.y).max() + np.ptp(record.y)
+
+
+def test_a_run_that_diverges_at_once_has_no_curve():
+    record = spring_record(400)
+    model = make_model({"a1_1": 1.2, "c1": 1.0, "e1_1": 0.1, "w1_1": 1.0, "level": 1e6}, ("tanh",), 1)
+    figure = draw_unit_curves(model, record, 20)
+    assert not figure.axes
+    assert "diverges at once" in figure.get_suptitle()
