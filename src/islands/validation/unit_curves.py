@@ -26,6 +26,9 @@ _LEAST_MEMBERS, _DEVIATIONS = 10, 1.96
 #: Least part of the variance of an argument that the output explains, for a curve over the output.
 _FOLLOWS = 0.99
 
+#: Effect of units through the states, relative to the variation of the output, below which they have none.
+_NEGLIGIBLE = 1e-3
+
 #: A sum below this fraction of its parts is zero but for rounding.
 _ROUNDING = 1e-9
 
@@ -169,7 +172,7 @@ def _choose_abscissa(
     read = np.flatnonzero(of["V"][unit])
     if not of["W"][unit].any() and len(read) == 1:
         return Abscissa.INPUT, int(read[0])
-    if not of["E"].any() and (inverse := _invert(model)) is not None:
+    if (inverse := _invert(model)) is not None and not _act_on_states(model, run, inverse):
         effects = np.abs(of["W"][unit] @ inverse @ of["B"] + of["V"][unit]) * variation
         if effects.any():
             return Abscissa.CONSTANT_INPUT, int(effects.argmax())
@@ -178,6 +181,14 @@ def _choose_abscissa(
     if scale and left.var() <= (1.0 - _FOLLOWS) * run.arguments[unit].var():
         return Abscissa.OUTPUT, -1
     return Abscissa.DEVIATION, -1
+
+
+def _act_on_states(model: LatentModel, run: UnitRun, inverse: NDArray[np.float64]) -> bool:
+    """Return whether units have an effect on the output through the states that is not negligible."""
+    effects = model.matrices["C"] @ inverse @ model.matrices["E"]
+    pairs = zip(effects, model.units, run.arguments, strict=True)
+    changes = [abs(effect) * evaluate_curve(name, values).std() for effect, name, values in pairs if effect]
+    return bool(sum(changes) > _NEGLIGIBLE * run.output.std())
 
 
 def _scale_argument(
