@@ -109,7 +109,7 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
         "paper-appendix-s2": "Appendix A of the paper, system S2: as for S1, with larger models",
         "hysteresis": "Systems with hysteresis: seeded by constrained forward selection, refined",
         "narx": "Smooth systems: seeded by forward selection, without constraints, refined",
-        LATENT: "States that are not measured: linear state spaces with static curves in their feedback",
+        LATENT: "States that are not measured: state spaces with static curves in their feedback",
     }
 )
 
@@ -117,16 +117,9 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 #: Settings of latent models. Any other one has no effect on them, and cannot be changed.
 LATENT_SETTINGS = frozenset(
     {
-        *("model_class", "structure", "population", "generations", "elite", "crossover", "tournament", "islands"),
-        *(
-            "topology",
-            "migrate_every",
-            "migrants",
-            "emigrants",
-            "replaced",
-            "max_evaluations",
-            "target_error",
-        ),
+        *("model_class", "structure", "population", "generations", "elite", "crossover"),
+        *("tournament", "islands", "topology", "migrate_every", "migrants", "emigrants"),
+        *("replaced", "max_evaluations", "target_error"),
     }
 )
 
@@ -186,11 +179,15 @@ KINDS: Mapping[str, RecordKind] = MappingProxyType(
 def resolve_kind(kind: str, delays: tuple[int, ...], changes: Mapping[str, Any]) -> Settings:
     """Return the settings of a kind of record with dead times; changes take precedence over both.
 
+    The kind ``latent`` has no dead times.
+
     Raises
     ------
     SettingsError
         The kind or a setting is unknown, or a setting is out of range.
     """
+    if kind == LATENT:
+        return resolve_settings(LATENT, changes)
     entry = lookup(KINDS, kind, "kind of record")
     return resolve_settings(entry.preset, {**entry.changes, "library_delays": delays, **changes})
 
@@ -210,6 +207,11 @@ def resolve_kinds(changes: Mapping[str, Any]) -> Mapping[str, Settings]:
     if "constraints" in changes and constraint(changes["constraints"]).sums:
         return {"hysteresis": settings["hysteresis"]}
     return settings
+
+
+def resolve_latent(changes: Mapping[str, Any]) -> Settings | None:
+    """Return the settings of latent models with changes; None if a change has no effect on them."""
+    return resolve_settings(LATENT, changes) if LATENT_SETTINGS.issuperset(changes) else None
 
 
 def common_settings(preset: str) -> dict[str, Any]:

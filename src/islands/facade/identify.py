@@ -208,7 +208,7 @@ def identify_record(
         settings = resolve_settings(preset, with_tuples(changes))
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if settings.model_class == LATENT:
-        described = {"method": "identify", "preset": preset, "validation": held_out}
+        described = {**_describe_preset(preset), "validation": held_out}
         return Result.from_search(
             identify_latent(
                 *(record, parts, settings, seed, steps, described),
@@ -247,10 +247,7 @@ def identify_record(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
             "record"
         )
-    described = {"method": "identify", "preset": preset, **_describe(settings)}
-    if isinstance(preset, Choice):
-        described.update(preset=AUTO, choice=preset.to_document())
-    described["validation"] = held_out
+    described = {**_describe_preset(preset), **_describe(settings), "validation": held_out}
     statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
     found = with_linear_comparison(found, scaled.library_delays, scaled.shooting, steps)
@@ -260,6 +257,13 @@ def identify_record(
 
 def _own_primitives(settings: Settings) -> list[Primitive]:
     return [entry for name, entry in settings.primitive_table.items() if name not in PRIMITIVES]
+
+
+def _describe_preset(preset: str | Choice) -> dict[str, Any]:
+    """Return the preset, with the choice of ``auto``, as JSON values."""
+    if isinstance(preset, Choice):
+        return {"method": "identify", "preset": AUTO, "choice": preset.to_document()}
+    return {"method": "identify", "preset": preset}
 
 
 def _describe(settings: Settings) -> dict[str, Any]:

@@ -26,9 +26,7 @@ from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.results.model_simulation import SHOOTING
 from islands.models.latent import LatentModel
-from islands.models.protocol import DynamicModel
 from islands.progress import Steps
-from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.ensemble import ValidatedModel
 
@@ -39,7 +37,7 @@ _GAIN, _MOST_MODELS = 0.15, 10
 _CRITERION = refinement_criterion(None)
 
 
-def identify_latent(
+def search_latent(
     record: Dataset,
     split: Split,
     settings: Settings,
@@ -51,7 +49,7 @@ def identify_latent(
     engine: Engine | Ray | str | None = None,
     on_epoch: SearchCallback = ignore_epoch,
 ) -> SearchResult:
-    """Identify latent models of a record by evolution.
+    """Search latent models of a record by evolution.
 
     Parameters
     ----------
@@ -72,6 +70,11 @@ def identify_latent(
     ------
     SettingsError
         No model was found.
+
+    Returns
+    -------
+    SearchResult
+        Without a linear model for comparison and without prediction bands.
     """
     problem = make_latent_problem(split.estimation, settings, steps)
     if not problem.linear:
@@ -102,14 +105,29 @@ def identify_latent(
         state.caches,
         stop_reason(state, settings) or "stopped",
     )
-    found = SearchResult(record, split, seed, described, search, rank_models(assessed))
-    validated: list[ValidatedModel[DynamicModel]] = [
-        ValidatedModel(model, _CRITERION, free_run(model, split.validation).mean_squared_error)
-        for model in models
-    ]
-    warm_up = max(model.maximum_lag for model in models)
-    found = with_linear_comparison(found, (), interval, steps)
-    return with_bands(found, validated, "none", warm_up, steps)
+    return SearchResult(record, split, seed, described, search, rank_models(assessed))
+
+
+def identify_latent(
+    record: Dataset,
+    split: Split,
+    settings: Settings,
+    seed: int,
+    steps: Steps,
+    described: dict[str, Any],
+    *,
+    start: SearchState | None = None,
+    engine: Engine | Ray | str | None = None,
+    on_epoch: SearchCallback = ignore_epoch,
+) -> SearchResult:
+    """Return the complete result of a search; see `search_latent`."""
+    found = search_latent(
+        *(record, split, settings, seed, steps, described), start=start, engine=engine, on_epoch=on_epoch
+    )
+    found = with_linear_comparison(found, (), found.shooting_interval, steps)
+    models = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
+    warm_up = max(entry.model.maximum_lag for entry in found.models)
+    return with_bands(found, models, "none", warm_up, steps)
 
 
 def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> list[LatentModel]:

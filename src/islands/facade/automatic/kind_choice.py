@@ -162,7 +162,7 @@ def choose_kind(
     compared = {
         kind: average_errors(each.found.recommended, count // each.average) for kind, each in bounded.items()
     }
-    errors = {kind: _measure(model, record) for kind, model in compared.items()}
+    errors = {kind: measure_share(model, record) for kind, model in compared.items()}
     kind, reason = _select_kind(record, libraries, trials, compared, errors, count)
     choice = Choice(
         kind,
@@ -227,8 +227,11 @@ def _is_bounded(model: Assessment) -> bool:
     return bool(model.outcomes["validation"]["free_run"])
 
 
-def _measure(model: Assessment, record: Dataset) -> float:
-    """Return the free-run RMSE on the validation data as a fraction of the output range of a record."""
+def measure_share(model: Assessment, record: Dataset) -> float:
+    """Return the free-run RMSE on the validation data as a fraction of the output range of a record.
+
+    It is at least `ROUNDING`.
+    """
     return max(model.validation_error / record.output_range, ROUNDING)
 
 

@@ -7,12 +7,13 @@ from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split, split_data
-from islands.errors import check_texts, lookup
+from islands.errors import ModelError, RecordError, SettingsError, check_texts, lookup
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import check_delays
-from islands.evolution.presets import AUTO, resolve_kinds, with_tuples
+from islands.evolution.presets import AUTO, resolve_kinds, resolve_latent, with_tuples
 from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_choice import Choice, choose_kind
+from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
 from islands.facade.library_fit import FitSettings, fit_library
 from islands.facade.trials.library import make_trial_library, take_library
 from islands.models.candidate_library import LIBRARIES
@@ -54,7 +55,18 @@ def choose_preset(
     common = {name: changes[name] for name in ("average", "feedthrough", "shooting") if name in changes}
     fit_kind = partial(fit_library, record, split, settings=FitSettings(**common), stop=stop)
     steps = Steps(progress, stop)
-    return choose_kind(split.estimation, libraries, changes.get("library_delays"), fit_kind, steps)[0]
+    delays = changes.get("library_delays")
+    choice, fits = choose_kind(split.estimation, libraries, delays, fit_kind, steps)
+    settings = resolve_latent(changes)
+    # Models of hysteresis keep a property that latent models do not have.
+    constrained = constraint(libraries[choice.kind].constraints).sums
+    if settings is None or constrained or not record.output_range > 0.0:
+        return choice
+    try:
+        fit = fits.get(choice.kind) or fit_kind(libraries[choice.kind].with_delays(choice.delays))
+    except (SettingsError, RecordError, ModelError):
+        return choice  # The search reports what is wrong.
+    return compare_latent(record, split, choice, fit, replace(settings, **LATENT_TRIAL), steps)
 
 
 def fit_chosen_library(

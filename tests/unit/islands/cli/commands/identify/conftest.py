@@ -19,7 +19,7 @@ def run(request, monkeypatch, command_line):
     """
     write_record(record(), "r.csv")
     if "with_figures" not in request.fixturenames:
-        monkeypatch.setattr("islands.figures.registry.FIGURES", {})
+        monkeypatch.setattr("islands.figures.registry.model_figures", lambda _found, _model: ())
         monkeypatch.setattr("islands.figures.registry.search_figures", lambda _findings: ())
 
     def call(*arguments):

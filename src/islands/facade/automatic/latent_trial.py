@@ -1,0 +1,86 @@
+"""Comparison of latent models with the kind of NARX models that the preset ``auto`` has chosen."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.errors import SettingsError
+from islands.evolution.settings import LATENT, Settings
+from islands.facade.automatic.kind_choice import Choice, measure_share
+from islands.facade.automatic.kind_trials import percent
+from islands.facade.latent_identification import search_latent
+from islands.facade.library_fit import LibraryFit
+from islands.progress import Steps, StoppedError
+from islands.validation.assessment import Assessment, average_errors
+from islands.validation.predictable_residual import LARGEST_SHARE
+
+#: Settings of the short search that is compared.
+LATENT_TRIAL: Mapping[str, Any] = MappingProxyType({"population": 16, "generations": 6, "islands": 1})
+
+#: Largest error of latent models on the validation data, relative to that of the chosen kind.
+_CLEARLY_BETTER = 0.8
+
+#: Largest error on the estimation data, relative to that of the chosen kind, of latent models whose error on
+#: the validation data is merely not larger.
+_HALF = 0.5
+
+
+def compare_latent(
+    record: Dataset, split: Split, choice: Choice, fit: LibraryFit, settings: Settings, steps: Steps
+) -> Choice:
+    """Return the choice of latent models if they are clearly better than those of the chosen kind.
+
+    They are not tried if the residual of the free run of the recommended model has no predictable part, since
+    another model can then hardly be better. A stop ends the trial without an effect on the choice.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record as passed by the user.
+    split : Split
+        Estimation data and validation data at the rate of the record.
+    choice : Choice
+        Kind of NARX models.
+    fit : LibraryFit
+        Its fit.
+    settings : Settings
+        Settings of the search for latent models that is compared.
+    steps : Steps
+    """
+    chosen = fit.found.recommended
+    bounded = chosen.outcomes["validation"]["free_run"]
+    if (bounded and chosen.residual_structure.free_run_share <= LARGEST_SHARE) or steps.stop():
+        return choice
+    steps.report("preset auto: trial of latent models", None)
+    try:
+        latent = search_latent(record, split, settings, 0, steps, {}).recommended
+    except (SettingsError, StoppedError):
+        return choice
+    if steps.stop() or not latent.outcomes["validation"]["free_run"]:
+        return choice
+    # Models of means and of samples are compared in means of equal length.
+    ours, theirs = average_errors(latent, fit.average), chosen
+    errors = {**choice.errors, choice.kind: measure_share(theirs, split.estimation)}
+    errors[LATENT] = measure_share(ours, split.estimation)
+    compared = replace(choice, errors=MappingProxyType(errors))
+    if not _is_better(ours, theirs):
+        return compared
+    reason = (
+        "Preset auto chose latent (state spaces with static curves), because the free-run RMSE of the "
+        "recommended model of a short search on the validation data is "
+        f"{percent(errors[LATENT])} of the output range of the estimation data, compared with "
+        f"{percent(errors[choice.kind])} for {choice.kind}."
+    )
+    return replace(compared, kind=LATENT, delays=(), reasons=(reason, "Dead times are states of the model."))
+
+
+def _is_better(latent: Assessment, chosen: Assessment) -> bool:
+    if not chosen.outcomes["validation"]["free_run"]:
+        return True
+    if latent.validation_error <= _CLEARLY_BETTER * chosen.validation_error:
+        return True
+    ours, theirs = (each.metrics["estimation"]["free_run"].rmse for each in (latent, chosen))
+    return latent.validation_error <= chosen.validation_error and ours <= _HALF * theirs
