@@ -274,6 +274,10 @@ class ModelView(ResponseModel):
     criterion: dict[str, Any] | None = Field(
         default=None, description="Estimator of the parameters, and the error that they minimise."
     )
+    refit: dict[str, Any] | None = Field(
+        default=None,
+        description="Estimate of the parameters on all data, and the model before it, which has the errors.",
+    )
     warm_up: int | None = Field(
         default=None, description="Samples before the first prediction of the simulations in metrics."
     )

@@ -32,7 +32,7 @@ from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, sea
 from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
-from islands.io.models import any_model_from_json, model_from_json
+from islands.io.models import any_model_from_json, model_from_json, read_validated_model
 from islands.io.result_folder import result_document
 from islands.io.result_models import read_criterion, read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
@@ -40,7 +40,7 @@ from islands.reports.comparison import ComparedModel, comparison_report
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
 from islands.reports.origin import Origin
-from islands.validation.assessment import Assessment, assess
+from islands.validation.assessment import Assessment, assess, with_refit
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import FMU, REPORT, Job, name_free_run
 from islands_service.domain.job_spec import Identification, parse_identification
@@ -200,7 +200,12 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
             preset = "hysteresis" if spec.preset == AUTO else spec.preset
             warm_up = resolve_settings(preset, spec.changes).maximum_lag
         criterion = read_criterion(entry.document)
-        assessment = assess(model, split, shooting, warm_up, document["settings"]["constraints"], criterion)
+        constraints, refit = document["settings"]["constraints"], entry.document.get("refit")
+        validated = read_validated_model(entry.document, model)
+        assessment = assess(validated, split, shooting, warm_up, constraints, criterion)
+        if refit:
+            discarded = refit["discarded"] or ""
+            assessment = with_refit(assessment, model, refit["samples"], discarded, split, constraints)
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(replace(assessment, bands=bands))
     search = _search(document["search"], store.results.history(job.id))

@@ -53,6 +53,20 @@ def finished(service: ServiceClient) -> str:
 
 
 @pytest.mark.ci
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_job_with_a_refit_says_which_parameters_its_errors_belong_to(
+    opened: Callable[..., Any], service: ServiceClient, expect: Any, scheme: str
+) -> None:
+    job = run_submitted(service, service.submit(5, name="refit", settings={"refit": "all"}))
+    models = json.loads(service.models(job))["items"]
+    assert any(each["refit"]["discarded"] is None for each in models)
+    page = opened(f"#/jobs/{job}", color_scheme=scheme)
+    expect(page.locator("section.result")).to_contain_text("Refit: ")
+    expect(page.get_by_text("estimated again on all data after these errors were measured")).to_be_visible()
+    assert unreadable(page) == []
+
+
+@pytest.mark.ci
 def test_a_finished_job_shows_its_models_with_their_metrics(
     opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:

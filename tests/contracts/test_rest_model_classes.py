@@ -31,13 +31,14 @@ def dataset(service, tmp_path):
 
 def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
     with Client(service.url) as client:
-        job = client.submit(dataset, "u_V", "y_K", model="gain-scheduled")
+        job = client.submit(dataset, "u_V", "y_K", model="gain-scheduled", refit="all")
         blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
         outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
         service.store.leases.finish(lease, outcome)
         assert client.job(job).state == JobState.SUCCEEDED
         (model,) = client.models(job)
         assert model.kind == "gain-scheduled"
+        assert model.refit["discarded"] is None
         document = json.loads(client.export(job, model.rank, "json"))
         found = GainScheduledModel.read(document, "model")
         np.testing.assert_allclose(found.parameters, TRUE, rtol=0.01)
@@ -82,6 +83,7 @@ def test_a_latent_model_has_figures_of_its_parts(service, tmp_path):
     [
         ({"model": "gain"}, "unknown class of models"),
         ({"model": "gain-scheduled", "settings": {"generations": 3}}, "leave them out"),
+        ({"model": "gain-scheduled", "settings": {"refit": "every"}}, "unknown refit"),
     ],
 )
 def test_an_unknown_class_and_settings_of_a_search_are_refused(service, dataset, given, message):

@@ -8,12 +8,16 @@ import pytest
 
 import islands
 from islands.data.signal_map import match_rate
+from islands.io.models import model_from_json
+from islands.io.result_text.statements import BEFORE_REFIT
 from islands.validation.metrics import metrics
 from islands_api.client import Client
+from islands_api.web.auth import LOCAL_OWNER
 from islands_api.web.routes import figures
 from islands_api.web.routes.figures import FigureError
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.domain.job import JobState
+from islands_service.domain.job import REPORT, JobState
+from islands_service.figure_worker import read_search_result, render_figures
 from islands_service.store.blobs import Blobs
 from support.command_line import fail, succeed
 from support.job_runs import make_run
@@ -75,6 +79,23 @@ def test_free_run_of_the_recommended_model_needs_no_other_process(service, clien
     assert shown.status_code == 200, shown.text
     measured, simulated = (np.array(shown.json()[name], dtype=float) for name in ("measured", "free_run"))
     assert metrics(measured, simulated).rmse == pytest.approx(summary["metrics"]["rmse"])
+
+
+def test_errors_and_figures_of_a_job_belong_to_the_model_before_its_refit(service, client, path):
+    job = search(service, client, client.upload(path), refit="all")
+    blobs, entries = Blobs(service.settings.blobs), service.store.results.models(job, None)
+    stored = service.store.jobs.get(LOCAL_OWNER, job)
+    rebuilt = read_search_result(stored, service.store, blobs, None)
+    assert any(entry.refit and not entry.refit.discarded for entry in rebuilt.models)
+    for entry, kept in zip(rebuilt.models, entries, strict=True):
+        assert entry.final_model == model_from_json(kept.file)
+        assert entry.validation_error == kept.document["metrics"]["validation"]["free_run"]["rmse"]
+    summary = client.job(job).summary
+    shown = service.client.get(f"/v1/jobs/{job}/models/{summary['rank']}/simulation").json()
+    measured, simulated = (np.array(shown[name], dtype=float) for name in ("measured", "free_run"))
+    assert metrics(measured, simulated).rmse == pytest.approx(summary["metrics"]["rmse"])
+    assert "Refit: the parameters were estimated again on all 1200 samples" in summary["words"]
+    assert BEFORE_REFIT.encode() in render_figures(stored, rebuilt)[REPORT]
 
 
 def test_a_job_that_averages_samples_has_the_same_figures_everywhere(service, client, path, tmp_path):

@@ -91,7 +91,8 @@ def submit(
     output : str or sequence of str
         Output column; several for a model that couples them.
     model : str
-        Class of the models; others than ``narx`` are fitted without a search, and have no settings.
+        Class of the models; others than ``narx`` are fitted without a search, with the setting
+        ``refit`` only.
     dt : float, optional
         Sampling time in seconds, if the record has no time column.
     rows : str, optional

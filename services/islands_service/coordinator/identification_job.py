@@ -158,6 +158,7 @@ def _identify(
             validation,
             model=spec.model,
             seed=spec.seed,
+            refit=spec.changes.get("refit", "none"),
             progress=reporter.report_stage,
             stop=stop,
         )

@@ -66,7 +66,7 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
         "rank": recommended["rank"],
         "reasons": recommended["reasons"],
         "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
-        "equation": found.recommended.model.equation().line,
+        "equation": found.recommended.final_model.equation().line,
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],
         "property_1": best["physics"]["property_1"],
@@ -75,7 +75,7 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
         "ended_by": document["search"]["ended_by"],
         **({"note": note} if note else {}),
     }
-    files = [model_json(entry.model) for entry in found.models]
+    files = [model_json(entry.final_model) for entry in found.models]
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 

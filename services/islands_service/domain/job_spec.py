@@ -133,7 +133,7 @@ class Identification(BaseModel):
     preset: str = Field(default=AUTO, json_schema_extra={"enum": list(PRESET_NAMES)})
     model: str = Field(
         default=NARX,
-        description="Class of the models; others than narx are fitted without a search and have no settings.",
+        description="Class of the models; others than narx are fitted without a search (setting: refit).",
         json_schema_extra={"enum": [NARX, *MODEL_CLASSES]},
     )
     seed: Seed = 0

@@ -65,6 +65,14 @@ class Criterion:
         return {1: "one_step_ahead", None: "free_run"}.get(self.interval, "multiple_shooting")
 
 
+#: What is estimated again on estimation and validation data after the ranking, by name.
+REFITS: Mapping[str, str] = MappingProxyType(
+    {
+        "none": "nothing: the validation data have no part in the parameters",
+        "all": "the parameters of all ranked models",
+    }
+)
+
 #: Criterion of least squares.
 LEAST_SQUARES = Criterion("least-squares", 1)
 

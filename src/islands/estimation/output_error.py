@@ -35,7 +35,7 @@ from islands.estimation.linear_simulation import (
 from islands.estimation.noise_model import fit_whitening, is_rounding_error
 from islands.expressions.tree import Expression, Lagged
 from islands.kernels.linear_filter import divide_rows
-from islands.models.narx import make_model
+from islands.models.narx import Model, make_model
 
 #: Largest order of a model. An order is tried only if one of the two before it reduced the criterion.
 _LARGEST_ORDER, _PATIENCE = 4, 2
@@ -112,6 +112,46 @@ def make_problem(record: Dataset, order: int, delays: Sequence[int], lags: int) 
         for place, delay in enumerate(delays)
         for lag in range(1, min(order + early[place], lags) + 1)
     ]
+    return _make_rows(record, order, read)
+
+
+def refit_output_error(model: Model, record: Dataset, criterion: Criterion) -> FittedStructure | None:
+    """Estimate the parameters of a model of `fit_output_error` again, on another record.
+
+    Parameters
+    ----------
+    model : Model
+        Its parameters are the start, and its terms stay.
+    record : Dataset
+        Record without missing values. All samples of its 16 longest segments are used.
+    criterion : Criterion
+        ``OUTPUT_ERROR`` or ``BOX_JENKINS``. The noise model of the latter is estimated again, too.
+
+    Returns
+    -------
+    FittedStructure or None
+        None if the estimate fails.
+    """
+    values = {item.expression: value for item, value in zip(model.regressors, model.parameters, strict=True)}
+    lagged = [term for term in values if isinstance(term, Lagged)]
+    read = sorted((term.channel - 1, term.lag) for term in lagged if term.channel)
+    problem = _make_rows(record, model.output_lag, read)
+    if problem is not None and len(lagged) < len(values):
+        problem = problem.with_constant()
+    if problem is None or not problem.is_determined:
+        return None
+    denominator = [-values[Lagged(0, lag)] for lag in range(1, model.output_lag + 1)]
+    start = solve(problem, np.array(denominator))
+    if start is None:
+        return None
+    found = minimise(start, _MIN_GAIN)
+    if criterion == BOX_JENKINS:
+        found = _fit_coloured(found) or found  # of a white residual, both are equal
+    return _make_structure(found, record, criterion)
+
+
+def _make_rows(record: Dataset, order: int, read: Sequence[tuple[int, int]]) -> LinearProblem | None:
+    """Return the rows of a model that reads inputs, each given by its place and its lag."""
     first = max([order, *(lag for _, lag in read)])
     longest = sorted(record.bounds, key=lambda bounds: bounds[0] - bounds[1])[:_LARGEST_SEGMENTS]
     kept = sorted((begin, end) for begin, end in longest if end - begin > first + order)

@@ -119,7 +119,7 @@ LATENT_SETTINGS = frozenset(
     {
         *("model_class", "structure", "population", "generations", "elite", "crossover"),
         *("tournament", "islands", "topology", "migrate_every", "migrants", "emigrants"),
-        *("replaced", "max_evaluations", "target_error"),
+        *("replaced", "max_evaluations", "target_error", "refit"),
     }
 )
 
@@ -265,7 +265,7 @@ def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Setting
     if lookup({AUTO: _PAPER, **PRESETS}, name, "preset").model_class == LATENT:
         raise SettingsError(f"the preset {name} is for one output: name one output, or take another preset")
     settings = resolve_settings(name, {"feedthrough": "no", **changes})
-    check_coupled_settings(settings.constraints, settings.feedthrough)
+    check_coupled_settings(settings.constraints, settings.feedthrough, settings.refit)
     if settings.select != "validation":
         raise SettingsError(
             "select is 'validation' with several outputs: equations are chosen by their free run together"
@@ -273,7 +273,7 @@ def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Setting
     return settings
 
 
-def check_coupled_settings(constraints: str | None, feedthrough: str) -> None:
+def check_coupled_settings(constraints: str | None, feedthrough: str, refit: str) -> None:
     """Check settings that hold for every equation of several outputs.
 
     Raises
@@ -290,6 +290,10 @@ def check_coupled_settings(constraints: str | None, feedthrough: str) -> None:
         raise SettingsError(
             "feedthrough is 'no' with several outputs, so that they do not depend on each other within a "
             "sample: name the inputs that act within the sample with +1, as u+1"
+        )
+    if refit != "none":
+        raise SettingsError(
+            "refit is 'none' with several outputs: the validation data choose among their equations"
         )
 
 

@@ -19,7 +19,7 @@ from islands.errors import (
     lookup,
 )
 from islands.estimation.constraints.parser import FORMS
-from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimator_table import ESTIMATORS, REFITS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.err_targets import ERR_TARGETS
@@ -160,6 +160,9 @@ class Settings:
     estimator : str
         An entry of ``ESTIMATORS``, which estimates the parameters of the final models. Empty: least squares
         and, with ``refine``, refinement; the validation data select between the two.
+    refit : str
+        An entry of ``REFITS``. With ``all``, the parameters of the ranked models are estimated again on
+        estimation and validation data together; the errors remain those of the parameters before.
     select : str
         An entry of ``SELECTIONS``, which recommends a model. ``validation`` takes the smallest model that is
         as good as the best on the validation data. ``fitness`` takes the model with the least error of the
@@ -243,10 +246,15 @@ class Settings:
     estimator: str = _option(
         "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"
     )
+    refit: str = _option(
+        "none",
+        f"Estimate the parameters again on all data in the end: {', '.join(REFITS)}.",
+        after="estimator",
+    )
     select: str = _option(
         "validation",
         "What recommends a model: validation, or fitness, the error on the estimation data.",
-        after="estimator",
+        after="refit",
     )
     average: int | str = _option(1, "Samples of a mean that becomes one sample, or auto.")
     feedthrough: str = _option("no", "Whether models read u(k): auto (test the record), yes or no.")
@@ -309,6 +317,7 @@ class Settings:
         lookup(SELECTIONS, self.select, "select")
         if self.estimator:
             lookup(ESTIMATORS, self.estimator, "estimator")
+        lookup(REFITS, self.refit, "refit")
         primitive_table(self.primitives)
         for shift in self.shifts:
             check_integers(shifts=shift)

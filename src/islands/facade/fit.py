@@ -14,6 +14,7 @@ from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
 from islands.facade.library_fit import FitChanges, FitSettings
+from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
 from islands.io.data_frames import read_data
 from islands.io.models import NARX
@@ -51,6 +52,7 @@ def fit(
     max_terms: int = 10,
     constraints: str | None = None,
     estimator: str = "",
+    refit: str = "none",
     average: int | str = AUTO,
     feedthrough: str = AUTO,
     shooting: int | None = None,
@@ -63,7 +65,8 @@ def fit(
     """Fit models of increasing size to a record by subset selection and rank them on validation data.
 
     With another ``model`` than ``narx``, fit the model of a class with named parameters by the error of its
-    free run; all settings from ``library`` to ``certificate`` are those of NARX models.
+    free run; all settings from ``library`` to ``certificate`` except ``refit`` are those of NARX
+    models.
 
     Parameters
     ----------
@@ -100,6 +103,10 @@ def fit(
     estimator : str
         An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures. By default,
         they are those of least squares or, if the validation data prefer it, of the error of the free run.
+    refit : str
+        ``all`` estimates the parameters of the ranked models again in the end, on estimation and validation
+        data together. The errors of the result remain those of the parameters before, since no data are left
+        to measure the others. An entry of ``REFITS``; for models of every class.
     average : int or str
         Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
         oversampled record if small models are clearly better on the validation data. Models then have the
@@ -158,6 +165,7 @@ def fit(
         stop=stop,
         max_terms=max_terms,
         estimator=estimator,
+        refit=refit,
         average=average,
         feedthrough=feedthrough,
         shooting=shooting,
@@ -207,17 +215,19 @@ def fit_record(
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if model != NARX:
         given = library, degree, lags, delays, constraints, settings
-        if given != (AUTO, None, None, None, None, FitSettings()):
+        if given != (AUTO, None, None, None, None, FitSettings(refit=settings.refit)):
             raise SettingsError(
                 f"library, max_terms and so on are settings of NARX models, not for the model {model}: "
                 "leave them out"
             )
         found = fit_class(record, split, model, structure, seed, Steps(progress, stop))
-        return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))
+        found = replace(found, settings={**found.settings, "refit": settings.refit, "validation": held_out})
+        return Result.from_search(refit_models(found, validation, Steps(progress, stop)))
     try:
         found = fit_chosen_library(
             record, split, library, degree, lags, constraints, delays, settings, seed, progress, stop
         )
     except StoppedChoiceError as stopped:
         found = stopped.found
-    return Result.from_search(replace(found, settings={**found.settings, "validation": held_out}))
+    found = replace(found, settings={**found.settings, "validation": held_out})
+    return Result.from_search(refit_models(found, validation, Steps(progress, stop)))

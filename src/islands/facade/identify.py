@@ -42,6 +42,7 @@ from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.latent_identification import identify_latent
+from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.feedthrough_selection import select_feedthrough
@@ -209,14 +210,13 @@ def identify_record(
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if settings.model_class == LATENT:
         described = {**_describe_preset(preset), "validation": held_out}
-        return Result.from_search(
-            identify_latent(
-                *(record, parts, settings, seed, steps, described),
-                start=start,
-                engine=engine,
-                on_epoch=on_epoch or ignore_epoch,
-            )
+        found = identify_latent(
+            *(record, parts, settings, seed, steps, described),
+            start=start,
+            engine=engine,
+            on_epoch=on_epoch or ignore_epoch,
         )
+        return Result.from_search(refit_models(found, validation, steps))
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
     steps("sampling rate and direct feedthrough", 0.0)
@@ -252,7 +252,7 @@ def identify_record(
     found = SearchResult(record, split, seed, described, statistics, models)
     found = with_linear_comparison(found, scaled.library_delays, scaled.shooting, steps)
     banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
-    return Result.from_search(with_average(banded, count))
+    return Result.from_search(refit_models(with_average(banded, count), validation, steps))
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:

@@ -12,7 +12,7 @@ from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import SettingsError, check_integers, lookup
-from islands.estimation.estimator_table import ESTIMATORS, make_criterion
+from islands.estimation.estimator_table import ESTIMATORS, REFITS, make_criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
     Structure,
@@ -80,6 +80,7 @@ class FitChanges(TypedDict, total=False):
 
     max_terms: int
     estimator: str
+    refit: str
     average: int | str
     feedthrough: str
     shooting: int | None
@@ -92,6 +93,7 @@ class FitSettings:
 
     max_terms: int = 10
     estimator: str = ""
+    refit: str = "none"
     average: int | str = AUTO
     feedthrough: str = AUTO
     shooting: int | None = None
@@ -99,6 +101,7 @@ class FitSettings:
 
     def __post_init__(self) -> None:
         lookup(ESTIMATORS, self.selecting_estimator, "estimator")
+        lookup(REFITS, self.refit, "refit")
         check_integers(max_terms=self.max_terms, certificate=self.certificate, shooting=self.shooting)
         if self.max_terms < 1:
             raise SettingsError(f"a model has at least one term, got max_terms = {self.max_terms}")

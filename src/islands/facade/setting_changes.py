@@ -42,6 +42,7 @@ class SettingChanges(TypedDict, total=False):
     niches: bool
     refine: bool
     estimator: str
+    refit: str
     select: str
     average: int | str
     feedthrough: str

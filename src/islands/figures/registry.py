@@ -171,7 +171,7 @@ def _loop(entry: Assessment, split: Split) -> Figure:
 
 def _hold(entry: Assessment, split: Split) -> Figure:
     """Draw the output while the input is held at five levels."""
-    return draw_holds(entry.model, split.estimation)
+    return draw_holds(entry.final_model, split.estimation)
 
 
 def _residuals(entry: Assessment, _split: Split) -> Figure:

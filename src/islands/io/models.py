@@ -122,6 +122,24 @@ def model_from_json(
     return read_narx(text, name, primitives)
 
 
+def read_validated_model(entry: Mapping[str, Any], model: DynamicModel) -> DynamicModel:
+    """Return the model that the errors of an entry of ``result.json`` belong to.
+
+    Parameters
+    ----------
+    entry : mapping
+    model : DynamicModel
+        Model of the entry. Its parameters are others if they were estimated again on all data.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    found = (entry.get("refit") or {}).get("validated_model")
+    return model if found is None else model_from_json(json.dumps(found), "the validated model of the result")
+
+
 def any_model_from_json(
     text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> AnyModel:

@@ -47,7 +47,7 @@ def _write_json(document: Mapping[str, Any]) -> str:
 def result_document(found: SearchResult) -> dict[str, Any]:
     """Return a result as JSON values; NaN and infinity become null."""
     # The checks of a model are made when they are first read.
-    list(map_over_record(attrgetter("physics", "residual_tests"), found.models, found.record.samples))
+    list(map_over_record(attrgetter("final_physics", "residual_tests"), found.models, found.record.samples))
     search, recommendation = found.search, found.recommendation
     document = {
         "schema": SCHEMA,
@@ -128,7 +128,7 @@ def content_sha256(record: Dataset) -> str:
 def _model_document(
     rank: int, assessment: Assessment, recommended: bool, ensemble: Ensemble | None
 ) -> dict[str, Any]:
-    model, written = assessment.model, assessment.model.equation()
+    model, written = assessment.final_model, assessment.final_model.equation()
     return {
         **({} if isinstance(model, Model) else {"kind": model.kind}),
         "rank": rank,
@@ -147,12 +147,25 @@ def _model_document(
         },
         "warm_up": assessment.warm_up,
         "estimated_start": assessment.has_estimated_start,
+        "refit": _refit_document(assessment),
         "information": asdict(assessment.information),
         "constraints": [
             {**asdict(entry), "named": named_statement(entry.text, require_narx(model))}
-            for entry in assessment.constraints
+            for entry in assessment.final_constraints
         ],
         **_assessment_document(assessment),
+    }
+
+
+def _refit_document(assessment: Assessment) -> dict[str, Any] | None:
+    """Return the estimate on all data as JSON values, with the model that the errors belong to."""
+    refit = assessment.refit
+    if refit is None:
+        return None
+    return {
+        "samples": refit.samples,
+        "discarded": refit.discarded or None,
+        "validated_model": None if refit.discarded else json.loads(model_json(assessment.model)),
     }
 
 
@@ -177,7 +190,7 @@ def _assessment_document(assessment: Assessment) -> dict[str, Any]:
         "outcomes": {
             part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
         },
-        "physics": physics_document(assessment.physics),
+        "physics": physics_document(assessment.final_physics),
         "residual_tests": residual_tests_document(assessment.residual_tests)
         | residual_structure_document(assessment.residual_structure),
     }
@@ -258,9 +271,9 @@ def write_result(found: SearchResult, folder: Path) -> None:
     for path in models.glob("[0-9][0-9]*.json"):
         path.unlink()
     for rank, entry in enumerate(found.models, start=1):
-        write_model(entry.model, models / f"{rank:02d}.json")
+        write_model(entry.final_model, models / f"{rank:02d}.json")
     document = result_document(found)
-    (folder / "summary.txt").write_text(summary(document, found.recommended.model), encoding="utf-8")
+    (folder / "summary.txt").write_text(summary(document, found.recommended.final_model), encoding="utf-8")
     (folder / "method.txt").write_text(method_text(found), encoding="utf-8")
     (folder / "result.json").write_text(_write_json(document), encoding="utf-8")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.errors import SettingsError
 from islands.io.result_text.headlines import write_comparison_headline
-from islands.io.result_text.statements import Document
+from islands.io.result_text.statements import BEFORE_REFIT, Document, is_refitted
 from islands.reports.origin import Origin
 from islands.reports.rendering import TEMPLATES, inline_figure
 
@@ -94,7 +94,7 @@ def comparison_report(origin: Origin, models: Sequence[ComparedModel]) -> bytes:
         headline=write_comparison_headline(
             [(each.name, each.output, each.model) for each in models], len(groups) == 1
         ),
-        lead=_describe_data(models, len(groups)),
+        lead=_describe_data(models, len(groups)) + _describe_refits(lettered),
         columns=_COLUMNS,
         errors=[_list_errors(letter, each) for letter, each in lettered.items()],
         figures=_draw_groups(groups),
@@ -121,6 +121,11 @@ def _describe_data(models: Sequence[ComparedModel], groups: int) -> str:
     same = len({each.record["sha256"] for each in models}) == 1
     what = "different samples of the same data" if same else "different data"
     return f"The models were validated on {what}, so that their errors are not comparable."
+
+
+def _describe_refits(lettered: Mapping[str, ComparedModel]) -> str:
+    refitted = [letter for letter, each in lettered.items() if is_refitted(each.model)]
+    return f" Errors and free runs of {', '.join(refitted)}: {BEFORE_REFIT}." if refitted else ""
 
 
 def _list_errors(letter: str, compared: ComparedModel) -> list[str]:

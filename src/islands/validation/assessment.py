@@ -68,12 +68,40 @@ class Checks:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Refit:
+    """Estimate of the parameters of an assessed model on all data, after the validation data have ranked it.
+
+    The validation data have a part in these parameters, so that no error on them is measured.
+
+    Attributes
+    ----------
+    model : DynamicModel
+        With the new parameters and their standard errors. The assessed model if they are discarded.
+    samples : int
+        Samples of all data.
+    discarded : str
+        Why the new parameters are discarded; empty if they are not.
+    checks : Checks
+        Of the model: its physics checks count, and its residuals are not tested.
+    constraints : tuple of ConstraintCheck
+        As of an `Assessment`, with the values of this model.
+    """
+
+    model: DynamicModel
+    samples: int
+    discarded: str
+    checks: Checks
+    constraints: tuple[ConstraintCheck, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
     """A model with its errors, residual tests and physics checks.
 
     Attributes
     ----------
     model : DynamicModel
+        Model that all errors, tests and checks here belong to; see ``final_model``.
     metrics : mapping
         ``metrics[part][mode]``, NaN if the simulation diverged.
     outcomes : mapping
@@ -97,6 +125,8 @@ class Assessment:
         Prediction bands of the free run. None without an ensemble, or if its free runs diverge.
     criterion : Criterion or None
         Error that the parameters minimise. None if they are given.
+    refit : Refit or None
+        Estimate of the parameters on all data, if there is one.
     """
 
     model: DynamicModel
@@ -110,6 +140,22 @@ class Assessment:
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
     bands: PredictionBands | None = None
     criterion: Criterion | None = None
+    refit: Refit | None = None
+
+    @property
+    def final_model(self) -> DynamicModel:
+        """Model for use: that of the refit, if there is one."""
+        return self.refit.model if self.refit else self.model
+
+    @property
+    def final_physics(self) -> PhysicsChecks:
+        """Physics checks of the final model."""
+        return self.refit.checks.physics if self.refit else self.physics
+
+    @property
+    def final_constraints(self) -> tuple[ConstraintCheck, ...]:
+        """Constraints with the values of the final model."""
+        return self.refit.constraints if self.refit else self.constraints
 
     @property
     def validation_error(self) -> float:
@@ -213,6 +259,31 @@ def assess(
         recordings,
         criterion=criterion,
     )
+
+
+def with_refit(
+    entry: Assessment, model: DynamicModel, samples: int, discarded: str, split: Split, constraints: str
+) -> Assessment:
+    """Return an assessment with the estimate of its parameters on all data.
+
+    Parameters
+    ----------
+    entry : Assessment
+    model : DynamicModel
+        Model of that estimate. If it is discarded, the model of the assessment takes its place.
+    samples : int
+        Samples of all data.
+    discarded : str
+        Why the estimate is discarded; empty if it is not.
+    split : Split
+        Split of the assessment.
+    constraints : str
+        Constraints under which the parameters were estimated.
+    """
+    if discarded:
+        return replace(entry, refit=Refit(entry.model, samples, discarded, entry.checks, entry.constraints))
+    checks = Checks(model, split, entry.warm_up)
+    return replace(entry, refit=Refit(model, samples, "", checks, check_constraints(model, constraints)))
 
 
 def average_errors(assessment: Assessment, count: int) -> Assessment:

@@ -120,7 +120,7 @@ def recommend(
         chosen + 1,
         (
             _describe_choice(chosen, best, len(equal), len(kept), assessments, unit) + _describe_luck(lucky),
-            _describe_physics(bool(sound), hysteresis, assessments[chosen].physics),
+            _describe_physics(bool(sound), hysteresis, assessments[chosen].final_physics),
         ),
     )
 
@@ -147,11 +147,10 @@ def recommend_fittest(
     chosen = min(range(len(errors)), key=lambda at: (inf if isnan(errors[at]) else errors[at], at))
     size = f"{errors[chosen]:.4g} {unit}".rstrip()
     reason = f"least error of the search on the estimation data ({mode.replace('_', ' ')}), RMSE {size}"
-    sound = is_sound(assessments[chosen].physics, hysteresis)
-    return Recommendation(
-        chosen + 1,
-        (reason, _describe_physics(True, hysteresis, assessments[chosen].physics)) if sound else (reason,),
-    )
+    entry = assessments[chosen]
+    if not is_sound(entry.physics, hysteresis):
+        return Recommendation(chosen + 1, (reason,))
+    return Recommendation(chosen + 1, (reason, _describe_physics(True, hysteresis, entry.final_physics)))
 
 
 def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:

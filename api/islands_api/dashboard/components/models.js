@@ -265,7 +265,10 @@ export function makeModelsPanel(job, rank, unit, signal) {
       "p",
       { class: "soft small" },
       "Errors are those of the free run. The models are ranked by the validation data, so these errors are "
-        + "not an independent test.",
+        + "not an independent test."
+        + (models.some((model) => model.refit && !model.refit.discarded)
+          ? " The parameters were estimated again on all data after these errors were measured."
+          : ""),
     );
     const overview = makeScrollable("Models", makeModelTable(job.id, models));
     front = makeModelFront(job, models, unit, signal);

@@ -7,8 +7,8 @@ import { makeLineChart } from "./chart.js";
 import { makeEquation } from "./models.js";
 import { makeTryModel } from "./try_model.js";
 
-/** Beginnings of the sentences of the summary that are shown: physical quantities, and the verdict. */
-const SHOWN = ["Dry friction", "As a simulation", "Fails at"];
+/** Beginnings of the sentences of the summary that are shown: physical quantities, a refit, the verdict. */
+const SHOWN = ["Dry friction", "Refit", "As a simulation", "Fails at"];
 
 /** Return the median of half the width of a band; NaN if there is none. */
 function findHalfWidth({ band }) {

@@ -22,7 +22,7 @@ from islands.data.coupled_record import join_columns, split_coupled
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
-from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimator_table import ESTIMATORS, REFITS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.identification_progress import CLASS_PHASES, fit_phases
 from islands.figures.names import FREE_RUN, parse_figures
@@ -85,6 +85,12 @@ def fit(
     estimator: Annotated[
         str, typer.Option("--estimator", help=f"{', '.join(ESTIMATORS)}; by default validation selects.")
     ] = "",
+    refit: Annotated[
+        str,
+        typer.Option(
+            "--refit", help=f"Estimate the parameters again on all data in the end: {', '.join(REFITS)}."
+        ),
+    ] = "none",
     average: Annotated[
         str, typer.Option("--average", help="Samples of a mean that becomes one sample, or auto.")
     ] = AUTO,
@@ -138,6 +144,7 @@ def fit(
             "max_terms": max_terms,
             "constraints": constraints,
             "estimator": estimator,
+            "refit": refit,
             "average": average,
             "feedthrough": feedthrough,
             "shooting": shooting,

@@ -178,7 +178,7 @@ def fit_coupled_data(
         As `fit_coupled`.
     """
     chosen: dict[str, Any] = {"library": "polynomial", "feedthrough": "no", **options}
-    check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"])
+    check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"], chosen.get("refit", "none"))
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
     find = partial(fit_record, seed=seed, stop=stop)

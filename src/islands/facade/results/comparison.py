@@ -10,6 +10,7 @@ from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import record_of_model
+from islands.io.result_text.statements import BEFORE_REFIT
 from islands.validation.metrics import Metrics, metrics
 
 if TYPE_CHECKING:
@@ -149,6 +150,8 @@ def compare_models(
         data = "the validation data"
         if not same_data:
             data += " of each result, which differ: give a record to compare on"
+        if any(each.is_refitted for models in results for each in models):
+            data += f" ({BEFORE_REFIT})"
     recommended = tuple(models[rank - 1] for rank, models in zip(chosen, rows, strict=True))
     return ResultComparison(recommended, tuple(row for models in rows for row in models), data)
 

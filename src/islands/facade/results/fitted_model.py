@@ -18,6 +18,7 @@ from islands.export import export_or_write
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
+from islands.io.result_text.statements import BEFORE_REFIT, is_refitted
 from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
@@ -49,12 +50,12 @@ class FittedModel:
     Attributes
     ----------
     model : DynamicModel
-        Structure, parameters, standard errors.
+        Structure, parameters, standard errors; those of a refit, if there is one.
     rank : int or None
         Rank of the model; 1 has the least validation error. None for a model file outside of a result folder.
     metrics : mapping
         Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``; empty outside
-        of a result folder.
+        of a result folder. They are those of the parameters before a refit.
     warm_up : int
         Number of samples before the first prediction of the simulations of ``metrics``; the largest lag
         outside of a result folder.
@@ -85,7 +86,7 @@ class FittedModel:
     def from_search(cls, rank: int, assessment: Assessment, found: SearchResult) -> "FittedModel":
         """Return a model of a search result."""
         return cls(
-            *(assessment.model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
+            *(assessment.final_model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
             *(assessment.bands, found.record.output_unit, {}, assessment, found),
         )
 
@@ -96,7 +97,7 @@ class FittedModel:
 
     @property
     def assessment(self) -> Assessment:
-        """Errors, residual tests and physics checks of the search.
+        """Errors, residual tests and physics checks of the search, of the parameters before a refit.
 
         Raises
         ------
@@ -106,6 +107,13 @@ class FittedModel:
         if self._assessment is None:
             raise _missing_search()
         return self._assessment
+
+    @property
+    def is_refitted(self) -> bool:
+        """Whether the parameters were estimated again on all data, after the errors were measured."""
+        if self._assessment is None:
+            return is_refitted(self.document)
+        return self._assessment.refit is not None and not self._assessment.refit.discarded
 
     @property
     def search_result(self) -> SearchResult:
@@ -211,12 +219,12 @@ class FittedModel:
     @property
     def physics(self) -> PhysicsChecks:
         """Physics checks: cluster sums, holds, minor loops, other amplitudes and rates."""
-        return self.assessment.physics
+        return self.assessment.final_physics
 
     @property
     def constraints(self) -> tuple[ConstraintCheck, ...]:
         """Constraints of the search, each with its target and the value of this model."""
-        return self.assessment.constraints
+        return self.assessment.final_constraints
 
     @property
     def residual_tests(self) -> ResidualTests:
@@ -299,8 +307,8 @@ class FittedModel:
     ) -> Simulation:
         """Simulate the model on a record.
 
-        On the validation data, the errors of the simulation are those in `metrics`. A free run starts as that
-        of `predict`.
+        On the validation data, the errors of the simulation are those in `metrics`, unless the parameters
+        were estimated again on all data. A free run starts as that of `predict`.
 
         Parameters
         ----------
@@ -359,7 +367,8 @@ class FittedModel:
             A key of ``islands.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in ``metrics``),
             ``loop``, ``hold``, ``residuals``; of latent models ``structure``, ``curves`` and ``bode``.
         record : Dataset or data frame, optional
-            Record that is drawn; by default the validation data. A frame has the columns of the model.
+            Record that is drawn; by default the validation data, with the parameters that the errors on them
+            belong to. A frame has the columns of the model.
         ax : Axes, optional
             Axes to draw into, for the kinds of ``PANELS``: of a figure with several panels, the first.
 
@@ -385,10 +394,10 @@ class FittedModel:
         if record is None and ax is None:
             return lookup(FIGURES, kind, "figure")(self.assessment, self.search_result.split)
         if record is None:
-            data = self.validation
+            model, data = self.assessment.model, self.validation
         else:
-            data = match_rate(self.model, record_of_model(self.model, record))
-        return draw_record_figure(kind, self.model, data, self.warm_up, self.prediction_bands, ax)
+            model, data = self.model, match_rate(self.model, record_of_model(self.model, record))
+        return draw_record_figure(kind, model, data, self.warm_up, self.prediction_bands, ax)
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
         """Return the model as text, or write it to a file.
@@ -422,7 +431,7 @@ class FittedModel:
         """Return the rank and the error of the model as a sentence."""
         error = self.metrics["validation"]["free_run"].rmse
         text = f"Rank {self.rank}: free-run RMSE on the validation data {error:.4g} {self.output_unit}"
-        return text.rstrip()
+        return text.rstrip() + (f", {BEFORE_REFIT}" if self.is_refitted else "")
 
 
 def _missing_search() -> ModelError:

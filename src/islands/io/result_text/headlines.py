@@ -3,7 +3,13 @@
 from collections.abc import Sequence
 
 from islands.io.result_text.diagnosis_statements import DiagnosisFacts, compare_with_output
-from islands.io.result_text.statements import Document, ResultFacts, write_amount
+from islands.io.result_text.statements import (
+    BEFORE_REFIT,
+    Document,
+    ResultFacts,
+    is_refitted,
+    write_amount,
+)
 
 
 def write_headline(document: Document) -> str:
@@ -21,8 +27,9 @@ def write_headline(document: Document) -> str:
     error = facts.error()
     if error["rmse"] is None:
         return f"The free run of a model of {terms} diverges on the validation data of {output}"
-    stated = _state_error(error, facts.unit)
-    return f"A model of {terms} simulates {output} with a {stated}"
+    return f"A model of {terms} simulates {output} with a {_state_error(error, facts.unit)}" + _add_refit(
+        facts.model
+    )
 
 
 def write_coupled_headline(outputs: Sequence[Document]) -> str:
@@ -66,7 +73,7 @@ def write_comparison_headline(
     # The error that is stated is the least one; it is undefined for a constant output.
     stated = "rmse" if any(errors[at]["mape"] is None for at in known) else "mape"
     name, (_, unit), _ = models[best := min(known, key=lambda at: float(errors[at][stated]))]
-    error = _state_error(errors[best], unit)
+    error = _state_error(errors[best], unit) + _add_refit(models[best][2])
     return f"Of {len(models)} models, {name} simulates {outputs} best, with a {error}"
 
 
@@ -107,6 +114,10 @@ def _state_error(error: Document, unit: str) -> str:
     if error["mape"] is None:
         return f"free-run error (RMSE) of {write_amount(error['rmse'], unit)}"
     return f"mean absolute error of {error['mape']:.3g} % of its range"
+
+
+def _add_refit(entry: Document) -> str:
+    return f", {BEFORE_REFIT}" if is_refitted(entry) else ""
 
 
 def _percent(fraction: float) -> str:

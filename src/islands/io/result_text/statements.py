@@ -77,6 +77,9 @@ _ESTIMATES = {
     "box-jenkins": "least error of the free run and its initial state, whitened (linear Box-Jenkins model)",
 }
 
+#: What is added to an error on the validation data if the parameters were estimated again after it.
+BEFORE_REFIT = "measured before the parameters were estimated again on all data"
+
 #: Values of a JSON object.
 Document = Mapping[str, Any]
 
@@ -310,6 +313,11 @@ class ResultFacts(RunFacts):
     def criterion(self) -> Document:
         """Error that the parameters minimise. Empty in results of earlier versions."""
         return self.model.get("criterion") or {}
+
+    @property
+    def refit(self) -> Document:
+        """Estimate of the parameters on all data. Empty if there is none."""
+        return self.model.get("refit") or {}
 
     @property
     def linear(self) -> Document:
@@ -578,6 +586,33 @@ def _describe_criterion(facts: ResultFacts) -> str:
     found = facts.criterion
     text = _ESTIMATES[found["estimator"]].format(interval=found["interval"])
     return f"Parameters: {text}{', under constraints' if facts.model['constraints'] else ''}."
+
+
+def is_refitted(entry: Document) -> bool:
+    """Return whether the parameters of a model are others than those that its errors belong to.
+
+    Parameters
+    ----------
+    entry : mapping
+        Entry of the model in ``result.json``.
+    """
+    refit = entry.get("refit")
+    return bool(refit and not refit["discarded"])
+
+
+def _describe_refit(facts: ResultFacts) -> str:
+    return (
+        f"Refit: the parameters were estimated again on all {facts.refit['samples']} samples, those of "
+        "estimation and of validation; errors, residual tests and bands are measured with the parameters "
+        "before, since no data are left to measure the new ones."
+    )
+
+
+def _describe_discarded_refit(facts: ResultFacts) -> str:
+    return (
+        "Refit: discarded, the parameters are those of the estimation data. With estimation and validation "
+        f"data, {facts.refit['discarded']}."
+    )
 
 
 def _describe_error(facts: ResultFacts) -> str:
@@ -933,6 +968,8 @@ MEASURES: Final[tuple[Statement[ResultFacts], ...]] = (
         lambda facts: _describe_friction(facts.friction, facts) if facts.friction else "",
     ),
     Statement("criterion", lambda facts: facts.criterion, _describe_criterion),
+    Statement("refit", lambda facts: is_refitted(facts.model), _describe_refit),
+    Statement("discarded-refit", lambda facts: facts.refit.get("discarded"), _describe_discarded_refit),
     Statement("error", lambda facts: facts.error()["rmse"] is not None, _describe_error),
     Statement(
         "divergence",

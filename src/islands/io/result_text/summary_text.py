@@ -47,7 +47,7 @@ def method_text(found: SearchResult) -> str:
         "",
         *wrap(_describe_names(found)),
         *(
-            f"{rank:2d}  " + entry.model.equation().named.replace("\n", "\n    ")
+            f"{rank:2d}  " + entry.final_model.equation().named.replace("\n", "\n    ")
             for rank, entry in enumerate(found.models, start=1)
         ),
     ]
@@ -56,7 +56,7 @@ def method_text(found: SearchResult) -> str:
 
 def _describe_names(found: SearchResult) -> str:
     """Return the heading of the equations, with the signals that they read."""
-    statement = named_signals(found.recommended.model)
+    statement = named_signals(found.recommended.final_model)
     where = f", where {statement}" if statement else ""
     return f"Equations by rank, with the columns of the record{where}:"
 

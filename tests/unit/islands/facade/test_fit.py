@@ -213,6 +213,7 @@ def test_result_has_the_values_of_default_settings():
         "max_terms": 2,
         "constraints": "none",
         "estimator": "",
+        "refit": "none",
         "average": "auto",
         "feedthrough": "auto",
         "shooting": 30,

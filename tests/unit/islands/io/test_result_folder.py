@@ -70,8 +70,8 @@ def test_a_result_has_every_field_of_the_contract(findings):
     for model in result["models"]:
         assert list(model) == [
             *("rank", "recommended", "size", "equation", "latex", "signals", "named_equation"),
-            *("named_signals", "terms", "bands", "recordings", "warm_up", "estimated_start", "information"),
-            *("constraints", "criterion", "metrics", "outcomes", "physics"),
+            *("named_signals", "terms", "bands", "recordings", "warm_up", "estimated_start", "refit"),
+            *("information", "constraints", "criterion", "metrics", "outcomes", "physics"),
             "residual_tests",
         ]
         for term in model["terms"]:

@@ -46,6 +46,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "primitives": (("mul", "phi1"), ["mul", "phi1"]),
     "constraints": (("none",), "none"),
     "estimator": (("free-run",), "free-run"),
+    "refit": (("all",), "all"),
     "average": (("20",), "20"),
     "feedthrough": (("no",), "no"),
     "islands": (("3",), 3),
