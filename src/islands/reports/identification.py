@@ -8,7 +8,6 @@ from markupsafe import Markup
 from islands.io.result_text.headlines import write_headline
 from islands.io.result_text.model_table import columns, number, rows
 from islands.io.result_text.statements import (
-    BEFORE_REFIT,
     VERDICTS,
     Document,
     ResultFacts,
@@ -34,7 +33,9 @@ _LATENT_FIGURES = {
     "bode.svg": "Frequency response for small deviations from rest",
 }
 #: The same if its parameters were estimated again on all data.
-_REFITTED_OVERLAY = {name: f"{caption}, {BEFORE_REFIT}" for name, caption in _OVERLAY.items()}
+_REFITTED_OVERLAY = {
+    name: f"{caption}, with its parameters before the refit on all data" for name, caption in _OVERLAY.items()
+}
 
 #: Captions of the figures that assess every model, and of those of hysteresis alone.
 _FIGURES = {"residuals.svg": "Correlations of the one-step-ahead residual"}

@@ -602,9 +602,9 @@ def is_refitted(entry: Document) -> bool:
 
 def _describe_refit(facts: ResultFacts) -> str:
     return (
-        f"Refit: the parameters were estimated again on all {facts.refit['samples']} samples, those of "
-        "estimation and of validation; errors, residual tests and bands are measured with the parameters "
-        "before, since no data are left to measure the new ones."
+        f"Refit: the parameters were estimated again on all {facts.refit['samples']} samples, estimation and "
+        "validation data together; errors, residual tests and bands are measured with the parameters before, "
+        "since no data are left to measure the new ones."
     )
 
 
