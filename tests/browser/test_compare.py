@@ -59,6 +59,16 @@ def test_two_jobs_are_compared(
     assert unreadable(compared) == []
 
 
+def test_a_comparison_names_the_models_whose_errors_belong_to_other_parameters(
+    opened: Callable[..., Any], service: ServiceClient, jobs: tuple[str, str], expect: Any
+) -> None:
+    refitted = run_submitted(service, service.submit(5, name="again", settings={"refit": "all"}))
+    page = opened(f"#/compare?jobs={jobs[0]},{refitted}")
+    note = page.get_by_text("estimated again on all data after the errors were measured")
+    expect(note).to_have_count(1)
+    assert note.inner_text().startswith("again, model ")
+
+
 def test_the_report_of_the_comparison_is_one_file_of_four_pages(
     compared: Any, quiet: Callable[..., Screen], tmp_path: Path, expect: Any
 ) -> None:

@@ -62,7 +62,7 @@ def test_a_job_with_a_refit_says_which_parameters_its_errors_belong_to(
     assert any(each["refit"]["discarded"] is None for each in models)
     page = opened(f"#/jobs/{job}", color_scheme=scheme)
     expect(page.locator("section.result")).to_contain_text("Refit: ")
-    expect(page.get_by_text("estimated again on all data after these errors were measured")).to_be_visible()
+    expect(page.get_by_text("estimated again on all data after the errors were measured")).to_be_visible()
     assert unreadable(page) == []
 
 

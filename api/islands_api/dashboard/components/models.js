@@ -8,6 +8,7 @@ import { showProblem } from "./banner.js";
 import { makeCompareChoice } from "./compare_choice.js";
 import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
+import { listRefits } from "./refit.js";
 import { makeReportButtons } from "./report.js";
 import { makeModelFront } from "./size_front.js";
 import { makeExactValue, makeTermPanel } from "./term_table.js";
@@ -265,17 +266,15 @@ export function makeModelsPanel(job, rank, unit, signal) {
       "p",
       { class: "soft small" },
       "Errors are those of the free run. The models are ranked by the validation data, so these errors are "
-        + "not an independent test."
-        + (models.some((model) => model.refit && !model.refit.discarded)
-          ? " The parameters were estimated again on all data after these errors were measured."
-          : ""),
+        + "not an independent test.",
     );
     const overview = makeScrollable("Models", makeModelTable(job.id, models));
     front = makeModelFront(job, models, unit, signal);
     const islands = job.progress?.islands?.length ?? 0;
     const figures = makeSearchFigures(job.id, islands, signal);
     const compare = makeCompareChoice(job, models) ?? "";
-    body.replaceChildren(makeSentences(job), front.node, overview, note, compare, article, figures);
+    const notes = [note, ...listRefits(models.map((model) => ({ model, name: model.rank })), "Model ")];
+    body.replaceChildren(makeSentences(job), front.node, overview, ...notes, compare, article, figures);
     select(rank);
     return Infinity;
   }, signal);

@@ -9,6 +9,7 @@ import {
   makeSettingTable,
   makeTermTable,
 } from "../components/job_comparison.js";
+import { listRefits } from "../components/refit.js";
 import { getDatasetPath, getJobPath, getJson } from "../lib/api.js";
 import { el, makeScrollable } from "../lib/dom.js";
 import { poll } from "../lib/polling.js";
@@ -94,6 +95,7 @@ function makeContent(found, signal) {
       "Models",
       describeData(entries),
       makeScrollable("Compared models", makeModelTable(entries)),
+      listRefits(entries),
       listEquations(entries),
       entries.length > 1 ? makeComparisonReportButtons(entries) : [],
     ),

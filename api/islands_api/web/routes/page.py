@@ -80,6 +80,7 @@ FILES = {
     "components/monitoring/state_charts.js": _SCRIPT,
     "components/paged_table.js": _SCRIPT,
     "components/record_notes.js": _SCRIPT,
+    "components/refit.js": _SCRIPT,
     "components/report.js": _SCRIPT,
     "components/result_card.js": _SCRIPT,
     "components/row_ranges.js": _SCRIPT,

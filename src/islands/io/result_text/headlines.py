@@ -27,9 +27,8 @@ def write_headline(document: Document) -> str:
     error = facts.error()
     if error["rmse"] is None:
         return f"The free run of a model of {terms} diverges on the validation data of {output}"
-    return f"A model of {terms} simulates {output} with a {_state_error(error, facts.unit)}" + _add_refit(
-        facts.model
-    )
+    stated = _state_error(error, facts.unit) + _add_refit(facts.model)
+    return f"A model of {terms} simulates {output} with a {stated}"
 
 
 def write_coupled_headline(outputs: Sequence[Document]) -> str:
