@@ -1,4 +1,8 @@
-"""Searches that a benchmark compares: what each finds on the estimation data, with its default settings."""
+"""Searches that a benchmark compares: what each finds on the estimation data, with its default settings.
+
+The parameters of models of one output are estimated on all estimation data in the end, since a benchmark has
+separate tests.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -72,13 +76,13 @@ def _one_output(find: Callable[[Dataset, int, ProgressCallback, Stop], AnyModel]
 
 
 def _find_latent(record: Dataset, seed: int, progress: ProgressCallback, stop: Stop) -> AnyModel:
-    return fit_record(record, model=LATENT, seed=seed, progress=progress, stop=stop).best.model
+    return fit_record(record, model=LATENT, seed=seed, refit="all", progress=progress, stop=stop).best.model
 
 
 def _find_narx(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
     if isinstance(record, CoupledRecord):
         return fit_coupled(record, seed=seed, progress=progress, stop=stop).model
-    return fit_record(record, seed=seed, progress=progress, stop=stop).best.model
+    return fit_record(record, seed=seed, refit="all", progress=progress, stop=stop).best.model
 
 
 def _find_linear(record: Dataset, _seed: int, progress: ProgressCallback, stop: Stop) -> AnyModel:

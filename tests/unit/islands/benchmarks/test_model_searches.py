@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.benchmarks.definition import CLASSES, LATENT, LINEAR
+import islands
+from islands.benchmarks.definition import CLASSES, LATENT, LINEAR, NARX
 from islands.benchmarks.model_searches import MODEL_SEARCHES, count_terms
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
@@ -33,6 +34,16 @@ def test_terms_are_those_of_equations_and_the_units_of_state_spaces():
     assert count_terms(make_model()) == 1
     assert count_terms(TWO_MASSES) == 8
     assert count_terms(TWO_MASSES.models[0]) == 4
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("kind", [NARX, LATENT])
+def test_models_are_estimated_again_on_all_estimation_data(kind):
+    u, noise = smooth_input(300, 4), np.random.default_rng(6).standard_normal(300)
+    record = Dataset(u, np.convolve(u, 0.2 * 0.8 ** np.arange(40))[:300] + 0.01 * noise, 0.1)
+    expected = islands.fit(record, model=kind, refit="all").best
+    assert expected.is_refitted
+    assert find(kind, record) == expected.model
 
 
 @pytest.mark.ci
