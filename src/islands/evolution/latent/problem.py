@@ -1,11 +1,10 @@
 """Search problem of state spaces with static units, and the steps of its islands."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
-from math import log
 from typing import cast
 
 import numpy as np
@@ -16,10 +15,11 @@ from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData, make_latent_data
-from islands.estimation.latent_models import find_front, fit_linear_systems, make_latent_model
+from islands.estimation.latent_models import fit_linear_systems, make_latent_model
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import AnyIndividual, AnyPopulation, unique_structures
+from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.island import Island, StepInfo
+from islands.evolution.latent.selection import select_latent_elite, select_parent
 from islands.evolution.latent.variation import begin_system, cross, mutate
 from islands.evolution.protocol import Caches
 from islands.evolution.rng import Purpose
@@ -39,12 +39,6 @@ _FIRST_UNITS = (
 #: Orders whose linear system has larger mean squared errors than this multiple of the least are left out of
 #: the first population. On held-out rows, a linear system may drift whose units would not.
 _LARGEST_RATIO = 4.0
-
-#: Least error in the criterion: of a record without noise it has no limit.
-_LEAST_FITNESS = 1e-300
-
-#: Probability that a parent is drawn from the front of size and error.
-_FROM_FRONT = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,7 +144,7 @@ class LatentEvolution:
 
     def _vary(self, island: Island, rng: Generator) -> Draft:
         settings, elite = self.problem.settings, cast("Sequence[FittedStateSpace]", island.elite)
-        parent, other = (_select_parent(elite, settings, rng) for _ in range(2))
+        parent, other = (select_parent(elite, settings.tournament, rng) for _ in range(2))
         if rng.random() < settings.crossover:
             crossed = cross(parent, other, self._data, settings.structure, rng)
             if crossed is not None:
@@ -177,45 +171,6 @@ class LatentEvolution:
         )
         elite = self.select_elite((*island.elite, *population), island.index)
         return replace(island, population=population, elite=elite, hall_of_fame=hall), info
-
-
-def select_latent_elite(
-    systems: Iterable[FittedStateSpace], count: int, rows: int
-) -> tuple[FittedStateSpace, ...]:
-    """Return the systems of the least criterion, each structure once, with the front of size and error.
-
-    Parameters
-    ----------
-    systems : iterable of FittedStateSpace
-    count : int
-    rows : int
-        Rows of the estimation.
-
-    Returns
-    -------
-    tuple of FittedStateSpace
-        Least criterion first. It is the logarithm of the error with the penalty of the number of parameters
-        of the Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978) 461-464): without it,
-        systems grow.
-    """
-
-    def order(system: FittedStateSpace) -> tuple[float, int, tuple[str, ...]]:
-        criterion = log(max(system.fitness, _LEAST_FITNESS)) + system.size * log(rows) / rows
-        return criterion, system.size, system.key
-
-    ordered = unique_structures(sorted(systems, key=order))
-    front = find_front(ordered)[-count:]
-    keys = {each.key for each in front}
-    others = [each for each in ordered if each.key not in keys][: count - len(front)]
-    return tuple(sorted((*front, *others), key=order))
-
-
-def _select_parent(elite: Sequence[FittedStateSpace], settings: Settings, rng: Generator) -> FittedStateSpace:
-    """Return a system of the front, or the best one of a tournament."""
-    if rng.random() < _FROM_FRONT:
-        front = find_front(elite)
-        return front[int(rng.integers(len(front)))]
-    return elite[int(rng.integers(len(elite), size=settings.tournament).min())]
 
 
 def _keep_orders(linear: Sequence[FittedStateSpace]) -> list[FittedStateSpace]:

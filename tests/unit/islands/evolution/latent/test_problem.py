@@ -9,7 +9,8 @@ from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.latent.problem import make_latent_problem, select_latent_elite
+from islands.evolution.latent.problem import make_latent_problem
+from islands.evolution.latent.selection import select_latent_elite
 from islands.evolution.presets import resolve_settings
 from islands.io.checkpoints.reading import archipelago_from_document
 from islands.io.checkpoints.writing import checkpoint_text

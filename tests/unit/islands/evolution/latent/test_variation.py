@@ -1,4 +1,4 @@
-"""Variation of state spaces: what each operation changes, and what it leaves."""
+"""Variation of state spaces: the sizes, the zeros and the simulation after each operation."""
 
 from dataclasses import replace
 
@@ -53,7 +53,7 @@ def test_a_unit_of_the_same_system_has_the_same_argument(data, system):
     assert blocks["E"][:, 2] == pytest.approx(0.5 * blocks["E"][:, place], rel=1e-6, abs=1e-9)
 
 
-def test_a_unit_of_another_order_has_an_argument_of_its_own_states(data, linear, system):
+def test_a_unit_of_another_order_reads_the_states_of_the_system(data, linear, system):
     draft = cross(linear[2], system, data, "auto", np.random.default_rng(0))
     assert (draft.layout.order, len(draft.units)) == (3, 1)
     assert draft.estimate(data).mean_square < linear[2].mean_square
