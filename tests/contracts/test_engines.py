@@ -15,7 +15,6 @@ from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import run_epoch, select_migrants
-from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
@@ -116,11 +115,11 @@ def test_epochs_end_at_migrations_and_at_the_last_generation(history):
 
 def test_engine_equals_single_epochs_of_the_islands(history, search_problem):
     """By definition every island runs separately and passes its emigrants to the next one."""
-    evaluators = [Evaluator(search_problem.record, search_problem.settings) for _ in range(3)]
+    evolutions = [search_problem.open() for _ in range(3)]
     islands, leaving = empty_archipelago(3, 7).islands, [(), (), ()]
     for epoch in history:
         epochs = [
-            run_epoch(island, [leaving[index - 1]], evaluators[index], search_problem, never_stop)
+            run_epoch(island, [leaving[index - 1]], evolutions[index], never_stop)
             for index, island in enumerate(islands)
         ]
         islands, leaving = [each.island for each in epochs], [each.emigrants for each in epochs]
