@@ -181,7 +181,7 @@ def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, war
     Raises
     ------
     RecordError, SettingsError
-        As in `make_block_simulator`; or a latent model diverges in the warm-up.
+        As in `make_block_simulator`.
     """
     made = make_block_simulator(model.block(), record, interval, warm_up)
     if isinstance(model, LatentModel):

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.errors import RecordError
 from islands.kernels.state_space import accumulate_products, simulate_state_space
 from islands.models.latent import LatentModel
 
 #: Weight of the measurement of the initial states, relative to the variance of the output of the states.
 _RIDGE = 1e-3
+
+#: Rows from which each state is first estimated if the model diverges in the whole of them.
+_FIRST_ROWS = 3
 
 #: Steps of the estimation of initial states, and the step that ends it.
 _STATE_STEPS, _NEGLIGIBLE_STEP = 15, 1e-9
@@ -77,17 +79,41 @@ def estimate_states(
     -------
     ndarray, shape (states,)
         The states move about those at rest with the magnitude 1, which is a weak measurement of each of them:
-        a state that the rows do not show rests. All states rest if the model diverges from there.
+        a state that the rows do not show rests. If the model diverges from rest, the states are estimated
+        from the first rows, and then from more and more of them. All states rest if it still diverges.
     """
+    found = _minimise(theta, codes, segment, rest, rest)
+    if found is not None:
+        return found
+    states, rows = rest, _FIRST_ROWS * len(rest)
+    while rows < len(segment.y):
+        part = Segment(segment.u[:rows], segment.y[:rows])
+        states = _choose(_minimise(theta, codes, part, states, rest), states)
+        rows *= 2
+    return _choose(_minimise(theta, codes, segment, states, rest), rest).copy()
+
+
+def _choose(found: NDArray[np.float64] | None, other: NDArray[np.float64]) -> NDArray[np.float64]:
+    return other if found is None else found
+
+
+def _minimise(
+    theta: NDArray[np.float64],
+    codes: NDArray[np.int64],
+    segment: Segment,
+    start: NDArray[np.float64],
+    rest: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """Return the states of the least error by Gauss-Newton steps; None after a divergence."""
     order = len(rest)
     places = np.full(theta.size, -1)
     fixed = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
-    states = rest.copy()
+    states = start.copy()
     products = np.empty((order + 1, order + 1))
     for _ in range(_STATE_STEPS):
         rows = accumulate_products(theta, places, codes, segment.u, states, segment.y, 0, products)
         if rows < len(segment.y) or not np.isfinite(products).all():
-            return rest.copy()
+            return None
         normal = products[:-1, :-1] + fixed * np.eye(order)
         step = np.linalg.lstsq(normal, products[:-1, -1] - fixed * (states - rest), rcond=None)[0]
         states = states + step
@@ -137,12 +163,8 @@ def estimate_initial_states(
     Returns
     -------
     ndarray, shape (intervals, states)
-        States at the last sample of the warm-up.
-
-    Raises
-    ------
-    RecordError
-        The model diverges in the warm-up.
+        States at the last sample of the warm-up; NaN if the model diverges before it, so that the free run
+        diverges at its first sample.
     """
     theta, codes = model.theta, model.codes
     found = []
@@ -151,7 +173,6 @@ def estimate_initial_states(
         u, late = read_inputs(record, model, begin, first)
         x = estimate_states(theta, codes, Segment(u, record.y[begin + late : first]), model.rest)
         rows = len(u) - 1
-        if simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) < rows:
-            raise RecordError(f"the model diverges in the warm-up before sample {first}")
-        found.append(x)
+        bounded = simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) == rows
+        found.append(x if bounded else np.full(len(x), np.nan))
     return np.array(found)

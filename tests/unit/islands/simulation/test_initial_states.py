@@ -5,8 +5,14 @@ import pytest
 
 from islands.data.dataset import Dataset, join
 from islands.data.input_lead import advance_inputs
-from islands.errors import RecordError
-from islands.simulation.initial_states import Segment, estimate_initial_states, estimate_states
+from islands.kernels.state_space import simulate_state_space
+from islands.simulation.initial_states import (
+    Segment,
+    estimate_initial_states,
+    estimate_states,
+    simulate_errors,
+)
+from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 
@@ -70,7 +76,21 @@ def test_outputs_after_the_warm_up_have_no_influence():
     assert (estimate_initial_states(model, changed, np.array([50]), 50) == found).all()
 
 
-def test_a_model_that_diverges_in_the_warm_up_is_an_error():
+def test_a_model_that_diverges_in_the_warm_up_diverges_at_the_first_prediction():
     model = make_model(SPRING | {"a1_1": 3.0, "a2_2": 3.0})
-    with pytest.raises(RecordError, match="diverges in the warm-up"):
-        free_run(model, spring_record(200), 100)
+    run = free_run(model, spring_record(200), 100)
+    assert run.outcome.verdict is Status.DIVERGED
+    assert "at sample 100" in run.outcome.reason
+
+
+def test_states_are_estimated_although_the_model_diverges_from_rest():
+    """The cubic spring softens: from rest, an input that is too large takes it beyond its maximum."""
+    softening = SPRING | {"e2_1": 0.02}
+    record = spring_record(60)
+    theta, codes = make_model(softening).theta, make_model(softening).codes
+    states, y = np.array([0.5, -0.4]), np.empty(60)
+    u = np.ascontiguousarray(record.u)
+    assert simulate_state_space(theta, codes, u, states.copy(), y) == 60
+    far = np.array([4.0, 4.0])
+    assert simulate_errors(theta, codes, Segment(u, y), far) is None
+    assert estimate_states(theta, codes, Segment(u, y), far) == pytest.approx(states, abs=2e-3)
