@@ -15,7 +15,7 @@ from islands.facade.latent_identification import search_latent
 from islands.facade.library_fit import LibraryFit
 from islands.progress import Steps, StoppedError
 from islands.validation.assessment import Assessment, average_errors
-from islands.validation.predictable_residual import LARGEST_SHARE
+from islands.validation.predictable_residual import ADEQUATE
 
 #: Settings of the short search that is compared.
 LATENT_TRIAL: Mapping[str, Any] = MappingProxyType({"population": 16, "generations": 6, "islands": 1})
@@ -33,8 +33,8 @@ def compare_latent(
 ) -> Choice:
     """Return the choice of latent models if they are clearly better than those of the chosen kind.
 
-    They are not tried if the residual of the free run of the recommended model has no predictable part, since
-    another model can then hardly be better. A stop ends the trial without an effect on the choice.
+    They are not tried if no predictable part is left in the residual of the free run of the recommended
+    model, since another model can then hardly be better. A stop ends the trial without an effect on the choice.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ def compare_latent(
     steps : Steps
     """
     chosen = fit.found.recommended
-    bounded = chosen.outcomes["validation"]["free_run"]
-    if (bounded and chosen.residual_structure.free_run_share <= LARGEST_SHARE) or steps.stop():
+    explained = chosen.residual_structure.verdict == ADEQUATE
+    if explained or steps.stop():
         return choice
     steps.report("preset auto: trial of latent models", None)
     try:

@@ -1,0 +1,109 @@
+"""Preset auto: latent models are chosen where they are clearly better, and are not tried elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.facade.automatic import preset_choice
+from islands.facade.automatic.kind_choice import Choice, choice_from_document
+from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.identify import identify_record
+from support.latent_systems import smooth_input
+
+SHORT = {"population": 6, "generations": 2, "migrate_every": 1}
+
+
+def clipped_record(samples=900, noise=0.003):
+    """Return a record of two lags, a saturation and two lags, with noise of the output."""
+    u, x, y = 1.5 * smooth_input(samples, 4), np.zeros(4), np.empty(samples)
+    for k in range(samples):
+        y[k] = x[3]
+        between = np.clip(x[1], -0.5, 0.5)
+        x = np.array(
+            [
+                0.8 * x[0] + 0.2 * u[k],
+                0.7 * x[1] + 0.3 * x[0],
+                0.9 * x[2] + 0.1 * between,
+                0.6 * x[3] + 0.4 * x[2],
+            ]
+        )
+    y += noise * np.abs(y).max() * np.random.default_rng(5).standard_normal(samples)
+    return Dataset(u, y, 0.01, ("u_V",), "y_V")
+
+
+def lag_record(noise_of_output, samples=300):
+    """Return a record of a lag, which a NARX model describes, with noise of the output or of the equation."""
+    u, noise = smooth_input(samples, 2), 0.02 * np.random.default_rng(1).standard_normal(samples)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1] + (0.0 if noise_of_output else noise[k])
+    return Dataset(u, y + noise if noise_of_output else y, 0.01, ("u_V",), "y_V")
+
+
+@pytest.fixture
+def tried(monkeypatch):
+    """Return the choices that are compared with latent models; kinds and latent models are not searched."""
+    found = []
+
+    def choose(_record, libraries, *_others):
+        kind = next(iter(libraries))
+        return Choice(kind, (), ("", ""), {}, {}), {kind: None}
+
+    def compare(_record, _split, choice, *_others):
+        found.append(choice.kind)
+        return choice
+
+    monkeypatch.setattr(preset_choice, "choose_kind", choose)
+    monkeypatch.setattr(preset_choice, "compare_latent", compare)
+    monkeypatch.setattr(preset_choice, "fit_library", lambda *_given, **_settings: None)
+    return found
+
+
+@pytest.mark.ci
+def test_a_saturation_between_lags_is_latent():
+    record = clipped_record()
+    choice = choose_preset(record, 0.25, {})
+    assert choice.kind == "latent"
+    assert choice.errors["latent"] < 0.8 * min(
+        error for kind, error in choice.errors.items() if kind != "latent"
+    )
+    sentence, dead_time = choice.reasons
+    assert "Preset auto chose latent (state spaces with static curves)" in sentence
+    assert dead_time == "Dead times are states of the model."
+    found = identify_record(record, preset=choice, **SHORT)
+    assert found.settings["choice"]["kind"] == "latent"
+    assert choice_from_document(found.settings["choice"]) == choice
+    assert any(each.model.units for each in found.models)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("noise_of_output", [True, False])
+def test_a_law_of_narx_models_keeps_its_kind(noise_of_output):
+    choice = choose_preset(lag_record(noise_of_output), 0.25, {})
+    assert choice.kind == "smooth"
+    # The residual of the free run is white with noise of the output, so that latent models are not tried.
+    assert ("latent" in choice.errors) == (not noise_of_output)
+
+
+@pytest.mark.parametrize(
+    ("changes", "count"),
+    [
+        ({}, 1),
+        ({"generations": 5}, 1),
+        ({"max_terms": 4}, 0),
+        ({"library_delays": (1,)}, 0),
+        # Models of hysteresis keep a property that latent models do not have.
+        ({"constraints": "hysteresis"}, 0),
+    ],
+)
+def test_settings_of_narx_models_exclude_latent_models(tried, changes, count):
+    choose_preset(lag_record(True), 0.25, changes)
+    assert tried == ["smooth"] * count
+
+
+def test_a_constant_output_is_not_compared(tried):
+    record = lag_record(True)
+    choose_preset(replace(record, y=np.ones(record.samples)), 0.25, {})
+    assert tried == []
