@@ -38,6 +38,9 @@ _REGRESSIONS = ("least-squares", "extended-least-squares")
 #: Reason of a discarded estimate.
 _UNSOUND = "a physics check that the model passes would fail"
 
+#: Steps of a refinement, at most: the parameters of the estimation data are near those of all data.
+_STEPS = 10
+
 #: Largest increase of the free-run RMSE on all data, as a fraction. Least squares does not minimise that
 #: error: of a law under white equation noise, parameters that are nearer to the truth increase it by chance,
 #: in half of the records and by up to 4 %. Biased least squares increases it by more.
@@ -120,7 +123,9 @@ def _estimate(
     else:
         has_errors = model.standard_errors is not None
         stop = partial(steps.skip, _REFIT)
-        found = refine(model, data, criterion.interval, *limits, standard_errors=has_errors, stop=stop)
+        found = refine(
+            model, data, criterion.interval, *limits, _STEPS, standard_errors=has_errors, stop=stop
+        )
     if found is None or isinstance(found, EvaluationOutcome):
         return "the estimation fails" if found is None else f"the estimation fails ({found.reason})"
     if found.model.parameter_names != model.parameter_names:

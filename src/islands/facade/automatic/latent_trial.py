@@ -34,7 +34,7 @@ def compare_latent(
     """Return the choice of latent models if they are clearly better than those of the chosen kind.
 
     They are not tried if no predictable part is left in the residual of the free run of the recommended
-    model, since another model can then hardly be better. A stop ends the trial without an effect on the choice.
+    model, since another one can then hardly be better. A stop ends the trial without an effect on the choice.
 
     Parameters
     ----------
