@@ -20,7 +20,7 @@ _RIDGE = 1e-3
 _FIRST_ROWS = 3
 
 #: Steps of the estimation of initial states, and the step that ends it.
-_STATE_STEPS, _NEGLIGIBLE_STEP = 15, 1e-9
+_STATE_STEPS, _NEGLIGIBLE_STEP = 30, 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,22 +104,30 @@ def _minimise(
     start: NDArray[np.float64],
     rest: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:
-    """Return the states of the least error by Gauss-Newton steps; None after a divergence."""
+    """Return the states of the least error by Gauss-Newton steps; None if the model diverges from the start.
+
+    A step that increases the error is halved.
+    """
     order = len(rest)
     places = np.full(theta.size, -1)
     fixed = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
-    states = start.copy()
+    best, least, step = start, np.inf, np.zeros(order)
     products = np.empty((order + 1, order + 1))
     for _ in range(_STATE_STEPS):
+        states = best + step
         rows = accumulate_products(theta, places, codes, segment.u, states, segment.y, 0, products)
-        if rows < len(segment.y) or not np.isfinite(products).all():
+        error = products[-1, -1] + fixed * float(np.sum((states - rest) ** 2))
+        if rows == len(segment.y) and np.isfinite(products).all() and error < least:
+            best, least = states, error
+            normal = products[:-1, :-1] + fixed * np.eye(order)
+            step = np.linalg.lstsq(normal, products[:-1, -1] - fixed * (states - rest), rcond=None)[0]
+        elif least == np.inf:
             return None
-        normal = products[:-1, :-1] + fixed * np.eye(order)
-        step = np.linalg.lstsq(normal, products[:-1, -1] - fixed * (states - rest), rcond=None)[0]
-        states = states + step
+        else:
+            step = step / 2.0
         if np.abs(step).max() < _NEGLIGIBLE_STEP:
             break
-    return states
+    return best
 
 
 def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tuple[NDArray[np.float64], int]:
