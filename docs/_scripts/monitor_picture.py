@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from playwright.sync_api import sync_playwright
-from search_pictures import CHROMIUM, PATIENCE, PICTURES, PORT
+from page_pictures import CHROMIUM, PATIENCE, PICTURES, PORT
 
 from islands.io.records import write_record
 from islands_api.client import Client
