@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from islands.io.models import NARX
 from islands_api.schemas import Envelope, ModelView, ResponseModel
 
 
@@ -136,7 +137,11 @@ class SearchFreeRunView(ResponseModel):
     job: str
     output: str
     generation: int = Field(description="Generation of the search, as in `progress.free_run`.")
-    size: int = Field(description="Number of terms of the smallest model whose error is near the least one.")
+    kind: str = Field(default=NARX, description="Class of the model.")
+    size: int = Field(
+        description="Number of terms of the smallest model whose error is near the least one; of free "
+        "parameters if it is latent."
+    )
     error: float = Field(description="RMS error of the model in the search.")
     outcome: str = Field(description="`ok`, or where the free run diverged.")
     dt: float = Field(description="Sampling time in seconds.")

@@ -256,7 +256,7 @@ class ModelView(ResponseModel):
     recommended: bool = Field(
         default=False, description="Whether this is the recommended model of the job, one of all its models."
     )
-    size: int = Field(description="Number of terms.")
+    size: int = Field(description="Number of terms, of parameters with names in other classes than NARX.")
     equation: str
     latex: str
     signals: str = Field(
@@ -297,7 +297,9 @@ class HistoryPoint(ResponseModel):
 
     generation: int
     evaluations: int
-    best: dict[str, float] = Field(description="Error by number of terms.")
+    best: dict[str, float] = Field(
+        description="Error by number of terms, of latent models by number of free parameters."
+    )
     islands: tuple[float | None, ...] = Field(
         description="Error by island; null if an island has no model yet."
     )
@@ -325,6 +327,8 @@ class PresetView(ResponseModel):
     settings: dict[str, Any] = Field(
         description="Its settings. Of `auto` those that do not depend on the record."
     )
+    structures: tuple[str, ...] = Field(description="Values of the setting `structure`.")
+    fixed: tuple[str, ...] = Field(description="Settings that cannot be changed.")
 
 
 class PresetPage(ResponseModel):

@@ -372,6 +372,7 @@ class ProgressReporter:
         rate = (state.evaluations - before) / max(now - since, 1e-9)
         best = {size: error**0.5 for size, error in last.best.items()}
         return {
+            "model": settings.model_class,
             "generation": last.generation,
             "generations": generations,
             "evaluations": state.evaluations,

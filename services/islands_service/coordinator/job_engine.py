@@ -9,6 +9,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine, SerialEngine
 from islands.evolution.protocol import SearchProblem
 from islands.evolution.settings import LATENT, Settings
+from islands.facade.identification_progress import estimate_state_space_seconds
 from islands.io.models import NARX
 from islands.progress import ProgressCallback, Stop
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, Job, Lease
@@ -22,11 +23,6 @@ log = structlog.get_logger()
 #: the presets narx, hysteresis and paper-case1: 50 to 120 us with 500 samples, 120 to 230 us with 100 000.
 INDIVIDUAL_SECONDS, SAMPLE_SECONDS = 1e-4, 1.5e-9
 
-#: Seconds of one core that a state space takes, for each sample of the estimation, of which there are at most
-#: `ESTIMATED_SAMPLES`, and for each sample of the record. Measured with 770 to 75 000 samples: 15 to 250 ms.
-STATE_SPACE_SECONDS, ESTIMATED_SECONDS, HELD_OUT_SECONDS = 5e-3, 1.5e-5, 1.5e-6
-ESTIMATED_SAMPLES = 6_000
-
 
 def estimate_seconds(settings: Settings, samples: int) -> float:
     """Estimate the time of the epochs of a whole search on one core.
@@ -35,8 +31,7 @@ def estimate_seconds(settings: Settings, samples: int) -> float:
     """
     individuals = settings.islands * settings.population * (settings.generations + 1)
     if settings.model_class == LATENT:
-        estimated = min(samples, ESTIMATED_SAMPLES) * ESTIMATED_SECONDS
-        return individuals * (STATE_SPACE_SECONDS + estimated + samples * HELD_OUT_SECONDS)
+        return individuals * estimate_state_space_seconds(samples)
     return individuals * (INDIVIDUAL_SECONDS + samples * SAMPLE_SECONDS)
 
 

@@ -13,13 +13,14 @@ import structlog
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.input_lead import advance_all_inputs
+from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.migration.topology import parse_topology
 from islands.evolution.protocol import SearchProblem
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation
-from islands.models.narx import Model
+from islands.models.narx import require_narx
 from islands_service.domain.free_runs import SearchFreeRun, simulate_searched
 from islands_service.runtime.errors import ClusterError
 
@@ -56,12 +57,13 @@ class SearchFront:
         self._best: Mapping[int, float] = {}
         self._front: list[dict[str, Any]] = []
         self._due = 0.0
+        self._is_first = True
         self.free_run: SearchFreeRun | None = None
 
     def begin(self, problem: SearchProblem) -> None:
         """Begin with the front of another search."""
         self._problem, self._best, self._front, self._due = problem, {}, [], 0.0
-        self.free_run = None
+        self._is_first, self.free_run = True, None
 
     def update(self, state: SearchState) -> list[dict[str, Any]]:
         """Return the models of the front, smallest first: ``size``, ``error`` (RMS) and ``equation``.
@@ -82,7 +84,9 @@ class SearchFront:
                 generation = state.history[-1].generation
                 self.free_run = _simulate(_find_small(front), self._problem, generation)
         ended = monotonic()
-        self._due = ended + (ended - began) / _SHARE
+        # The first free run also loads compiled kernels, which takes longer than many later ones.
+        self._due = 0.0 if self._is_first else ended + (ended - began) / _SHARE
+        self._is_first = False
         return self._front
 
 
@@ -97,7 +101,8 @@ def _simulate(individual: AnyIndividual, problem: SearchProblem, generation: int
     model, record = problem.make_model(individual), problem.record
     if model.input_names != record.input_names:
         record = advance_all_inputs(record)
-    return simulate_searched(model, record, offset, generation, sqrt(individual.fitness))
+    error = sqrt(individual.fitness)
+    return simulate_searched(model, individual.size, record, offset, generation, error)
 
 
 def describe_migration(state: SearchState, settings: Settings, seed: int) -> dict[str, Any] | None:
@@ -136,12 +141,22 @@ def _describe(individual: AnyIndividual, problem: SearchProblem) -> dict[str, An
 
 def _write_equation(individual: AnyIndividual, problem: SearchProblem) -> str:
     """Write the equation of a model with the names of the columns, or the structure of a state space."""
-    record, model = problem.record, problem.make_model(individual)
-    if not isinstance(model, Model):
-        return " · ".join(individual.niche)
+    if isinstance(individual, FittedStateSpace):
+        return _describe_structure(individual)
+    record, model = problem.record, require_narx(problem.make_model(individual))
     names = (record.output_name, *(parse_channel_name(name).base for name in record.input_names))
     statement = ", ".join(
         f"{name} minus {offset:g}" for name, offset in zip(names, problem.offsets, strict=False) if offset
     )
     line = named_equation(model, _DIGITS)
     return f"{line}, with {statement}" if statement else line
+
+
+def _describe_structure(system: FittedStateSpace) -> str:
+    """Describe a state space, whose equations are too long: ``2 states, units cube and tanh``."""
+    states = "1 state" if system.order == 1 else f"{system.order} states"
+    if not system.units:
+        return f"{states}, linear"
+    *others, last = sorted(system.units)
+    units = f"units {', '.join(others)} and {last}" if others else f"unit {last}"
+    return f"{states}, {units}"

@@ -39,7 +39,7 @@ class SearchFreeRun:
     generation : int
         Generation of the search.
     size : int
-        Number of terms of the model.
+        Size of the model.
     document : mapping
         Fields of `islands_api.result_schemas.SearchFreeRunView`, without the job.
     """
@@ -55,13 +55,15 @@ class SearchFreeRun:
 
 
 def simulate_searched(
-    model: DynamicModel, data: Dataset, offset: float, generation: int, error: float
+    model: DynamicModel, size: int, data: Dataset, offset: float, generation: int, error: float
 ) -> SearchFreeRun:
     """Simulate a model of a running search over its estimation data, from the measured first outputs.
 
     Parameters
     ----------
     model : DynamicModel
+    size : int
+        Size of the model in the search.
     data : Dataset
     offset : float
         Constant that was subtracted from the output of ``data``.
@@ -76,7 +78,8 @@ def simulate_searched(
     document = {
         "output": data.output_name,
         "generation": generation,
-        "size": model.size,
+        "kind": model.kind,
+        "size": size,
         "error": error,
         "outcome": str(run.outcome),
         "dt": data.dt,
@@ -88,7 +91,7 @@ def simulate_searched(
             for column in columns
         ],
     }
-    return SearchFreeRun(generation, model.size, document)
+    return SearchFreeRun(generation, size, document)
 
 
 def _round(values: Sequence[float | None]) -> list[float | None]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.errors import SettingsError, lookup, suggest
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
-from islands.evolution.settings import LATENT, Settings
+from islands.evolution.settings import LATENT, NARX, STRUCTURES_OF, Settings
 
 #: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5. What the paper leaves open is as
 #: in the authors' toolbox: tournaments of two, a distinct elite, parents in place of children that are too
@@ -210,8 +210,23 @@ def resolve_kinds(changes: Mapping[str, Any]) -> Mapping[str, Settings]:
 
 
 def resolve_latent(changes: Mapping[str, Any]) -> Settings | None:
-    """Return the settings of latent models with changes; None if a change has no effect on them."""
-    return resolve_settings(LATENT, changes) if LATENT_SETTINGS.issuperset(changes) else None
+    """Return the settings of latent models with changes of NARX models; None if one has no effect on them.
+
+    A structure of NARX models is none of latent models.
+    """
+    common = LATENT_SETTINGS - {"structure"}
+    return resolve_settings(LATENT, changes) if common.issuperset(changes) else None
+
+
+def list_structures(preset: str) -> tuple[str, ...]:
+    """Return the values of the setting ``structure`` of a preset."""
+    return tuple(STRUCTURES_OF[LATENT if preset == LATENT else NARX])
+
+
+def list_fixed_settings(preset: str) -> tuple[str, ...]:
+    """Return the settings of a preset that cannot be changed, in the order of `Settings`."""
+    fixed = set(_SETTING_NAMES) - LATENT_SETTINGS if preset == LATENT else set()
+    return tuple(name for name in _SETTING_NAMES if name in fixed | {"model_class"})
 
 
 def common_settings(preset: str) -> dict[str, Any]:

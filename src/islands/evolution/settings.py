@@ -51,9 +51,11 @@ SELECTIONS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-#: Class of the models of a search, by name, with its structures.
+#: Names of the classes of the models of a search.
 NARX, LATENT = "narx", LatentModel.kind
-_STRUCTURES: Mapping[str, Mapping[str, Any]] = MappingProxyType({NARX: STRUCTURES, LATENT: ZERO_BLOCKS})
+
+#: Values of the setting ``structure`` of each class.
+STRUCTURES_OF: Mapping[str, Mapping[str, Any]] = MappingProxyType({NARX: STRUCTURES, LATENT: ZERO_BLOCKS})
 
 T = TypeVar("T")
 
@@ -220,7 +222,9 @@ class Settings:
         "--primitive",
         text_type=tuple[str, ...],
     )
-    structure: str = "phi"
+    structure: str = _option(
+        "phi", f"Form of genes: {', '.join(STRUCTURES)}; of latent models: {', '.join(ZERO_BLOCKS)}."
+    )
     constraints: str = _option("hysteresis", f"{', '.join(CONSTRAINTS)}, or statements: {'; '.join(FORMS)}.")
     fitness: str = "shooting"
     shooting: int = _option(500, "Samples of a shooting interval, before averaging.", after="max_height")
@@ -307,8 +311,8 @@ class Settings:
         check_delays(self.library_delays)
         check_average(self.average)
         check_feedthrough(self.feedthrough)
-        structures = lookup(_STRUCTURES, self.model_class, "class of models")
-        lookup(structures, self.structure, "structure")
+        structures = lookup(STRUCTURES_OF, self.model_class, "class of models")
+        lookup(structures, self.structure, f"structure of {self.model_class} models")
         check_texts(constraints=self.constraints)
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from islands.evolution.presets import AUTO
+from islands.evolution.settings import LATENT
 from islands.progress import MIN_FRACTION, Phase, PhasedProgress, ProgressCallback
 
 if TYPE_CHECKING:
@@ -16,6 +17,11 @@ SEARCH = "search"
 
 #: Seconds of an individual of the search.
 _INDIVIDUAL = 2e-4
+
+#: Seconds of one core that a state space takes, for each sample of the estimation, of which there are at most
+#: `_ESTIMATED_SAMPLES`, and for each sample of the record. Measured with 770 to 75 000 samples: 15 to 250 ms.
+_STATE_SPACE, _ESTIMATED, _HELD_OUT = 5e-3, 1.5e-5, 1.5e-6
+_ESTIMATED_SAMPLES = 6_000
 
 #: Trials and fits of the preset auto, in seconds. They take about the same time for 500 and 20 000 samples.
 _CHOICE = (Phase("preset auto: trial of", 2.6, 4), Phase("preset auto: fit of", 2.6, 3))
@@ -64,6 +70,14 @@ def identification_phases(
         Names of several outputs, which are searched one after the other.
     """
     evaluations = settings.population * settings.islands * (settings.generations + 1)
+    if settings.model_class == LATENT:
+        return (
+            Phase("linear state space of order", 0.5 + 5e-5 * samples, 5),
+            Phase(SEARCH, estimate_state_space_seconds(samples) * evaluations),
+            Phase("final estimation of state spaces", 0.1 + _BANDS * samples),
+            Phase("assessment of the models", 0.3),
+            Phase("prediction bands", 0.1 + 1e-5 * samples),
+        )
     phases = (
         *(_CHOICE if preset == AUTO and not outputs else ()),
         Phase("forward selection among", 0.1),
@@ -74,6 +88,11 @@ def identification_phases(
         Phase("prediction bands", 0.2 + _BANDS * samples),
     )
     return _repeat(phases, outputs) if outputs else phases
+
+
+def estimate_state_space_seconds(samples: int) -> float:
+    """Estimate the seconds of one core that the estimation of a state space takes."""
+    return _STATE_SPACE + min(samples, _ESTIMATED_SAMPLES) * _ESTIMATED + samples * _HELD_OUT
 
 
 def _repeat(phases: Sequence[Phase], outputs: Sequence[str]) -> tuple[Phase, ...]:

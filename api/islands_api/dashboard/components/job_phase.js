@@ -2,16 +2,16 @@
 
 import { announce, el, setText } from "../lib/dom.js";
 import { formatCount } from "../lib/numbers.js";
-import { getIsolatedName, isEnded } from "./job_state.js";
+import { getIsolatedName, getModelClass, isEnded } from "./job_state.js";
 import { isDiagnosis, isSearch } from "./diagnosis.js";
 
 /** Stages of a search, each with the beginnings of its phases. */
 const SEARCH = [
   ["Record", ["loading", "reading"]],
   ["Preset", ["preset auto"]],
-  ["First models", ["sampling rate", "forward selection", "swap search"]],
+  ["First models", ["sampling rate", "forward selection", "swap search", "linear state space"]],
   ["Search", ["search", "starting", "waiting"]],
-  ["Final models", ["estimation", "choice of the equations", "refinement"]],
+  ["Final models", ["estimation", "final estimation", "choice of the equations", "refinement"]],
   ["Validation", ["assessment", "prediction bands"]],
   ["Result", ["storing"]],
 ];
@@ -40,11 +40,13 @@ function splitPhase({ spec, progress }) {
   return output === undefined ? ["", phase] : [output, phase.slice(output.length + 2)];
 }
 
-function describeSearch({ generation, generations, islands = [] }) {
+function describeSearch(job) {
+  const { generation, generations, islands = [] } = job.progress;
+  const evolved = getModelClass(job) === "narx" ? "equations" : "state spaces";
   const where = islands.length > 1 ? ` on ${formatCount(islands.length)} islands` : "";
   const reached =
     generation === undefined ? "" : `: generation ${formatCount(generation)} of ${formatCount(generations)}`;
-  return `Evolution of equations${where}${reached}.`;
+  return `Evolution of ${evolved}${where}${reached}.`;
 }
 
 /** Describe what a running job does now. */
@@ -52,7 +54,7 @@ export function describePhase(job) {
   const [output, phase] = splitPhase(job);
   const step = phase.replace(/^preset auto: /, "choice of the preset: ");
   let sentence = "Starting.";
-  if (phase === "search") sentence = describeSearch(job.progress);
+  if (phase === "search") sentence = describeSearch(job);
   else if (phase) sentence = `${capitalise((WAITING.includes(phase) && job.progress.note) || step)}.`;
   const stopped = job.stop_requested ? " The search ends with its best models." : "";
   return `${output ? `${output}: ` : ""}${sentence}${stopped}`;

@@ -18,6 +18,9 @@ export const getName = (job) => job.name || `Job ${job.id.slice(0, 8)}`;
 /** Return the name of a job for a sentence, between characters that isolate its direction. */
 export const getIsolatedName = (job) => `\u2068${getName(job)}\u2069`;
 
+/** Return the class of the models of a search: the preset auto chooses it before the first generation. */
+export const getModelClass = ({ spec, progress }) => progress?.model ?? spec.model ?? "narx";
+
 /** Make a badge with the state; `show(job)` updates it. */
 export function makeBadge() {
   const node = el("span", { class: "state" });

@@ -50,7 +50,7 @@ export function makeSearchRun(job, unit, signal) {
     const outcome = found.outcome === "ok" ? "" : ` (${found.outcome})`;
     setText(
       statement,
-      `${formatSize(found.size)}, generation ${formatCount(found.generation)}, over the estimation data`
+      `${formatSize(found.size, found.kind)}, generation ${formatCount(found.generation)}, over the estimation data`
         + `${outcome}. It is the smallest model within 10 % of the least error.`,
     );
     node.hidden = false;

@@ -32,6 +32,24 @@ function makeField(name, type) {
   return el("input", { ...names, type: kind, step, maxlength: 500, autocomplete: "off" });
 }
 
+/** Preset whose structure is chosen next to it, and what its values mean. */
+const LATENT = "latent";
+const STRUCTURES = "auto: curves anywhere. wiener: only the output reads them. hammerstein: they read the inputs "
+  + "only. feedback: they act on the states only.";
+
+/** Make the choice of the structure of latent models; `show(isVisible)` shows or hides it. */
+function makeStructure() {
+  const select = el("select", { name: "structure", id: "structure", "aria-describedby": "structure-hint" });
+  const nodes = [
+    el("label", { for: "structure" }, "Structure"),
+    select,
+    el("span", { class: "soft small", id: "structure-hint" }, STRUCTURES),
+  ];
+  const show = (isVisible) => nodes.forEach((each) => (each.hidden = !isVisible));
+  show(false);
+  return { select, nodes, show };
+}
+
 /** Make the fields; `initial` has the `preset` and the `settings` of a request. */
 export function makeSearchSettings(initial, onChange, signal) {
   const chosen = initial.preset ?? "auto";
@@ -40,12 +58,18 @@ export function makeSearchSettings(initial, onChange, signal) {
   const hint = el("span", { class: "soft small", id: "preset-hint" });
   const list = el("div", { class: "settings" }, el("p", { class: "loading" }, "Loading…"));
   const count = el("span", { class: "soft small" });
+  const structure = makeStructure();
   let [presets, fields] = [[], new Map()];
 
+  const findPreset = () => presets.find(({ name }) => name === preset.value) ?? {};
+
   function showPreset() {
-    const { summary = "", settings = {} } = presets.find(({ name }) => name === preset.value) ?? {};
+    const { summary = "", settings = {}, fixed = [] } = findPreset();
+    const isLatent = preset.value === LATENT;
     setText(hint, summary && `${summary}.`);
-    for (const [name, { field, standard }] of fields) {
+    structure.show(isLatent);
+    for (const [name, { field, row, standard }] of fields) {
+      row.hidden = fixed.includes(name) || (isLatent && name === "structure");
       const text = name in settings ? format(settings[name]) || "none" : "by the record";
       setText(standard, `Default: ${text}.`);
       if (field.tagName === "INPUT") field.placeholder = text;
@@ -54,8 +78,14 @@ export function makeSearchSettings(initial, onChange, signal) {
 
   function getSettings() {
     if (!fields.size) return initial.settings ?? {};
-    const values = [...fields].map(([name, { field, type }]) => [name, readValue(field.value, type)]);
-    return Object.fromEntries(values.filter(([, value]) => value !== undefined));
+    // A setting that the preset does not have keeps its value for another preset, and is not sent.
+    const shown = [...fields].filter(([, { row }]) => !row.hidden);
+    const values = shown.map(([name, { field, type }]) => [name, readValue(field.value, type)]);
+    const isRestricted = preset.value === LATENT && structure.select.value !== "auto";
+    return {
+      ...Object.fromEntries(values.filter(([, value]) => value !== undefined)),
+      ...(isRestricted && { structure: structure.select.value }),
+    };
   }
 
   function update() {
@@ -68,18 +98,19 @@ export function makeSearchSettings(initial, onChange, signal) {
     const type = findType(schema);
     const field = makeField(name, type);
     const standard = el("span");
-    const given = initial.settings?.[name];
+    const given = name === "structure" && chosen === LATENT ? null : initial.settings?.[name];
     if (given !== undefined && given !== null) field.value = format(given);
-    fields.set(name, { field, type, standard });
     // Double grave accents mark code in the documentation.
     const meaning = schema.description.replaceAll("``", "");
-    return el(
+    const row = el(
       "div",
       {},
       el("label", { for: field.id }, el("code", {}, name)),
       field,
       el("p", { class: "soft small", id: `meaning-${name}` }, `${meaning} `, standard),
     );
+    fields.set(name, { field, row, type, standard });
+    return row;
   }
 
   getJson("v1/presets", { signal }).then(
@@ -90,16 +121,23 @@ export function makeSearchSettings(initial, onChange, signal) {
       preset.replaceChildren(...items.map(text));
       preset.value = chosen;
       list.replaceChildren(...Object.entries(settings).map(makeRow));
+      const { structures } = items.find(({ name }) => name === LATENT);
+      structure.select.replaceChildren(...structures.map((each) => el("option", { value: each }, each)));
+      if (chosen === LATENT) structure.select.value = initial.settings?.structure ?? "auto";
       showPreset();
       update();
     },
     (error) => signal.aborted || list.replaceChildren(el("p", { class: "complaint" }, error.message)),
   );
-  preset.addEventListener("input", showPreset);
+  preset.addEventListener("input", () => {
+    showPreset();
+    update();
+  });
+  structure.select.addEventListener("input", update);
   list.addEventListener("input", update);
   return {
     nodes: [
-      el("div", { class: "fields" }, el("label", { for: "preset" }, "Preset"), preset, hint),
+      el("div", { class: "fields" }, el("label", { for: "preset" }, "Preset"), preset, hint, structure.nodes),
       el("details", { open: Boolean(initial.settings) }, el("summary", {}, "Advanced settings", count), list),
     ],
     /** Return the fields `preset` and `settings` of a request. */

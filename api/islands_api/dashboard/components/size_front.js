@@ -4,14 +4,14 @@ import { el, makeScrollable, setText } from "../lib/dom.js";
 import { formatNumber, formatSize, nameParts } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeLine } from "./equation.js";
-import { isEnded } from "./job_state.js";
+import { getModelClass, isEnded } from "./job_state.js";
 import { makeSearchRun } from "./search_run.js";
 
-/** Make a chart of errors by size of models of a class. */
-const makeChart = (title, error, unit, kind, signal) =>
+/** Make a chart of errors by size; `getKind()` returns the class of the models. */
+const makeChart = (title, error, unit, getKind, signal) =>
   makeLineChart({
     title,
-    x: { label: nameParts(kind), integer: true },
+    x: { get label() { return nameParts(getKind()); }, integer: true },
     y: { label: unit ? `${error} / ${unit}` : error, log: true },
     marks: true,
   }, signal);
@@ -49,9 +49,9 @@ export function makeLivePanel(job, unit, signal) {
   host.classList.add("equation");
   const heading = el("h2");
   const statement = el("p", { class: "soft small" });
-  let [front, size, simulated] = [[], null, null];
+  let [front, size, simulated, kind] = [[], null, null, getModelClass(job)];
   const run = makeSearchRun(job, unit, signal);
-  const chart = makeChart("Front of size against error", "RMS error", unit, job.spec.model, signal);
+  const chart = makeChart("Front of size against error", "RMS error", unit, () => kind, signal);
   letChoose(chart, "shows the equation of a point", (at) => {
     size = at;
     drawFront();
@@ -72,7 +72,7 @@ export function makeLivePanel(job, unit, signal) {
     run.node,
   );
 
-  const findSize = (terms) => front.find((each) => each.size === terms);
+  const findSize = (wanted) => front.find((each) => each.size === wanted);
   const findModel = () => findSize(size) ?? findSize(simulated) ?? front.at(-1);
 
   function drawFront() {
@@ -88,12 +88,13 @@ export function makeLivePanel(job, unit, signal) {
     let which = model === front.at(-1) ? "Model of the least error" : "Smallest model near the least error";
     if (model.size === size) which = "Chosen point";
     const error = `${formatNumber(model.error)} ${unit}`.trim();
-    setText(statement, `${which}: ${formatSize(model.size, model.kind)}, error ${error}`);
+    setText(statement, `${which}: ${formatSize(model.size, kind)}, error ${error}`);
   }
 
   return {
     node,
-    draw({ progress }) {
+    draw({ spec, progress }) {
+      kind = getModelClass({ spec, progress });
       front = getFront(progress ?? {});
       simulated = progress?.free_run?.size;
       if (front.length) drawFront();
@@ -127,7 +128,7 @@ function makeFrontSeries(models) {
 /** Make the chart with the equation of a model; `show(model)` marks another model. */
 export function makeModelFront(job, models, unit, signal) {
   const [statement, equation] = [el("p", {}), el("code", { class: "plain" })];
-  const chart = makeChart("Size against error", "RMSE of the free run", unit, job.spec.model, signal);
+  const chart = makeChart("Size against error", "RMSE of the free run", unit, () => models[0].kind, signal);
   letChoose(chart, "opens the model of a point", (size) => {
     const { rank } = models.find((model) => model.size === size);
     location.hash = `#/jobs/${job.id}/models/${rank}`;

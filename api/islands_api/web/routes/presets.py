@@ -4,7 +4,15 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from islands.evolution.presets import AUTO, AUTO_SUMMARY, PRESET_NAMES, PRESET_SUMMARIES, common_settings
+from islands.evolution.presets import (
+    AUTO,
+    AUTO_SUMMARY,
+    PRESET_NAMES,
+    PRESET_SUMMARIES,
+    common_settings,
+    list_fixed_settings,
+    list_structures,
+)
 from islands_api.schemas import PresetPage
 from islands_api.web.auth import Reader
 from islands_api.web.problems import RESPONSES
@@ -20,7 +28,13 @@ async def presets(_caller: Reader) -> Any:
     summaries = {AUTO: AUTO_SUMMARY, **PRESET_SUMMARIES}
     return {
         "items": [
-            {"name": name, "summary": summaries[name], "settings": common_settings(name)}
+            {
+                "name": name,
+                "summary": summaries[name],
+                "settings": common_settings(name),
+                "structures": list_structures(name),
+                "fixed": list_fixed_settings(name),
+            }
             for name in PRESET_NAMES
         ],
         "settings": SettingsChanges.model_json_schema()["properties"],

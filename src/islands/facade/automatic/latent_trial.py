@@ -20,6 +20,9 @@ from islands.validation.predictable_residual import ADEQUATE
 #: Settings of the short search that is compared.
 LATENT_TRIAL: Mapping[str, Any] = MappingProxyType({"population": 16, "generations": 6, "islands": 1})
 
+#: Message of the trial.
+_TRIAL = "preset auto: trial of latent models"
+
 #: Largest error of latent models on the validation data, relative to that of the chosen kind.
 _CLEARLY_BETTER = 0.8
 
@@ -54,9 +57,11 @@ def compare_latent(
     explained = chosen.residual_structure.verdict == ADEQUATE
     if explained or steps.stop():
         return choice
-    steps.report("preset auto: trial of latent models", None)
+    # The steps of the trial are part of the choice, and not steps of the search that follows.
+    trial = Steps(lambda message, _=None: steps.report(f"{_TRIAL}, {message}", None), steps.stop)
+    steps.report(_TRIAL, None)
     try:
-        latent = search_latent(record, split, settings, 0, steps, {}).recommended
+        latent = search_latent(record, split, settings, 0, trial, {}).recommended
     except (SettingsError, StoppedError):
         return choice
     if steps.stop() or not latent.outcomes["validation"]["free_run"]:

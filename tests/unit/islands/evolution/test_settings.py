@@ -30,7 +30,7 @@ from islands.evolution.settings import Settings
         ({"initial_height": -1}, "initial_height -1 lies between 0 and max_height 5"),
         ({"initial_height": 6}, "initial_height 6 lies between 0 and max_height 5"),
         ({"max_height": 2}, "initial_height 3 lies between 0 and max_height 2"),
-        ({"structure": "tree"}, "unknown structure 'tree': take one of free, phi, increment"),
+        ({"structure": "tree"}, "unknown structure of narx models 'tree': take one of free, phi, increment"),
         ({"constraints": "physics"}, "unknown constraints 'physics': take one of none, hysteresis"),
         ({"fitness": "bic"}, "unknown fitness 'bic': take one of one-step, shooting, free-run"),
         ({"primitives": ("mul", "gamma")}, "unknown primitive 'gamma': take one of mul, sub"),

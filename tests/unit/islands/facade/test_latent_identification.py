@@ -124,5 +124,5 @@ def test_settings_of_narx_models_are_refused():
         SettingsError, match="max_terms is a setting of NARX models, not of the preset latent"
     ):
         resolve_settings("latent", {"max_terms": 3})
-    with pytest.raises(SettingsError, match="unknown structure 'phi'"):
+    with pytest.raises(SettingsError, match="unknown structure of latent models 'phi'"):
         resolve_settings("latent", {"structure": "phi"})
