@@ -12,12 +12,16 @@ import pytest
 from islands.available_cpus import count_cpus
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
+from islands.evolution.latent.problem import make_latent_problem
+from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem
+from islands.progress import Steps
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool
 from islands_service.runtime.cluster import LOSS_ERRORS, ClusterError
 from islands_service.runtime.island_actor import IslandActor
 from islands_service.runtime.ray_engine import RayEngine
+from support.latent_systems import spring_record
 from support.processes import actors, alive, eventually, kill
 from support.searches import SMALL, exactly, record
 
@@ -68,6 +72,26 @@ def test_three_killed_actors_do_not_change_the_result(posed, undisturbed, engine
             # The engine is suspended: the loss occurs before the next step.
     assert found == undisturbed
     assert messages.count("an actor was lost: its islands continue from their last epoch") == 3
+
+
+@pytest.mark.ci
+def test_killed_actors_do_not_change_a_search_for_latent_models(ray_address, messages):
+    changes = {"population": 6, "generations": 6, "islands": 2, "migrate_every": 1}
+    settings = resolve_settings("latent", changes)
+    problem = make_latent_problem(spring_record(240, noise=0.02), settings, Steps())
+    alone = [each.archipelago for each in SerialEngine().run(problem, empty_archipelago(2, SEED), never)]
+    found = []
+    with ENGINES["ray"](ray_address, messages.append) as engine:
+        for epoch in engine.run(problem, empty_archipelago(2, SEED), never):
+            found.append(exactly(epoch.archipelago))
+            if len(found) in (2, 4):
+                victim = min(eventually(actors))
+                kill(victim)
+                eventually(lambda pid=victim: not alive([pid]))
+    assert found == [exactly(each) for each in alone]
+    assert messages.count("an actor was lost: its islands continue from their last epoch") == 2
+    assert alone[-1].find_front()[-1].units
+    eventually(lambda: not actors())
 
 
 @pytest.mark.nightly

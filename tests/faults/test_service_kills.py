@@ -120,6 +120,27 @@ def test_killed_process_loses_no_job(service: Service, undisturbed: tuple[bytes,
     assert happened.count("running") in ATTEMPTS[role], happened
 
 
+def submit_latent(service: Service) -> str:
+    settings = {"population": 4, "generations": 24, "migrate_every": 1}
+    columns = {"inputs": SPEC["inputs"], "output": SPEC["output"], "rows": "0:500"}
+    spec = {"dataset": service.dataset, **columns, "preset": "latent", "settings": settings}
+    answer = service.ask("POST", "/v1/jobs", json=spec)
+    assert answer.status_code == 202, answer.text
+    return str(answer.json()["id"])
+
+
+@pytest.mark.ci
+def test_killed_coordinator_does_not_change_a_search_for_latent_models(service: Service) -> None:
+    undisturbed = service.found(submit_latent(service))
+    job = submit_latent(service)
+    assert service.under_way(job, 6) < 24
+    victim = service.one(ESSENTIAL)
+    kill(victim)
+    eventually(lambda: not alive([victim]))
+    assert service.found(job) == undisturbed
+    assert service.job(job)["attempt"] in ATTEMPTS[ESSENTIAL]
+
+
 @pytest.mark.nightly
 def test_killed_service_leaves_no_process_and_continues_after_a_start(
     tmp_path: Path, undisturbed: tuple[bytes, bytes]

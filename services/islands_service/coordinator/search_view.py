@@ -4,6 +4,7 @@ A search never reads it. Its size is bounded, because every report of progress c
 the best model is larger, and is stored once.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from math import sqrt
 from time import monotonic
@@ -153,10 +154,8 @@ def _write_equation(individual: AnyIndividual, problem: SearchProblem) -> str:
 
 
 def _describe_structure(system: FittedStateSpace) -> str:
-    """Describe a state space, whose equations are too long: ``2 states, units cube and tanh``."""
+    """Describe a state space, whose equations are too long: ``2 states with cube, 2 × tanh``."""
     states = "1 state" if system.order == 1 else f"{system.order} states"
-    if not system.units:
-        return f"{states}, linear"
-    *others, last = sorted(system.units)
-    units = f"units {', '.join(others)} and {last}" if others else f"unit {last}"
-    return f"{states}, {units}"
+    counts = Counter(sorted(system.units)).items()
+    units = ", ".join(unit if count == 1 else f"{count} × {unit}" for unit, count in counts)
+    return f"{states} with {units}" if units else f"{states}, linear"

@@ -1,7 +1,7 @@
 """View of a running search: the front has at most one bounded entry per size, and migrations are named."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.history import HistoryPoint
-from islands.evolution.individual import Individual
+from islands.evolution.individual import AnyIndividual, Individual
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState
@@ -43,7 +44,7 @@ def individual(size: int, fitness: float) -> Individual:
     return Individual((), tuple(terms), (0.5,) * size, fitness)
 
 
-def searched(*islands: list[Individual], generation: int = 7) -> SearchState:
+def searched(*islands: Sequence[AnyIndividual], generation: int = 7) -> SearchState:
     halls = [HallOfFame(tuple(sorted(each, key=lambda one: (one.size, one.fitness)))) for each in islands]
     made = tuple(Island(at, 3, generation, (), (), hall) for at, hall in enumerate(halls))
     best = {each.size: each.fitness for hall in halls for each in hall.entries}
@@ -76,6 +77,22 @@ def test_size_of_a_front_is_bounded() -> None:
 def test_equation_in_deviations_names_the_offsets() -> None:
     (found,) = shown(searched([individual(1, 1.0)]), replace(PROBLEM, offsets=(101300.0, 0.0)))
     assert found["equation"] == "y_um(k) = 0.5*y_um(k-1), with y_um minus 101300"
+
+
+def test_state_spaces_are_described_by_their_states_and_units(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("islands_service.coordinator.search_view._simulate", lambda *_: None)
+
+    def system(order: int, *units: str) -> FittedStateSpace:
+        free = (True,) * (order + len(units))
+        return FittedStateSpace(order, 1, units, (), free, (), 16.0 / len(free) ** 2, 1.0)
+
+    systems = [system(1), system(2), system(2, "tanh"), system(2, "tanh", "cube", "tanh")]
+    assert [(each["size"], each["equation"]) for each in shown(searched(systems))] == [
+        (1, "1 state, linear"),
+        (2, "2 states, linear"),
+        (3, "2 states with tanh"),
+        (5, "2 states with cube, 2 × tanh"),
+    ]
 
 
 def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.MonkeyPatch) -> None:
