@@ -5,13 +5,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf, isnan
-from typing import ClassVar, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeAlias, TypeVar
 
 from islands.errors import ModelError
-from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.expressions.tree import Expression
 from islands.models.regressor import CanonicalForms, Regressor, regressor
 from islands.simulation.outcome import OK, EvaluationOutcome
+
+if TYPE_CHECKING:
+    # At run time it would load the kernels of its estimation into every command that reads settings.
+    from islands.estimation.fitted_state_space import FittedStateSpace
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +73,8 @@ class Individual:
 Population: TypeAlias = tuple[Individual, ...]
 
 #: Individual of any class of models.
-AnyIndividual: TypeAlias = Individual | FittedStateSpace
-AnyPopulation: TypeAlias = tuple[AnyIndividual, ...]
+AnyIndividual: TypeAlias = "Individual | FittedStateSpace"
+AnyPopulation: TypeAlias = "tuple[AnyIndividual, ...]"
 
 _Kind = TypeVar("_Kind", bound=AnyIndividual)
 
