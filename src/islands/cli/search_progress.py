@@ -1,6 +1,6 @@
 """Progress display of a search."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import takewhile
 from math import inf
 from time import monotonic
@@ -8,7 +8,7 @@ from time import monotonic
 from islands.cli.progress_display import Display
 from islands.evolution.history import HistoryPoint
 from islands.evolution.search_state import SearchState
-from islands.evolution.settings import Settings
+from islands.evolution.settings import NARX, Settings
 from islands.facade.identification_progress import IdentificationProgress
 
 #: Largest number of islands that have a line each.
@@ -51,17 +51,29 @@ class SearchDisplay:
         _, since, before = self._first
         rate = (state.evaluations - before) / max(now - since, 1e-9)
         left = self._progress.report_epoch(state, settings, rate)
-        best = " ".join(f"{size}:{error**0.5:.3g}" for size, error in state.history[-1].best.items())
+        front = _find_front(state.history[-1].best)
+        best = " ".join(f"{size}:{error**0.5:.3g}" for size, error in front.items())
+        counted = "terms" if settings.model_class == NARX else "parameters"
         self._show(
             f"generation {state.history[-1].generation}/{settings.generations}, {rate:.0f}/s",
             self._fraction,
-            [f"  RMSE by terms  {best}", *_island_lines(state.history)],
+            [f"  RMSE by {counted}  {best}", *_island_lines(state.history)],
             left,
         )
 
     def _show_stage(self, message: str, fraction: float | None = None, /) -> None:
         self._fraction = fraction or 0.0
         self._show(message, fraction)
+
+
+def _find_front(best: Mapping[int, float]) -> dict[int, float]:
+    """Return the errors that are less than those of all smaller models; latent models have many sizes."""
+    front: dict[int, float] = {}
+    least = inf
+    for size, error in sorted(best.items()):
+        if error < least:
+            front[size] = least = error
+    return front
 
 
 def _has_error(island: int, error: float) -> Callable[[HistoryPoint], bool]:

@@ -2,6 +2,7 @@
 
 from islands.evolution.search_result import SearchResult
 from islands.io.certificates import summarise_certificates
+from islands.io.result_text.latent_method import describe_latent_search, is_latent
 from islands.io.result_text.model_table import table
 from islands.io.result_text.statements import Document, describe_choice, describe_findings, describe_units
 from islands.io.result_text.text_layout import LEGEND, term_table, wrap
@@ -37,12 +38,11 @@ def method_text(found: SearchResult) -> str:
     """Return data, settings, number of models, bounds, and the equations of all models."""
     record, search = found.record, found.search
     outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
-    full = search.full_set
     lines = [
         f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
         *wrap(_describe_settings(found)),
         f"{search.evaluations} models estimated: {outcomes}",
-        f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
+        *_describe_search(found),
         *(line for text in summarise_certificates(found) for line in wrap(text)),
         "",
         *wrap(_describe_names(found)),
@@ -52,6 +52,17 @@ def method_text(found: SearchResult) -> str:
         ),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _describe_search(found: SearchResult) -> list[str]:
+    """Return the size of the full polynomial set, or how latent models were searched."""
+    search, full = found.search, found.search.full_set
+    if not is_latent(found.settings):
+        return [
+            f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB"
+        ]
+    paragraphs = describe_latent_search(found.settings, search.generations or 0)
+    return [line for text in paragraphs for line in ("", *wrap(text))]
 
 
 def _describe_names(found: SearchResult) -> str:

@@ -12,6 +12,7 @@ from islands.cli import search_progress as showing
 from islands.cli.search_progress import SHOWN_ISLANDS, SearchDisplay
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.history import HistoryPoint
+from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 
@@ -134,3 +135,10 @@ def test_lines_below_the_bar_are_verbatim_and_erased_at_the_end(monkeypatch):
     assert shown.index("generation 3") < shown.index("island 0 [red]") < shown.index("island 1")
     # Each line is erased at the end (cursor up, erase).
     assert shown.rindex("\x1b[2K") > shown.rindex("island 1")
+
+
+def test_latent_models_are_displayed_by_parameters_without_those_that_a_smaller_one_exceeds(displayed):
+    best = {12: 4.0, 5: 9.0, 16: 4.5, 19: 0.25}
+    state = replace(at(0, 48, [0.25]), history=(HistoryPoint(0, 48, best, (0.25,)),))
+    ((_, _, lines, _),) = displayed(resolve_settings("latent", {"islands": 1}), state)
+    assert lines == ["  RMSE by parameters  5:3 12:2 19:0.5"]
