@@ -87,3 +87,22 @@ def test_a_structure_is_that_of_latent_models(folder):
     found = islands.fit(read(folder)[:300], model="latent", structure="feedback")
     assert found.settings["structure"] == "feedback"
     assert not any(name.startswith("f") for name in found.best.model.parameter_names)
+
+
+def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
+    search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
+    budget = ("--preset", "latent", "--population", "6", "--generations", "2", "--structure")
+    succeed(*search, *budget, "wiener", "--out", tmp_path / "out")
+    found = islands.load(tmp_path / "out")
+    assert found.settings["structure"] == "wiener"
+    models = [entry.model for entry in found.models]
+    assert any(model.units for model in models)
+    assert not any(name.startswith("e") for model in models for name in model.parameter_names)
+    method = " ".join((tmp_path / "out" / "method.txt").read_text().split())
+    assert "for 2 generations of 6 offspring" in method
+    assert "no unit acts on the states" in method
+    assert "full polynomial set" not in method
+    text = fail(*search, *budget, "phi", "--out", tmp_path / "refused")
+    assert "unknown structure of latent models 'phi': take one of auto, wiener" in text
+    text = fail(*search, "--structure", "wiener", "--out", tmp_path / "refused")
+    assert "unknown structure of narx models 'wiener'" in text
