@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from playwright.sync_api import sync_playwright
 from page_pictures import CHROMIUM, PATIENCE, PICTURES, PORT
+from playwright.sync_api import sync_playwright
 
 from islands.io.records import write_record
 from islands_api.client import Client

@@ -101,6 +101,28 @@ def test_the_front_grows_and_its_points_show_their_equations(
 
 
 @pytest.mark.ci
+def test_sizes_of_state_spaces_are_parameters_also_if_the_preset_chose_them(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
+    job = desk.submit(500, preset="auto")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    with stored(desk) as store:
+        lease = taken(store, job)
+        store.leases.report(lease, ProgressReport({"phase": "linear state space of order 2"}))
+        expect(page.locator(".stages [aria-current=step]")).to_have_text("First models")
+        advance(store, lease, 0, 40, model="latent")
+        expect(page.locator(".doing")).to_have_text(
+            "Evolution of state spaces on 2 islands: generation 40 of 500."
+        )
+        expect(page.locator(".live")).to_contain_text("Model of the least error: 5 parameters")
+        page.get_by_role("slider", name="Front of size against error").focus()
+        page.keyboard.press("Home")
+        expect(page.locator(".live > figure.chart")).to_contain_text("parameters 1")
+        store.leases.report(lease, ProgressReport({"phase": "final estimation of state spaces"}))
+        expect(page.locator(".stages [aria-current=step]")).to_have_text("Final models")
+
+
+@pytest.mark.ci
 def test_stop_and_keep_the_best_ends_a_search_with_models(
     opened: Callable[..., Any], searching: ServiceClient, expect: Any
 ) -> None:

@@ -77,3 +77,8 @@ def test_presets_state_their_settings_and_what_the_settings_mean(service):
     assert "library" not in auto.settings
     assert page.settings["tolerance"]["description"].startswith("Smallest error reduction ratio")
     assert np.all([each["description"] for each in page.settings.values()])
+    latent = next(each for each in named if each.name == "latent")
+    assert latent.structures == ("auto", "wiener", "hammerstein", "feedback")
+    assert {"max_terms", "model_class"} <= {*latent.fixed}
+    assert "structure" not in latent.fixed
+    assert (auto.structures, auto.fixed) == (("free", "phi", "increment"), ("model_class",))

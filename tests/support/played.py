@@ -29,7 +29,9 @@ def squared_error(generation: int, island: int) -> float:
     return 1e-3 * (1 + island) / (1 + generation / 20)
 
 
-def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2) -> None:
+def advance(
+    store: Store, lease: Lease, first: int, last: int, islands: int = 2, model: str = "narx"
+) -> None:
     """Report all generations from ``first`` to ``last``."""
     points = tuple(
         (
@@ -50,6 +52,7 @@ def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2)
     ]
     progress: dict[str, Any] = {
         "phase": "search",
+        "model": model,
         "generation": last,
         "generations": GENERATIONS,
         "evaluations": 60 * (last + 1),

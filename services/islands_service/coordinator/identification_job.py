@@ -21,7 +21,7 @@ from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.coupled.identification import identify_coupled_data
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit_record
-from islands.facade.identification_progress import CLASS_PHASES, SEARCH, IdentificationProgress
+from islands.facade.identification_progress import SEARCH, IdentificationProgress, class_phases
 from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
 from islands.io.checkpoints import history_document
@@ -220,7 +220,7 @@ def _identify_outputs(
 
 def _make_progress(progress: ProgressCallback, spec: Identification, samples: int) -> PhasedProgress:
     if spec.model != NARX:
-        return PhasedProgress(progress, CLASS_PHASES)
+        return PhasedProgress(progress, class_phases(spec.model, samples))
     settings, *_ = resolve_job_settings(spec, maxsize, maxsize)
     outputs = spec.outputs if len(spec.outputs) > 1 else ()
     return IdentificationProgress(progress, spec.preset, samples, settings, outputs)

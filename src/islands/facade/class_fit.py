@@ -16,7 +16,9 @@ from islands.evolution.search_result import (
     with_bands,
     with_linear_comparison,
 )
-from islands.evolution.settings import LATENT
+from islands.evolution.search_state import SearchState
+from islands.evolution.settings import LATENT, Settings
+from islands.facade.identification_progress import SEARCH
 from islands.facade.latent_identification import identify_latent
 from islands.facade.results.model_simulation import SHOOTING
 from islands.io.models import MODEL_CLASSES, NARX
@@ -68,7 +70,12 @@ def fit_class(
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
     if issubclass(entry, LatentModel):
         searched = resolve_settings(LATENT, {"structure": structure})
-        return identify_latent(record, split, searched, seed, steps, {"method": "fit"})
+
+        def report(state: SearchState, settings: Settings) -> None:
+            done, whole = state.archipelago.generation, settings.generations
+            steps.report(f"{SEARCH}: generation {done} of {whole}", (done + 1) / (whole + 1))
+
+        return identify_latent(record, split, searched, seed, steps, {"method": "fit"}, on_epoch=report)
     found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
     models = [model for _, model in found[:1]]
     if not models:

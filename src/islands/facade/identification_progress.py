@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from islands.evolution.presets import AUTO
+from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.settings import LATENT
 from islands.progress import MIN_FRACTION, Phase, PhasedProgress, ProgressCallback
 
@@ -37,8 +37,8 @@ _LIBRARY = (
 #: Seconds of the final models and of their bands for each sample, beyond a constant.
 _FINAL, _BANDS = 3.6e-4, 3e-5
 
-#: Phases of the fit of a class of models, as shares.
-CLASS_PHASES = (Phase("estimation from starting model", 0.9, 3), Phase("assessment of the model", 0.1))
+#: Phases of the fit of a class of models that has starting models, as shares.
+_CLASS = (Phase("estimation from starting model", 0.9, 3), Phase("assessment of the model", 0.1))
 
 
 def fit_phases(library: str, outputs: Sequence[str] = ()) -> tuple[Phase, ...]:
@@ -48,6 +48,13 @@ def fit_phases(library: str, outputs: Sequence[str] = ()) -> tuple[Phase, ...]:
         Phase("prediction bands", 0.1),
     )
     return _repeat(phases, outputs) if outputs else phases
+
+
+def class_phases(model: str, samples: int) -> tuple[Phase, ...]:
+    """Return the phases of the fit of a class of models; latent models are evolved."""
+    if model == LATENT:
+        return identification_phases(LATENT, samples, resolve_settings(LATENT, {}))
+    return _CLASS
 
 
 def identification_phases(

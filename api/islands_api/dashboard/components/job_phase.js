@@ -60,11 +60,12 @@ export function describePhase(job) {
   return `${output ? `${output}: ` : ""}${sentence}${stopped}`;
 }
 
-/** Return the stages of a job; a given preset is not chosen, and a class of models is only fitted. */
+/** Return the stages of a job; a given preset is not chosen, and other classes than latent are only fitted. */
 function getStages({ kind, spec }) {
   if (isDiagnosis({ kind })) return DIAGNOSIS;
-  if ((spec.model ?? "narx") !== "narx") return CLASS_FIT;
-  return (spec.preset ?? "auto") === "auto" ? SEARCH : SEARCH.filter(([name]) => name !== "Preset");
+  const { model = "narx", preset = "auto" } = spec;
+  if (!["narx", "latent"].includes(model)) return CLASS_FIT;
+  return model === "narx" && preset === "auto" ? SEARCH : SEARCH.filter(([name]) => name !== "Preset");
 }
 
 /** Return the position of the present stage; the one with the longest beginning of the phase. */

@@ -24,7 +24,7 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS, REFITS
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.facade.identification_progress import CLASS_PHASES, fit_phases
+from islands.facade.identification_progress import class_phases, fit_phases
 from islands.figures.names import FREE_RUN, parse_figures
 from islands.io.models import NARX
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
@@ -133,7 +133,10 @@ def fit(
 
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
-        phases = fit_phases(library, outputs if len(outputs) > 1 else ()) if model == NARX else CLASS_PHASES
+        if model == NARX:
+            phases = fit_phases(library, outputs if len(outputs) > 1 else ())
+        else:
+            phases = class_phases(model, data.samples)
         given: dict[str, Any] = {
             "model": model,
             "structure": structure,

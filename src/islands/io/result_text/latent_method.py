@@ -53,10 +53,10 @@ def describe_latent_search(settings: Mapping[str, Any], generations: int) -> Ite
     )
     yield (
         "Parameters: damped least squares of the free run over blocks of the estimation data, at most "
-        f"{EFFECT_STEPS} steps for everything but the arguments of new or changed units, then {STEPS} for all "
-        f"parameters, or {FURTHER_STEPS} if the estimation goes on. Error: the largest one of several free "
-        "runs over the held-out rows of the blocks, from the states of the block, from estimated and from "
-        "disturbed states."
+        f"{EFFECT_STEPS} steps for everything but the arguments of new or changed units, then {STEPS} for "
+        f"all parameters, or {FURTHER_STEPS} if the estimation goes on. Error: the largest one of several "
+        "free runs over the held-out rows of the blocks, from the states of the block, from estimated and "
+        "from disturbed states."
     )
     yield (
         f"Selection: the elite of an island has {elite} systems, each structure once: the front of size and "

@@ -1,11 +1,14 @@
 """Progress of an identification: honest about the time left over recorded runs, in every phase."""
 
+import numpy as np
 import pytest
 
+import islands
 from islands.evolution.presets import AUTO
 from islands.evolution.settings import Settings
-from islands.facade.identification_progress import fit_phases, identification_phases
+from islands.facade.identification_progress import class_phases, fit_phases, identification_phases
 from islands.progress import PhasedProgress
+from support.latent_systems import spring_record
 from support.recorded_runs import find_quarters, find_standstills, late, replay
 
 #: Recorded runs with the largest error of the time left beyond half of it, in seconds, as measured.
@@ -66,3 +69,18 @@ def test_several_outputs_pass_the_same_phases_one_after_the_other(phases):
         progress(message)
     assert seen == sorted(seen)
     assert 0.2 < seen[-2] < seen[-1] < 1.0
+
+
+@pytest.mark.ci
+def test_a_fit_of_latent_models_reports_their_generations():
+    reported = []
+    progress = PhasedProgress(lambda *each: reported.append(each), class_phases("latent", 240))
+    islands.fit(spring_record(240, noise=0.02), model="latent", progress=progress)
+    messages, fractions = zip(*reported, strict=True)
+    generations = [each for each in messages if each.startswith("search: generation")]
+    assert generations[0] == "search: generation 0 of 10"
+    assert generations[-1] == "search: generation 10 of 10"
+    assert list(fractions) == sorted(fractions)
+    steps = np.diff([fraction for message, fraction in reported if message in generations])
+    assert 0.2 < sum(steps) < 1.0
+    assert max(steps) < 0.35

@@ -14,7 +14,9 @@ def describe(generations=7, **changes):
 
 
 def test_the_numbers_are_those_of_the_settings():
-    text = describe(population=18, elite=0.5, crossover=0.4, tournament=5, islands=3, migrate_every=2, migrants=4)
+    text = describe(
+        population=18, elite=0.5, crossover=0.4, tournament=5, islands=3, migrate_every=2, migrants=4
+    )
     for part in (
         "on 3 islands for 7 generations of 18 offspring",
         "with probability 0.4",
