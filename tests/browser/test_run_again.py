@@ -153,7 +153,10 @@ def test_a_preset_shows_its_settings_only_and_latent_models_have_a_structure(
     order = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "preset": "latent"}
     job = start(desk, "/v1/jobs", {**order, "settings": {"generations": 3, "structure": "wiener"}})
     page = open_again(quiet(desk.url), job)
-    structure, setting = page.get_by_label("Structure", exact=True), page.get_by_label("structure", exact=True)
+    structure, setting = (
+        page.get_by_label("Structure", exact=True),
+        page.get_by_label("structure", exact=True),
+    )
     expect(structure).to_have_value("wiener")
     expect(page.get_by_label("max_terms", exact=True)).to_be_hidden()
     expect(page.get_by_label("crossover", exact=True)).to_be_visible()

@@ -29,9 +29,7 @@ def squared_error(generation: int, island: int) -> float:
     return 1e-3 * (1 + island) / (1 + generation / 20)
 
 
-def advance(
-    store: Store, lease: Lease, first: int, last: int, islands: int = 2, model: str = "narx"
-) -> None:
+def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2, model: str = "narx") -> None:
     """Report all generations from ``first`` to ``last``."""
     points = tuple(
         (
