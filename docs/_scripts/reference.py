@@ -27,6 +27,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.records import READERS
 from islands.models.candidate_library import LIBRARIES
+from islands.models.latent import STRUCTURE_SUMMARIES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES
@@ -53,6 +54,13 @@ def search_settings() -> str:
             table(("Setting", "Type", "Default", "Meaning"), rows),
         ),
         section("Gene structures", "Values of `structure`.", entries("Structure", STRUCTURES)),
+        section(
+            "Structures of latent models",
+            "Values of `structure` with the preset `latent`.",
+            table(
+                ("Structure", "Meaning"), ((code(name), text) for name, text in STRUCTURE_SUMMARIES.items())
+            ),
+        ),
         section("Fitnesses", "Values of `fitness`.", entries("Fitness", FITNESSES)),
         section("Parameter constraints", "Values of `constraints`.", entries("Constraint", CONSTRAINTS)),
         section("Candidate libraries", "Values of `library`, and of `islands fit --library`.", _libraries()),

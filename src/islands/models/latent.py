@@ -47,6 +47,16 @@ ZERO_BLOCKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"auto": (), "wiener": ("E",), "hammerstein": ("W of the states",), "feedback": ("F",)}
 )
 
+#: Meaning of each structure.
+STRUCTURE_SUMMARIES: Mapping[str, str] = MappingProxyType(
+    {
+        "auto": "units read and act anywhere",
+        "wiener": "no unit acts on the states",
+        "hammerstein": "no unit reads a state",
+        "feedback": "no unit acts on the output directly",
+    }
+)
+
 #: Text of units in equations for readers, if it is another one.
 _NAMED_POWERS: Mapping[str, str] = MappingProxyType({"square": "square({0})", "cube": "cube({0})"})
 

@@ -1,21 +1,12 @@
 """Text of the method of a search for latent models: what evolved, with the numbers of its settings."""
 
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import Any
 
 from islands.estimation.latent_models import ORDERS
 from islands.evolution.latent.variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
 from islands.evolution.settings import LATENT
-
-#: What a structure excludes, by its name.
-_EXCLUDED: Mapping[str, str] = MappingProxyType(
-    {
-        "wiener": "no unit acts on the states",
-        "hammerstein": "no unit reads a state",
-        "feedback": "no unit acts on the output directly",
-    }
-)
+from islands.models.latent import STRUCTURE_SUMMARIES
 
 
 def is_latent(settings: Mapping[str, Any]) -> bool:
@@ -37,12 +28,11 @@ def describe_latent_search(settings: Mapping[str, Any], generations: int) -> Ite
     where = "1 island" if islands == 1 else f"{islands} islands"
     elite = max(1, round(settings["elite"] * population))
     orders = f"{', '.join(map(str, ORDERS[:-1]))} and {ORDERS[-1]}"
-    excluded = _EXCLUDED.get(settings["structure"])
     yield (
         f"Search: state spaces with static units evolved on {where} for {generations} generations of "
         f"{population} offspring each. The first ones are linear systems of order {orders} with random "
-        f"units. A system has at most {MOST_STATES} states and {MOST_UNITS} units"
-        f"{f'; {excluded}' if excluded else ''}."
+        f"units. A system has at most {MOST_STATES} states and {MOST_UNITS} units. "
+        f"Structure {settings['structure']}: {STRUCTURE_SUMMARIES[settings['structure']]}."
     )
     yield (
         f"Offspring: with probability {settings['crossover']:g}, a parent with a unit of another system, the "

@@ -2,8 +2,6 @@
 
 from dataclasses import asdict
 
-import pytest
-
 from islands.evolution.presets import resolve_settings
 from islands.io.result_text.latent_method import describe_latent_search, is_latent
 
@@ -33,12 +31,9 @@ def test_one_island_has_no_migration():
     assert "Migration" not in text
 
 
-@pytest.mark.parametrize(
-    ("structure", "excluded"), [("wiener", "acts on the states"), ("hammerstein", "reads a state")]
-)
-def test_a_structure_states_what_it_excludes(structure, excluded):
-    assert f"no unit {excluded}" in describe(structure=structure)
-    assert "no unit" not in describe()
+def test_the_structure_is_stated_with_its_meaning():
+    assert "Structure hammerstein: no unit reads a state." in describe(structure="hammerstein")
+    assert "Structure auto: units read and act anywhere." in describe()
 
 
 def test_only_settings_of_latent_models_are_described():
