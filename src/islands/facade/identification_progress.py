@@ -41,13 +41,14 @@ _FINAL, _BANDS = 3.6e-4, 3e-5
 _CLASS = (Phase("estimation from starting model", 0.9, 3), Phase("assessment of the model", 0.1))
 
 
-def fit_phases(library: str, outputs: Sequence[str] = ()) -> tuple[Phase, ...]:
+def fit_phases(library: str, outputs: Sequence[str]) -> tuple[Phase, ...]:
     """Return the phases of a fit with a library, with times in seconds; see `identification_phases`."""
+    several = len(outputs) > 1
     phases = (
-        *(_TRIALS if library == AUTO and not outputs else _LIBRARY),
+        *(_TRIALS if library == AUTO and not several else _LIBRARY),
         Phase("prediction bands", 0.1),
     )
-    return _repeat(phases, outputs) if outputs else phases
+    return _repeat(phases, outputs) if several else phases
 
 
 def class_phases(model: str, samples: int) -> tuple[Phase, ...]:

@@ -133,10 +133,7 @@ def fit(
 
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
-        if model == NARX:
-            phases = fit_phases(library, outputs if len(outputs) > 1 else ())
-        else:
-            phases = class_phases(model, data.samples)
+        phases = fit_phases(library, outputs) if model == NARX else class_phases(model, data.samples)
         given: dict[str, Any] = {
             "model": model,
             "structure": structure,

@@ -137,7 +137,7 @@ def test_lines_below_the_bar_are_verbatim_and_erased_at_the_end(monkeypatch):
     assert shown.rindex("\x1b[2K") > shown.rindex("island 1")
 
 
-def test_latent_models_are_displayed_by_parameters_without_those_that_a_smaller_one_exceeds(displayed):
+def test_latent_models_are_displayed_by_parameters_on_their_front(displayed):
     best = {12: 4.0, 5: 9.0, 16: 4.5, 19: 0.25}
     state = replace(at(0, 48, [0.25]), history=(HistoryPoint(0, 48, best, (0.25,)),))
     ((_, _, lines, _),) = displayed(resolve_settings("latent", {"islands": 1}), state)
