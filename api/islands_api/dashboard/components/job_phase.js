@@ -60,7 +60,7 @@ export function describePhase(job) {
   return `${output ? `${output}: ` : ""}${sentence}${stopped}`;
 }
 
-/** Return the stages of a job; a given preset is not chosen, and other classes than latent are only fitted. */
+/** Return the stages of a job: a given preset is not chosen, and most classes of models are only fitted. */
 function getStages({ kind, spec }) {
   if (isDiagnosis({ kind })) return DIAGNOSIS;
   const { model = "narx", preset = "auto" } = spec;

@@ -13,7 +13,8 @@ export const KINDS = {
 const MAX_SETTINGS = 4;
 
 /** Return what a job has found: the equation of its recommended model, or the causes of a discrepancy. */
-export const getFinding = ({ summary }) => summary?.equation ?? summary?.effects?.join(", ") ?? "";
+export const getFinding = ({ summary }) =>
+  summary?.equation?.replaceAll("\n", "; ") ?? summary?.effects?.join(", ") ?? "";
 
 /** Return the verdict of a job in words; empty if it has none. */
 export function getVerdict({ summary, ...job }) {

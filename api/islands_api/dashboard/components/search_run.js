@@ -50,8 +50,8 @@ export function makeSearchRun(job, unit, signal) {
     const outcome = found.outcome === "ok" ? "" : ` (${found.outcome})`;
     setText(
       statement,
-      `${formatSize(found.size, found.kind)}, generation ${formatCount(found.generation)}, over the estimation data`
-        + `${outcome}. It is the smallest model within 10 % of the least error.`,
+      `${formatSize(found.size, found.kind)}, generation ${formatCount(found.generation)}, over the `
+        + `estimation data${outcome}. It is the smallest model within 10 % of the least error.`,
     );
     node.hidden = false;
   }

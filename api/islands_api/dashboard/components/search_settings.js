@@ -34,8 +34,8 @@ function makeField(name, type) {
 
 /** Preset whose structure is chosen next to it, and what its values mean. */
 const LATENT = "latent";
-const STRUCTURES = "auto: curves anywhere. wiener: only the output reads them. hammerstein: they read the inputs "
-  + "only. feedback: they act on the states only.";
+const STRUCTURES = "auto: curves anywhere. wiener: only the output reads them. hammerstein: they read the "
+  + "inputs only. feedback: they act on the states only.";
 
 /** Make the choice of the structure of latent models; `show(isVisible)` shows or hides it. */
 function makeStructure() {
