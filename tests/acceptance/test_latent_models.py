@@ -1,8 +1,11 @@
 """A latent model from the command line: fit, files, simulation, programs, figures."""
 
 import ctypes
+import re
+import shlex
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,8 +13,9 @@ import pytest
 import islands
 from islands.figures.names import LATENT_FIGURES
 from islands.simulation.predictors import free_run
-from support.command_line import fail, succeed
+from support.command_line import ISLANDS, fail, succeed
 from support.latent_systems import spring_record
+from support.repository import ROOT
 
 pytestmark = pytest.mark.ci
 
@@ -106,3 +110,24 @@ def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     assert "unknown structure of latent models 'phi': take one of auto, wiener" in text
     text = fail(*search, "--structure", "wiener", "--out", tmp_path / "refused")
     assert "unknown structure of narx models 'wiener'" in text
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
+def test_the_example_of_the_guide_leads_from_a_record_to_a_program(tmp_path):
+    guide = (ROOT / "docs/how-to/fit-a-latent-model.md").read_text("utf-8")
+    section = guide.split("## From a record to C code\n")[1].split("\n## ")[0]
+    (script,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True)
+    commands = re.findall(r"^    ((?:islands|gcc) .*)", section, re.MULTILINE)
+    assert [each.split()[:2] for each in commands[:2]] == [["islands", "identify"], ["islands", "show"]]
+    for command in commands:
+        serial = " --engine serial" if "identify" in command else ""
+        program = str(ISLANDS) if command.startswith("islands") else "gcc"
+        words = [program, *shlex.split(command + serial)[1:]]
+        subprocess.run(words, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "valve.o").exists()
+    summary = " ".join((tmp_path / "valve" / "summary.txt").read_text().split())
+    stated = [float(each) for each in re.findall(r"time constant ([\d.]+) s", summary)]
+    # Poles of 0.9 and 0.8 at a sampling time of 0.1 s.
+    assert stated == pytest.approx([-0.1 / np.log(0.9), -0.1 / np.log(0.8)], rel=0.02)
+    assert "size 13" in summary

@@ -50,6 +50,15 @@ def shown(page: Any) -> list[str]:
     return found
 
 
+def test_a_row_separates_the_equations_of_a_model_with_several(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
+    summary = {**SUMMARY, "equation": "y(k) = 0.5*x1(k)\nx1(k) = 0.9*x1(k-1) + u(k-1)"}
+    job = end(desk, desk.submit(500, name="states"), document={}, summary=summary)
+    line = row(quiet(desk.url).go(), job).locator(".line")
+    expect(line).to_have_text("y(k) = 0.5*x1(k); x1(k) = 0.9*x1(k-1) + u(k-1)")
+
+
 def test_a_row_shows_the_equation_the_error_and_the_verdict(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
