@@ -105,6 +105,15 @@ def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.Monke
     assert front.update(searched([individual(1, 0.25)]))[0]["error"] == 0.5
 
 
+def test_the_time_of_the_first_front_does_not_delay_the_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e-9)
+    front = SearchFront()
+    for _ in range(2):
+        front.begin(PROBLEM)
+        errors = [front.update(searched([individual(1, fitness)]))[0]["error"] for fitness in (9.0, 4.0, 1.0)]
+        assert errors == [3.0, 2.0, 2.0]
+
+
 def test_free_run_is_that_of_the_smallest_model_near_the_least_error() -> None:
     rng = np.random.default_rng(1)
     signals = {"u": rng.normal(size=(900, 1)), "y": rng.normal(size=900)}

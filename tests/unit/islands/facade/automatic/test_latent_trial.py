@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.evolution.presets import resolve_latent
 from islands.facade.automatic import preset_choice
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
@@ -63,12 +64,16 @@ def tried(monkeypatch):
 
 @pytest.mark.ci
 def test_a_saturation_between_lags_is_latent():
-    record = clipped_record()
-    choice = choose_preset(record, 0.25, {})
+    record, messages = clipped_record(), []
+    choice = choose_preset(record, 0.25, {}, lambda message, _=None: messages.append(message), lambda: False)
     assert choice.kind == "latent"
     assert choice.errors["latent"] < 0.8 * min(
         error for kind, error in choice.errors.items() if kind != "latent"
     )
+    # The steps of the trial are those of the choice, not of the search.
+    trial = "preset auto: trial of latent models"
+    assert f"{trial}, linear state space of order 2" in messages
+    assert all(each.startswith(trial) for each in messages[messages.index(trial) :])
     sentence, dead_time = choice.reasons
     assert "Preset auto chose latent (state spaces with static curves)" in sentence
     assert dead_time == "Dead times are states of the model."
@@ -107,3 +112,8 @@ def test_a_constant_output_is_not_compared(tried):
     record = lag_record(True)
     choose_preset(replace(record, y=np.ones(record.samples)), 0.25, {})
     assert tried == []
+
+
+def test_a_structure_of_narx_models_excludes_latent_models():
+    assert resolve_latent({"generations": 3}).generations == 3
+    assert resolve_latent({"structure": "free"}) is None
