@@ -111,7 +111,8 @@ def _minimise(
     order = len(rest)
     places = np.full(theta.size, -1)
     fixed = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
-    best, least, step = start, np.inf, np.zeros(order)
+    best, least = start, np.inf
+    step: NDArray[np.float64] = np.zeros(order)
     products = np.empty((order + 1, order + 1))
     for _ in range(_STATE_STEPS):
         states = best + step
