@@ -129,7 +129,7 @@ def submit_latent(service: Service) -> str:
     return str(answer.json()["id"])
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_killed_coordinator_does_not_change_a_search_for_latent_models(service: Service) -> None:
     undisturbed = service.found(submit_latent(service))
     job = submit_latent(service)

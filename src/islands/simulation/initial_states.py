@@ -112,7 +112,7 @@ def _minimise(
     places = np.full(theta.size, -1)
     fixed = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
     best, least = start, np.inf
-    step: NDArray[np.float64] = np.zeros(order)
+    step = np.zeros_like(start)
     products = np.empty((order + 1, order + 1))
     for _ in range(_STATE_STEPS):
         states = best + step

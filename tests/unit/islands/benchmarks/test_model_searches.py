@@ -36,7 +36,7 @@ def test_terms_are_those_of_equations_and_the_units_of_state_spaces():
     assert count_terms(TWO_MASSES.models[0]) == 4
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", [NARX, LATENT])
 def test_models_are_estimated_again_on_all_estimation_data(kind):
     u, noise = smooth_input(300, 4), np.random.default_rng(6).standard_normal(300)

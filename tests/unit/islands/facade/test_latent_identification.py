@@ -86,7 +86,7 @@ def test_a_structure_has_its_zeros(structure, absent):
         assert np.isfinite(rmse(each.model, saturated_record(300, 7)))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_fit_of_latent_models_has_the_models_of_the_preset():
     record = spring_record(160, noise=0.02)
     fitted, searched = islands.fit(record, model="latent"), identify_record(record, preset="latent")

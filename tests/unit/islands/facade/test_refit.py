@@ -133,7 +133,7 @@ def test_identify_estimates_its_models_again():
     assert found.settings["refit"] == "all"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_latent_models_keep_their_wiring_and_reduce_the_error_on_all_data():
     rng = np.random.default_rng(0)
     u, y = np.repeat(rng.uniform(0.2, 1.0, 60), 10), np.zeros(600)

@@ -62,7 +62,7 @@ def tried(monkeypatch):
     return found
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_saturation_between_lags_is_latent():
     record, messages = clipped_record(), []
     choice = choose_preset(record, 0.25, {}, lambda message, _=None: messages.append(message), lambda: False)
