@@ -121,7 +121,8 @@ def _minimise(
         if rows == len(segment.y) and np.isfinite(products).all() and error < least:
             best, least = states, error
             normal = products[:-1, :-1] + fixed * np.eye(order)
-            step = np.linalg.lstsq(normal, products[:-1, -1] - fixed * (states - rest), rcond=None)[0]
+            right = products[:-1, -1] - fixed * (states - rest)
+            step = np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0], np.float64)
         elif least == np.inf:
             return None
         else:
