@@ -250,7 +250,8 @@ class ModelView(ResponseModel):
     """Model with its metrics, physics checks and residual tests, as in ``result.json``."""
 
     kind: str = Field(
-        default=NARX, description="Class of the model: narx, coupled-narx for several outputs, or another."
+        default=NARX,
+        description="Class of the model, such as narx; coupled-narx or coupled-latent for several outputs.",
     )
     rank: int = Field(description="1 is the model with the least error on the validation data.")
     recommended: bool = Field(

@@ -123,7 +123,10 @@ def test_a_job_continues_in_the_search_that_was_interrupted(service, dataset, mo
         ({"settings": {"feedthrough": "yes"}}, "as u+1"),
         ({"settings": {"constraints": "gain = 2"}}, "are for one output"),
         ({"settings": {"select": "fitness"}}, "by their free run together"),
-        ({"model": "gain-scheduled"}, "have one output"),
+        (
+            {"model": "gain-scheduled"},
+            "has one output: name one, or take the model narx with the preset latent",
+        ),
     ],
 )
 @pytest.mark.usefixtures("toy_class")

@@ -4,7 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from islands.data.coupled_record import CoupledRecord
+from islands.data.dataset import Dataset
 from islands.models.block import Block
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
@@ -12,6 +15,7 @@ from islands.simulation.blocks import make_block_simulator
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.gain_scheduled import TRUE, GainScheduledModel, make_record
+from support.latent_systems import make_coupled_latent_model, smooth_input
 from support.programs import CASES, model, record, record_of
 
 #: Chosen for their states: past inputs and outputs, several inputs, no past, an input that acts at once.
@@ -35,6 +39,7 @@ OF_BLOCKS = {
     **OF_STATES,
     "two masses": TWO_MASSES,
     "prey": PREY,
+    "state spaces": make_coupled_latent_model(),
     "not measured": GainScheduledModel.of_record(make_record(), TRUE),
 }
 
@@ -63,11 +68,27 @@ class BlockCase:
 def block_case(name):
     """Return a case of ``OF_BLOCKS``."""
     exported = OF_BLOCKS[name]
+    if isinstance(exported, CoupledLatentModel):
+        return rest_case(exported)
     if isinstance(exported, CoupledModel):
         return coupled_case(exported, make_coupled_record(exported, samples=60))
     if isinstance(exported, GainScheduledModel):
         return state_case(exported, make_record(samples=60))
     return model_case(exported, record(exported.inputs, dt=0.1) if name == "at once" else record_of(name))
+
+
+def rest_case(exported):
+    """Return the case of latent models of several outputs that start at rest."""
+    block, first, u = measured_block(exported), exported.maximum_lag, smooth_input(60, 3)
+    data = CoupledRecord(
+        tuple(Dataset(u, np.zeros(60), 0.01, ("u_V",), name) for name in exported.output_names)
+    )
+    simulated = make_block_simulator(block, data, None, first)(np.array([exported.parameters]))[0].T
+    start = np.tile(
+        [*(0.0 for _ in exported.models), *block.start_values()[block.outputs :]][: block.computed],
+        (first, 1),
+    )
+    return make_case(exported, data.u, np.concatenate([start, simulated[first:]]), simulated)
 
 
 def model_case(exported, data):

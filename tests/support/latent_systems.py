@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel, StateSpaceLayout
 
 #: Parameters of a resonance with a cubic spring.
@@ -30,6 +32,13 @@ def make_model(parameters=SPRING, units=("cube",), order=2, **changes) -> Latent
         parameters=tuple(parameters.values()),
         **{"operating_inputs": (0.0,), **fields, **changes},
     )
+
+
+def make_coupled_latent_model(**changes) -> CoupledLatentModel:
+    """Return a resonance with a cubic spring, and a lag behind a saturation, of one input."""
+    lag = {"a1_1": 0.8, "c1": 2.0, "e1_1": 0.4, "v1": 1.5, "s1": 0.1, "level": -1.0}
+    second = {"output_name": "force (N)", "memory": 9, **changes}
+    return CoupledLatentModel((make_model(**changes), make_model(lag, ("saturation",), 1, **second)))
 
 
 def make_large_model() -> LatentModel:
@@ -71,3 +80,15 @@ def spring_record(samples: int = 1500, noise: float = 0.0, seed: int = 0, start=
         )
     y += noise * np.random.default_rng(seed + 1).standard_normal(samples)
     return Dataset(u, y, 0.01, ("u_V",), "y_mm")
+
+
+def curves_record(samples: int, seed: int, noise: float = 0.01) -> CoupledRecord:
+    """Return a lag behind which the output is saturated, and two lags behind which it is squared."""
+    u, x, y = 1.5 * smooth_input(samples, seed), np.zeros(3), np.empty((samples, 2))
+    for k in range(samples):
+        y[k] = np.tanh(2.0 * x[0]), x[1] + 0.3 * x[1] ** 2
+        x = np.array([0.9 * x[0] + 0.2 * u[k], 0.8 * x[1] + 0.2 * x[2], 0.7 * x[2] + 0.3 * u[k]])
+    y += noise * np.random.default_rng(seed + 50).standard_normal(y.shape)
+    return CoupledRecord(
+        tuple(Dataset(u, column, 0.01, ("u",), name) for column, name in zip(y.T, ("y1", "y2"), strict=True))
+    )

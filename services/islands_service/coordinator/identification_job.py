@@ -220,7 +220,8 @@ def _identify_outputs(
 
 def _make_progress(progress: ProgressCallback, spec: Identification, samples: int) -> PhasedProgress:
     if spec.model != NARX:
-        return PhasedProgress(progress, class_phases(spec.model, samples))
+        several = spec.outputs if len(spec.outputs) > 1 else ()
+        return PhasedProgress(progress, class_phases(spec.model, samples, several))
     settings, *_ = resolve_job_settings(spec, maxsize, maxsize)
     outputs = spec.outputs if len(spec.outputs) > 1 else ()
     return IdentificationProgress(progress, spec.preset, samples, settings, outputs)

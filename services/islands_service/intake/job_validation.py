@@ -12,6 +12,7 @@ from islands.data.compatibility import check_dt
 from islands.data.coupled_record import check_outputs
 from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.estimation.estimator_table import REFITS
+from islands.evolution.settings import LATENT
 from islands.io.models import MODEL_CLASSES, NARX, model_from_json
 from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
@@ -95,7 +96,10 @@ def _check_spec(spec: Identification | Discrepancy, settings: ServiceSettings) -
     if spec.model != NARX:
         lookup(MODEL_CLASSES, spec.model, "class of models")
         if len(spec.outputs) > 1:
-            raise SettingsError(f"models {spec.model} have one output: name one, or take the model {NARX}")
+            raise SettingsError(
+                f"a fit of models {spec.model} has one output: name one, or take the model {NARX} with the "
+                f"preset {LATENT}"
+            )
         if others := spec.changes.keys() - {"refit"}:
             listed = ", ".join(sorted(others))
             raise SettingsError(f"{listed}: settings are those of a search for models {NARX}, leave them out")

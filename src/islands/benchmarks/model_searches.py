@@ -4,7 +4,7 @@ The parameters of models of one output are estimated on all estimation data in t
 separate tests.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Protocol
@@ -12,10 +12,12 @@ from typing import Protocol
 from islands.benchmarks.definition import LATENT, LINEAR, NARX
 from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_all_inputs
 from islands.errors import SettingsError
 from islands.estimation.latent_models import search_linear_models
 from islands.facade.coupled.identification import fit_coupled
 from islands.facade.fit import fit_record
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
@@ -57,6 +59,8 @@ def count_terms(model: AnyModel) -> int:
     match model:
         case Model():
             return model.size
+        case CoupledLatentModel():
+            return sum(map(count_terms, model.models))
         case CoupledModel():
             return sum(each.size for each in model.models)
         case LatentModel():
@@ -64,18 +68,9 @@ def count_terms(model: AnyModel) -> int:
     raise SettingsError(f"a {type(model).__name__} has no terms")
 
 
-def _one_output(find: Callable[[Dataset, int, ProgressCallback, Stop], AnyModel]) -> FindModel:
-    """Return a search that states that it has no model of several outputs."""
-
-    def find_model(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
-        if isinstance(record, CoupledRecord):
-            raise SettingsError("no model of several outputs")
-        return find(record, seed, progress, stop)
-
-    return find_model
-
-
-def _find_latent(record: Dataset, seed: int, progress: ProgressCallback, stop: Stop) -> AnyModel:
+def _find_latent(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
+    if isinstance(record, CoupledRecord):
+        return fit_coupled(record, model=LATENT, seed=seed, progress=progress, stop=stop).model
     return fit_record(record, model=LATENT, seed=seed, refit="all", progress=progress, stop=stop).best.model
 
 
@@ -85,7 +80,14 @@ def _find_narx(record: AnyRecord, seed: int, progress: ProgressCallback, stop: S
     return fit_record(record, seed=seed, refit="all", progress=progress, stop=stop).best.model
 
 
-def _find_linear(record: Dataset, _seed: int, progress: ProgressCallback, stop: Stop) -> AnyModel:
+def _find_linear(record: AnyRecord, _seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
+    if isinstance(record, CoupledRecord):
+        found = [_find_linear_model(advance_all_inputs(each), progress, stop) for each in record.records]
+        return CoupledLatentModel(tuple(found))
+    return _find_linear_model(record, progress, stop)
+
+
+def _find_linear_model(record: Dataset, progress: ProgressCallback, stop: Stop) -> LatentModel:
     found = search_linear_models(record, Steps(progress, stop))
     if not found:
         raise SettingsError("no linear model: the record is too short, or input columns depend on each other")
@@ -96,8 +98,8 @@ def _find_linear(record: Dataset, _seed: int, progress: ProgressCallback, stop: 
 #: Searches by name, in the order of the rows.
 MODEL_SEARCHES: Mapping[str, ModelSearch] = MappingProxyType(
     {
-        LATENT: ModelSearch(_one_output(_find_latent), is_random=True),
+        LATENT: ModelSearch(_find_latent, is_random=True),
         NARX: ModelSearch(_find_narx),
-        LINEAR: ModelSearch(_one_output(_find_linear)),
+        LINEAR: ModelSearch(_find_linear),
     }
 )

@@ -9,6 +9,7 @@ from islands.benchmarks.definition import BenchmarkTest
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.facade.results.model_simulation import predict
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.simulation.initial_outputs import simulate_freely
@@ -33,7 +34,9 @@ def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
         The test does not match the model.
     """
     if isinstance(model, LatentModel):
-        model = replace(model, memory=min(model.memory, test.known))
+        model = _limit_memory(model, test)
+    elif isinstance(model, CoupledLatentModel):
+        model = CoupledLatentModel(tuple(_limit_memory(each, test) for each in model.models))
     average = model.average
     warm_up = test.known // average
     if warm_up < model.maximum_lag:
@@ -49,6 +52,11 @@ def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
     if not np.isfinite(errors).all():
         raise ModelError("the free run diverges")
     return float(np.sqrt(np.mean(errors**2)))
+
+
+def _limit_memory(model: LatentModel, test: BenchmarkTest) -> LatentModel:
+    """Return a model that estimates its initial states from the samples that a test allows."""
+    return replace(model, memory=min(model.memory, test.known))
 
 
 def _simulate(model: AnyModel, test: BenchmarkTest, warm_up: int) -> NDArray[np.float64]:

@@ -277,8 +277,6 @@ def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Setting
         As for `resolve_settings`, or a setting is for one output.
     """
     name = COUPLED_PRESET if preset == AUTO else preset
-    if lookup({AUTO: _PAPER, **PRESETS}, name, "preset").model_class == LATENT:
-        raise SettingsError(f"the preset {name} is for one output: name one output, or take another preset")
     settings = resolve_settings(name, {"feedthrough": "no", **changes})
     check_coupled_settings(settings.constraints, settings.feedthrough, settings.refit)
     if settings.select != "validation":

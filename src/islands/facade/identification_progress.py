@@ -51,11 +51,14 @@ def fit_phases(library: str, outputs: Sequence[str]) -> tuple[Phase, ...]:
     return _repeat(phases, outputs) if several else phases
 
 
-def class_phases(model: str, samples: int) -> tuple[Phase, ...]:
-    """Return the phases of the fit of a class of models; latent models are evolved."""
+def class_phases(model: str, samples: int, outputs: Sequence[str] = ()) -> tuple[Phase, ...]:
+    """Return the phases of the fit of a class of models to one output, or to each of several ones.
+
+    Latent models are evolved.
+    """
     if model == LATENT:
-        return identification_phases(LATENT, samples, resolve_settings(LATENT, {}))
-    return _CLASS
+        return identification_phases(LATENT, samples, resolve_settings(LATENT, {}), outputs)
+    return _repeat_searches(_CLASS, outputs) if outputs else _CLASS
 
 
 def identification_phases(
@@ -79,13 +82,14 @@ def identification_phases(
     """
     evaluations = settings.population * settings.islands * (settings.generations + 1)
     if settings.model_class == LATENT:
-        return (
+        searched = (
             Phase("linear state space of order", 0.5 + 5e-5 * samples, 5),
             Phase(SEARCH, estimate_state_space_seconds(samples) * evaluations),
             Phase("final estimation of state spaces", 0.1 + _BANDS * samples),
             Phase("assessment of the models", 0.3),
             Phase("prediction bands", 0.1 + 1e-5 * samples),
         )
+        return _repeat_searches(searched, outputs) if outputs else searched
     phases = (
         *(_CHOICE if preset == AUTO and not outputs else ()),
         Phase("forward selection among", 0.1),
@@ -103,10 +107,14 @@ def estimate_state_space_seconds(samples: int) -> float:
     return _STATE_SPACE + min(samples, _ESTIMATED_SAMPLES) * _ESTIMATED + samples * _HELD_OUT
 
 
+def _repeat_searches(phases: Sequence[Phase], outputs: Sequence[str]) -> tuple[Phase, ...]:
+    return tuple(replace(each, beginning=f"{name}: {each.beginning}") for name in outputs for each in phases)
+
+
 def _repeat(phases: Sequence[Phase], outputs: Sequence[str]) -> tuple[Phase, ...]:
     """Return the phases of several outputs, and those of the common model."""
     return (
-        *(replace(each, beginning=f"{name}: {each.beginning}") for name in outputs for each in phases),
+        *_repeat_searches(phases, outputs),
         Phase("choice of the equations", 0.1),
         Phase("refinement of all equations", 0.1),
         *(each for each in phases if each.beginning == "prediction bands"),

@@ -13,8 +13,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Primitive
-from islands.io.models import model_from_json, model_json
-from islands.io.narx_documents import read_coupled
+from islands.io.models import model_from_json, model_json, read_coupled
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.models.regressor import Regressor, regressor

@@ -10,20 +10,17 @@ from typing import Any
 from islands.errors import ModelError, lookup
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.io.narx_documents import (
-    COUPLED_SCHEMA,
-    SCHEMA,
-    coupled_json,
-    narx_json,
-    read_coupled,
-    read_narx,
-)
+from islands.io.narx_documents import SCHEMA, narx_json, read_narx
 from islands.io.result_models import read_preprocessing
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel, no_model_error
+
+#: Schema of models of several outputs.
+COUPLED_SCHEMA = "islands.coupled-model/1"
 
 #: Tag of NARX models.
 NARX = Model.kind
@@ -47,7 +44,9 @@ def model_json(model: AnyModel) -> str:
         case Model():
             return narx_json(model)
         case CoupledModel():
-            return coupled_json(model)
+            models = [json.loads(model_json(single)) for single in model.models]
+            coupled = {"schema": COUPLED_SCHEMA, **model.document(), "models": models}
+            return json.dumps(coupled, indent=2) + "\n"
     document = {"schema": SCHEMA, "kind": model.kind, **model.document()}
     try:
         return json.dumps(document, indent=2, allow_nan=False) + "\n"
@@ -151,6 +150,21 @@ def any_model_from_json(
     if isinstance(document, dict) and document.get("schema") == COUPLED_SCHEMA:
         return read_coupled(document, name, primitives)
     return model_from_json(text, name, primitives)
+
+
+def read_coupled(
+    document: Mapping[str, Any], name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> CoupledModel:
+    """Read the JSON values of a model of several outputs; see `model_from_json`."""
+    entries = document.get("models")
+    if not isinstance(entries, list):
+        raise ModelError(f"{name}: models: there is no list of models")
+    models = tuple(
+        model_from_json(json.dumps(entry), f"{name}: models.{place}", primitives)
+        for place, entry in enumerate(entries)
+    )
+    latent = tuple(model for model in models if isinstance(model, LatentModel))
+    return CoupledLatentModel(latent) if latent and len(latent) == len(models) else CoupledModel(models)
 
 
 def narx_from_json(text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:

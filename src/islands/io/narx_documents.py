@@ -1,9 +1,8 @@
-"""Documents of NARX models of one and of several outputs: JSON with a schema version and exact floats."""
+"""Documents of NARX models: JSON with a schema version and exact floats."""
 
-import json
 from collections.abc import Mapping
 from math import isfinite
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
@@ -13,13 +12,10 @@ from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import Regressor, regressor
 
 SCHEMA: Literal["islands.model/1"] = "islands.model/1"
-
-COUPLED_SCHEMA = "islands.coupled-model/1"
 
 
 class TermDocument(BaseModel):
@@ -139,31 +135,3 @@ def _all_or_none(values: list[float | None], field: str) -> tuple[float, ...] | 
     if given and len(given) < len(values):
         raise ModelError(f"{field} is given for some terms only: give it for all or for none")
     return given or None
-
-
-def coupled_json(model: CoupledModel) -> str:
-    """Return a model of several outputs as JSON text.
-
-    Raises
-    ------
-    ModelError
-        A number of the model is not finite.
-    """
-    models = [json.loads(narx_json(single)) for single in model.models]
-    document = {"schema": COUPLED_SCHEMA, **model.document(), "models": models}
-    return json.dumps(document, indent=2) + "\n"
-
-
-def read_coupled(
-    document: Mapping[str, Any], name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
-) -> CoupledModel:
-    """Read the JSON values of a model of several outputs; see `read_narx`."""
-    entries = document.get("models")
-    if not isinstance(entries, list):
-        raise ModelError(f"{name}: models: there is no list of models")
-    return CoupledModel(
-        tuple(
-            read_narx(json.dumps(entry), f"{name}: models.{place}", primitives)
-            for place, entry in enumerate(entries)
-        )
-    )

@@ -1,4 +1,7 @@
-"""Coupled model: one equation per output, each of which may read the past of all outputs."""
+"""Coupled model: one equation per output, each of which may read the past of all outputs.
+
+Models of several outputs of other classes are derived from it.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -6,6 +9,8 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Any, ClassVar, TypeAlias
 
+from islands.data.coupled_record import CoupledRecord
+from islands.data.dataset import Dataset
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged
@@ -20,7 +25,7 @@ from islands.models.equations import (
     named_term,
     signal_names,
 )
-from islands.models.narx import Model, measured_model
+from islands.models.narx import Model, measured_model, require_narx
 from islands.models.protocol import DynamicModel, EquationText
 from islands.models.signal_statement import describe_values, join_statements, symbols
 
@@ -43,7 +48,7 @@ class CoupledModel:
 
     kind: ClassVar[str] = "coupled-narx"
 
-    models: tuple[Model, ...]
+    models: tuple[DynamicModel, ...]
 
     def __post_init__(self) -> None:
         names = self.output_names
@@ -51,14 +56,14 @@ class CoupledModel:
             raise ModelError("a coupled model has at least two equations, for a single output use a Model")
         if len(set(names)) < len(names):
             raise ModelError(f"two equations have the same output: {', '.join(names)}")
+        self._check_classes()
         first = self.models[0]
-        inputs = len(first.input_names) - (len(names) - 1)
         for place, model in enumerate(self.models):
-            expected = (*self.input_names, *(name for name in names if name != names[place]))
-            if inputs < 1 or model.input_names != expected:
+            expected = self._list_columns(place)
+            if not self.input_names or model.input_names != expected:
                 raise ModelError(
                     f"the equation of {model.output_name} has the inputs {', '.join(model.input_names)}; "
-                    f"expected are inputs and then the other outputs, {', '.join(expected)}"
+                    f"expected are {self._expected}, {', '.join(expected)}"
                 )
             if (model.dt, model.average) != (first.dt, first.average):
                 raise ModelError(
@@ -73,6 +78,23 @@ class CoupledModel:
                     "estimate both from one record"
                 )
 
+    #: What the inputs of an equation are, in an error.
+    _expected: ClassVar[str] = "inputs and then the other outputs"
+
+    def _check_classes(self) -> None:
+        """Check that all equations are NARX models."""
+        for model in self.models:
+            require_narx(model)
+
+    def _list_columns(self, place: int) -> tuple[str, ...]:
+        """Return the columns that one equation has as its inputs."""
+        others = (name for name in self.output_names if name != self.output_names[place])
+        return (*self.input_names, *others)
+
+    def separate(self, record: CoupledRecord, place: int) -> Dataset:
+        """Return the record that one equation reads; see `CoupledRecord.separate`."""
+        return record.separate(place)
+
     @property
     def output_names(self) -> tuple[str, ...]:
         """Names of the outputs."""
@@ -82,7 +104,7 @@ class CoupledModel:
     def input_names(self) -> tuple[str, ...]:
         """Names of the inputs, without the outputs."""
         first = self.models[0]
-        return first.input_names[: len(first.input_names) - len(self.models) + 1]
+        return first.input_names[: max(0, len(first.input_names) - len(self.models) + 1)]
 
     @property
     def dt(self) -> float | None:
@@ -125,7 +147,7 @@ class CoupledModel:
     @property
     def leads(self) -> tuple[int, ...]:
         """Number of samples that every channel is read early: outputs, then inputs."""
-        return (0,) * len(self.models) + self.models[0].leads[1 : 1 + len(self.input_names)]
+        return (0,) * len(self.models) + narx_equations(self)[0].leads[1 : 1 + len(self.input_names)]
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -169,7 +191,7 @@ class CoupledModel:
         """Return the difference equations; the weights of their terms are the parameters."""
         equations, texts = [], []
         parameters: dict[str, float] = {}
-        for place, model in enumerate(self.models):
+        for place, model in enumerate(narx_equations(self)):
             names = [f"{place}: {item.text}" for item in model.regressors]
             equations.append(tuple(map(BlockTerm, self.expressions(place), names)))
             parameters.update(zip(names, model.theta or (nan,) * model.size, strict=True))
@@ -189,7 +211,7 @@ class CoupledModel:
 
     def _equation(self, place: int) -> str:
         """Return the text of one equation with the signals of the block."""
-        return _name_signals(equation(self.models[place]), equation_signals(self, place))
+        return _name_signals(equation(narx_equations(self)[place]), equation_signals(self, place))
 
     def equation(self) -> EquationText:
         """Return the equations as text, one line for each output."""
@@ -199,7 +221,7 @@ class CoupledModel:
             named=coupled_equation(self),
             terms=tuple(
                 f"{signal_names(model)[0]}: {named_term(model, place)}"
-                for model in self.models
+                for model in narx_equations(self)
                 for place in range(model.size)
             ),
             latex=coupled_latex(self),
@@ -208,13 +230,14 @@ class CoupledModel:
 
     def document(self) -> dict[str, Any]:
         """Return the model as JSON values."""
+        written = self.equation()
         return {
             "inputs": list(self.input_names),
             "outputs": list(self.output_names),
             "dt": self.dt,
             "average": self.average,
-            "equation": coupled_equation(self),
-            "latex": coupled_latex(self),
+            "equation": written.named,
+            "latex": written.latex,
             "models": [model.document() for model in self.models],
         }
 
@@ -230,7 +253,18 @@ class CoupledModel:
     def expressions(self, place: int) -> list[Expression]:
         """Return the terms of one equation, without parameters, in the channels of the coupled model."""
         channels = self.channels(place)
-        return [_read_channels(item.expression, channels) for item in self.models[place].regressors]
+        return [_read_channels(item.expression, channels) for item in narx_equations(self)[place].regressors]
+
+
+def narx_equations(model: CoupledModel) -> tuple[Model, ...]:
+    """Return the equations of a coupled model as NARX models.
+
+    Raises
+    ------
+    ModelError
+        They are of another class.
+    """
+    return tuple(map(require_narx, model.models))
 
 
 #: Model of one or several outputs.
@@ -238,8 +272,8 @@ AnyModel: TypeAlias = DynamicModel | CoupledModel
 
 
 def measured_coupled_model(model: CoupledModel) -> CoupledModel:
-    """Return a model of several outputs with its offsets inside its expressions; see `measured_model`."""
-    return CoupledModel(tuple(map(measured_model, model.models)))
+    """Return a model of NARX equations with its offsets inside its expressions; see `measured_model`."""
+    return CoupledModel(tuple(map(measured_model, narx_equations(model))))
 
 
 def _read_channels(expression: Expression, channels: Sequence[int]) -> Expression:
@@ -280,17 +314,17 @@ def _name_signals(text: str, names: Mapping[str, str]) -> str:
 
 def coupled_equation(model: CoupledModel) -> str:
     """Write one line per output, with the column names of the record."""
-    return "\n".join(named_equation(single) for single in model.models)
+    return "\n".join(map(named_equation, narx_equations(model)))
 
 
 def coupled_signals(model: CoupledModel) -> str:
     """State which signals the equations read, with the column names of the record."""
     outputs = (signal_names(single)[0] for single in model.models)
     inputs = signal_names(model.models[0])[1 : 1 + len(model.input_names)]
-    return _describe_signals(model, (*outputs, *inputs))
+    return describe_coupled_signals(model, (*outputs, *inputs))
 
 
-def _describe_signals(model: CoupledModel, names: Sequence[str]) -> str:
+def describe_coupled_signals(model: CoupledModel, names: Sequence[str]) -> str:
     """State which signals the equations read; see `describe_signals`.
 
     Parameters
@@ -322,7 +356,7 @@ def coupled_latex(model: CoupledModel) -> str:
             model,
             place,
         )
-        for place, single in enumerate(model.models)
+        for place, single in enumerate(narx_equations(model))
     ]
     rows = [row.replace(" = ", " &= ", 1) for row in rows]
     if statement := _describe_symbols(model):
@@ -346,14 +380,14 @@ def coupled_mathml(model: CoupledModel) -> str:
             model,
             place,
         )
-        for place, single in enumerate(model.models)
+        for place, single in enumerate(narx_equations(model))
     ]
     stated = mathml_statement(_describe_symbols(model))
     return "\n".join([*equations, *(f'<math display="block">{row}</math>' for row in stated)])
 
 
 def _describe_symbols(model: CoupledModel) -> str:
-    return _describe_signals(model, (*output_signals(model), *input_signals(model)))
+    return describe_coupled_signals(model, (*output_signals(model), *input_signals(model)))
 
 
 def _name_leaves(pattern: str, leaf: str, index: str, text: str, model: CoupledModel, place: int) -> str:

@@ -203,6 +203,11 @@ class LatentModel(ParametricModel):
         return tuple(f"x{place}" for place in range(1, self.order + 1))
 
     @property
+    def unit_signals(self) -> tuple[str, ...]:
+        """Names of the values of the units in displayed equations."""
+        return tuple(f"h{unit}" for unit in self._places)
+
+    @property
     def starts(self) -> tuple[str, ...]:
         """The states rest at the operating point before the first prediction, unless they are estimated."""
         return tuple(repr(float(value)) for value in self.rest)
@@ -318,7 +323,7 @@ class LatentModel(ParametricModel):
         def write(name: str, factor: str) -> str:
             return f"{values[name]}*{factor}" if factor else values[name]
 
-        names = tuple(f"h{unit}" for unit in self._places)
+        names = self.unit_signals
         units = {0: [f"{name}(k)" for name in names], 1: [f"{name}(k-1)" for name in names]}
         sides = self._write_sides(units, write)
         for name, unit in zip(names, self._places, strict=True):
@@ -335,7 +340,7 @@ class LatentModel(ParametricModel):
         now = [(f"c{place}", f"{name}(k)") for place, name in enumerate(self.states, start=1)]
         now += self._read_inputs("d", "d", 0)
         now += [(f"f{unit}", text) for unit, text in zip(self._places, units[0], strict=True)]
-        sides = {"y": self._sum([*now, ("level", "")], write)}
+        sides = {self.signals[0]: self._sum([*now, ("level", "")], write)}
         for row, state in enumerate(self.states, start=1):
             past = [(f"a{row}_{place}", f"{name}(k-1)") for place, name in enumerate(self.states, start=1)]
             past += self._read_inputs(f"b{row}", f"b{row}_", 1)

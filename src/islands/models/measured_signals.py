@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from islands.errors import ModelError
 from islands.models.block import Block, subtract_offsets
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
 from islands.models.narx import Model, measured_model
 from islands.models.protocol import DynamicModel
@@ -23,6 +24,8 @@ def measured_block(model: DynamicModel | CoupledModel) -> Block:
     match model:
         case Model():
             return measured_model(model).block()
+        case CoupledLatentModel():
+            return model.measured_block()
         case CoupledModel():
             return measured_coupled_model(model).block()
     block = model.block()

@@ -93,7 +93,7 @@ class ParametricModel(ABC):
 
     @abstractmethod
     def right_sides(self) -> Mapping[str, str]:
-        """Return the right side of the equation of the output ``y`` and of each state.
+        """Return the right side of the equation of the output, ``y`` or ``signals[0]``, and of each state.
 
         It reads past samples of signals, ``u(k-1)`` or ``u2(k-1)``, and parameters by name. That of the
         output may also read sample k of the states.
@@ -160,7 +160,7 @@ class ParametricModel(ABC):
     def block(self) -> Block:
         """Return the difference equations of the model."""
         sides = self.right_sides()
-        texts = [self._parse(sides[name]) for name in ("y", *self.states)]
+        texts = [self._parse(sides[name]) for name in self.signals[: 1 + len(self.states)]]
         return Block(
             equations=tuple((BlockTerm(each),) for each in texts),
             columns=(self.output_name, *self.states, *self.column_names),

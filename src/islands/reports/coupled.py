@@ -6,6 +6,7 @@ from typing import Any
 from markupsafe import Markup
 
 from islands.io.result_text.headlines import write_coupled_headline
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.reports.origin import Origin
 from islands.reports.record_table import list_record, list_settings
@@ -37,7 +38,7 @@ def coupled_report(
         SVG of the free run by the name of the output; those that were not drawn are absent.
     """
     estimation, validation = document["estimation"], document["validation"]
-    term_columns, rows = list_terms(terms)
+    term_columns, rows = list_terms(terms, isinstance(model, CoupledLatentModel))
     text = TEMPLATES.get_template("coupled.html").render(
         origin=origin,
         sha256=estimation["sha256"],

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord
+from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.expressions.evaluation import value
@@ -14,6 +14,7 @@ from islands.expressions.tree import Apply, Expression, Lagged, Symbol, remove_s
 from islands.kernels.interpreter import Program
 from islands.kernels.simulate_block import LANES, MANY_LANES, simulate_block
 from islands.models.block import Block
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
 from islands.program.term_pool import link
@@ -170,7 +171,7 @@ class BlockSimulator:
 def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, warm_up: int) -> BlockSimulator:
     """Return the simulator of the block of a model on the intervals of a record.
 
-    The initial states of a `LatentModel` are those that its parameters estimate from the warm-up.
+    The initial states of latent models are those that their parameters estimate from the warm-up.
 
     Parameters
     ----------
@@ -187,6 +188,12 @@ def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, war
     if isinstance(model, LatentModel):
         assert isinstance(record, Dataset), "the record matches the model"
         made.states = estimate_initial_states(model, record, made.start, warm_up)
+    elif isinstance(model, CoupledLatentModel):
+        assert isinstance(record, CoupledRecord), "the record matches the model"
+        pairs = zip(model.models, record.records, strict=True)
+        made.states = np.hstack(
+            [estimate_initial_states(single, each, made.start, warm_up) for single, each in pairs]
+        )
     return made
 
 

@@ -133,7 +133,9 @@ def fit(
 
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
-        phases = fit_phases(library, outputs) if model == NARX else class_phases(model, data.samples)
+        several = outputs if len(outputs) > 1 else ()
+        is_narx = model == NARX
+        phases = fit_phases(library, outputs) if is_narx else class_phases(model, data.samples, several)
         given: dict[str, Any] = {
             "model": model,
             "structure": structure,
@@ -155,11 +157,10 @@ def fit(
         }
         result: islands.Result | islands.CoupledResult
         if len(outputs) > 1:
-            if (given.pop("model"), given.pop("structure")) != (NARX, AUTO):
-                raise SettingsError("--model and --structure are for one output: leave them out")
             if dead_time:
                 raise SettingsError("--dead-time is for one output: leave it out")
-            given["library"] = SEVERAL_OUTPUTS if library == AUTO else library
+            if model == NARX and library == AUTO:
+                given["library"] = SEVERAL_OUTPUTS
             record, held = couple_data(data, [held_out], len(outputs), steps, names)
             fit_all = partial(fit_coupled_data, split_coupled(record, held), **coupled_options(given))
             result = search_outputs(fit_all, out, stop, drawn)

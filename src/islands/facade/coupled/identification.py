@@ -1,4 +1,7 @@
-"""`fit_coupled` and `identify_coupled`: one equation per output, chosen and refined for a common free run."""
+"""`fit_coupled` and `identify_coupled`: one equation per output, chosen and refined for a common free run.
+
+Latent models of several outputs read the inputs only, so that each is searched on its own.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -10,7 +13,7 @@ from islands.data.averaging import AUTO, average_samples
 from islands.data.coupled_record import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
 from islands.data.dataset import Dataset
 from islands.data.split import Split, warn_of_extrapolation
-from islands.errors import SettingsError
+from islands.errors import SettingsError, lookup
 from islands.estimation.refinement import refine
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO as AUTO_PRESET
@@ -21,8 +24,9 @@ from islands.evolution.presets import (
     with_tuples,
 )
 from islands.evolution.search_state import SearchState, keep_hall, stop_reason
-from islands.evolution.settings import Settings
+from islands.evolution.settings import LATENT, NARX, Settings
 from islands.facade.coupled.bands import make_bands
+from islands.facade.coupled.latent import join_latent_results
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
@@ -77,6 +81,8 @@ class StoppedCouplingError(StoppedError):
 class FitOptions(FitChanges, total=False):
     """Options of `fit` for every output; `fit` describes each of them."""
 
+    model: str
+    structure: str
     library: str
     degree: int | None
     lags: int | None
@@ -104,6 +110,8 @@ def fit_coupled(
     of the common free run on the validation data. Then all parameters are refined on the common free run of
     the estimation data; the refined parameters are kept if the error on the validation data is smaller.
 
+    With ``model="latent"``, every output has a latent model of the inputs alone; see `join_latent_results`.
+
     Parameters
     ----------
     record : CoupledRecord or data frame
@@ -115,7 +123,8 @@ def fit_coupled(
     validation : CoupledRecord, data frame or float
         Data that choose the equations: a separate record, or the fraction at the end of ``record``.
     refine_together : bool
-        Whether all parameters are refined together.
+        Whether all parameters are refined together. Those of latent models never are: the outputs do not
+        depend on each other.
     seed : int
         Seed of the results.
     progress : callable, optional
@@ -126,8 +135,9 @@ def fit_coupled(
     reading : mapping
         Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     **options
-        Options of `fit`. The default library is ``polynomial``; ``constraints`` are an entry of
-        ``CONSTRAINTS`` and hold for every equation; ``feedthrough`` is ``no``.
+        Options of `fit`; ``model`` is ``narx`` or ``latent``. The default library is ``polynomial``;
+        ``constraints`` are an entry of ``CONSTRAINTS`` and hold for every equation. ``feedthrough`` is
+        ``no``; that of latent models is found by their search.
 
     Returns
     -------
@@ -177,12 +187,17 @@ def fit_coupled_data(
     SettingsError, StoppedError, RecordError
         As `fit_coupled`.
     """
+    find, steps = partial(fit_record, seed=seed, stop=stop), Steps(progress, stop)
+    kind = options.get("model", NARX)
+    lookup(dict.fromkeys((NARX, LATENT)), kind, "class of models")
+    if kind == LATENT:
+        check_coupled_settings(None, "no", options.get("refit", "none"))
+        return _couple_latent(data, dict(options), steps, find)
     chosen: dict[str, Any] = {"library": "polynomial", "feedthrough": "no", **options}
     check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"], chosen.get("refit", "none"))
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
-    find = partial(fit_record, seed=seed, stop=stop)
-    return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, Steps(progress, stop), find)
+    return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, steps, find)
 
 
 def identify_coupled(
@@ -290,14 +305,13 @@ def identify_coupled_data(
     chosen: dict[str, Any] = {"feedthrough": "no", **with_tuples(changes)}
     settings = resolve_coupled_settings(preset, chosen)
     preset = COUPLED_PRESET if preset == AUTO_PRESET else preset
+    search = partial(identify_record, preset=preset, seed=seed, stop=stop, engine=engine)
+    find, steps = _Searches(search, start, on_epoch), Steps(progress, stop)
+    if settings.model_class == LATENT:
+        return _couple_latent(data, chosen, steps, find)
     chosen.setdefault("average", settings.average)
-    find = _Searches(
-        partial(identify_record, preset=preset, seed=seed, stop=stop, engine=engine), start, on_epoch
-    )
     trial = make_trial_library(settings)
-    return _couple(
-        data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, Steps(progress, stop), find
-    )
+    return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, steps, find)
 
 
 class _Searches:
@@ -362,6 +376,33 @@ def _read_data(
     return split_coupled(as_coupled(record), held_out)
 
 
+def _search_outputs(
+    names: Sequence[str],
+    splits: Sequence[Split],
+    options: dict[str, Any],
+    steps: Steps,
+    find: Callable[..., Result],
+) -> list[Result]:
+    """Search every output; a stop before the models of an output is a `StoppedCouplingError`."""
+    results: list[Result] = []
+    for name, split in zip(names, splits, strict=True):
+        show = partial(_report, steps.report, name)
+        try:
+            results.append(find(split.estimation, split.validation, progress=show, **options))
+        except StoppedError as stopped:
+            raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
+    return results
+
+
+def _couple_latent(
+    data: CoupledSplit, options: dict[str, Any], steps: Steps, find: Callable[..., Result]
+) -> CoupledResult:
+    """Search a latent model of every output, and join them."""
+    splits = [Split(*pair) for pair in zip(data.estimation.records, data.validation.records, strict=True)]
+    results = _search_outputs(data.estimation.output_names, splits, options, steps, find)
+    return join_latent_results(data, results, steps)
+
+
 def _couple(
     data: CoupledSplit,
     options: dict[str, Any],
@@ -381,13 +422,7 @@ def _couple(
     # The equations have one sampling time: the shortest that one of them needs.
     average = options.get("average", AUTO)
     options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
-    results = []
-    for name, split in zip(names, splits, strict=True):
-        show = partial(_report, steps.report, name)
-        try:
-            results.append(find(split.estimation, split.validation, progress=show, **options))
-        except StoppedError as stopped:
-            raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
+    results = _search_outputs(names, splits, options, steps, find)
     steps.report("choice of the equations", 0.0)
     means = partial(average_samples, count=options["average"])
     data = CoupledSplit(data.estimation.map(means), data.validation.map(means))

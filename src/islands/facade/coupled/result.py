@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.coupled_record import CoupledRecord, CoupledSplit, match_coupled
 from islands.data.signal_map import match_rate
@@ -34,10 +35,12 @@ from islands.io.result_folder import (
 )
 from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.result_text.text_layout import term_table, wrap
-from islands.models.coupled_narx import CoupledModel, coupled_equation, coupled_signals
+from islands.models.coupled_latent import CoupledLatentModel
+from islands.models.coupled_narx import CoupledModel, coupled_signals
 from islands.progress import Steps
 from islands.reports.origin import REPORT_FILE
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
+from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
@@ -73,7 +76,7 @@ class FittedCoupledModel:
     @property
     def equation(self) -> str:
         """Equations with the column names of the record, one line per output."""
-        return coupled_equation(self.model)
+        return self.model.equation().named
 
     def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> Simulation:
         """Simulate all outputs of a record from its first samples.
@@ -119,11 +122,27 @@ class FittedCoupledModel:
         first = self.warm_up if warm_up is None else warm_up
         data = match_coupled(self.model, record.map(lambda each: match_rate(self.model, each)))
         run = free_run(self.model, data, first).y
-        runs = self.prediction_bands[0].ensemble.simulate(data, first)
+        runs = self._simulate_ensembles(data, first)
         return tuple(
-            each.band(run[:, place], runs[..., place], level)
-            for place, each in enumerate(self.prediction_bands)
+            each.band(run[:, place], runs[place], level) for place, each in enumerate(self.prediction_bands)
         )
+
+    @property
+    def _shared_ensemble(self) -> Ensemble | None:
+        """The ensemble of all outputs; None without bands, or if every output has its own."""
+        found = [each.ensemble for each in self.prediction_bands]
+        return found[0] if found and all(each is found[0] for each in found) else None
+
+    def _simulate_ensembles(self, data: CoupledRecord, warm_up: int) -> list[NDArray[np.float64]]:
+        """Return the free runs of the ensemble of every output, each of shape (members, samples)."""
+        shared = self._shared_ensemble
+        if shared is not None:
+            runs = shared.simulate(data, warm_up)
+            return [runs[..., place] for place in range(len(data.records))]
+        return [
+            each.ensemble.simulate(self.model.separate(data, place), warm_up)
+            for place, each in enumerate(self.prediction_bands)
+        ]
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
         """Return the coupled model as text in a format of ``EXPORTS``, or write it to a file."""
@@ -159,8 +178,15 @@ def read_fitted_model(
     """
     try:
         # Results of earlier versions have no ensemble and no warm-up.
-        ensemble = ensemble_from_document(document.get("ensemble"), model, primitives)
-        bands = [bands_from_document(each.get("bands"), ensemble) for each in document["outputs"]]
+        shared = ensemble_from_document(document.get("ensemble"), model, primitives)
+        own = [
+            ensemble_from_document(each.get("ensemble"), single, primitives)
+            for each, single in zip(document["outputs"], model.models, strict=True)
+        ]
+        bands = [
+            bands_from_document(each.get("bands"), ensemble or shared)
+            for each, ensemble in zip(document["outputs"], own, strict=True)
+        ]
         warm_up = int(document.get("warm_up") or model.maximum_lag)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"{name} is damaged: {error!r} is missing or wrong") from error
@@ -182,7 +208,8 @@ class CoupledResult(FittedCoupledModel):
     ranks : tuple of int
         Rank of the chosen model in each of these results.
     refined : bool
-        Whether the parameters were refined on the common simulation. If not, they are those of the results.
+        Whether the parameters were refined on the common simulation. If not, they are those of the results,
+        as with latent models.
     split : CoupledSplit
         Estimation data and validation data with the sampling time of the model.
     left_out : tuple of str
@@ -216,7 +243,7 @@ class CoupledResult(FittedCoupledModel):
                 zip(self.model.output_names, self.model.models, strict=True)
             ):
                 y = record.records[place].y
-                one = one_step_ahead(single, record.separate(place), self.warm_up)
+                one = one_step_ahead(single, self.model.separate(record, place), self.warm_up)
                 runs = {"one_step_ahead": one.y, "free_run": free.y[:, place]}
                 outcomes = {"one_step_ahead": one.outcome, "free_run": free.outcome}
                 found[name][part] = {
@@ -267,7 +294,6 @@ class CoupledResult(FittedCoupledModel):
 
     def document(self) -> dict[str, Any]:
         """Return the content of ``result.json`` as JSON values."""
-        ensemble = self.prediction_bands[0].ensemble if self.prediction_bands else None
         metrics = self.metrics
         document = {
             "schema": COUPLED_RESULT_SCHEMA,
@@ -287,7 +313,7 @@ class CoupledResult(FittedCoupledModel):
                     "unit": self.split.validation.records[place].output_unit,
                     "folder": f"outputs/{list_folders(self.model.output_names)[place]}",
                     "rank": self.ranks[place],
-                    "bands": bands_document(self.prediction_bands[place] if self.prediction_bands else None),
+                    **self._bands_document(place),
                     "data": {
                         "noise": measure_output_noise(self.split.estimation.records[place]),
                         "output_range": self.split.validation.records[place].output_range,
@@ -305,11 +331,19 @@ class CoupledResult(FittedCoupledModel):
                 "validation": measure_input_ranges(self.split.validation.records[0]),
             },
             "models": [self._model_document(metrics)],
-            "ensemble": ensemble_document(ensemble),
+            "ensemble": ensemble_document(self._shared_ensemble),
             "estimation": record_document(self.split.estimation.records[0]) | {"names": self._names()},
             "validation": record_document(self.split.validation.records[0]) | {"names": self._names()},
         }
         described: dict[str, Any] = finite(document)
+        return described
+
+    def _bands_document(self, place: int) -> dict[str, Any]:
+        """Return the bands of an output as JSON values, with its ensemble if it has its own."""
+        bands = self.prediction_bands[place] if self.prediction_bands else None
+        described: dict[str, Any] = {"bands": bands_document(bands)}
+        if bands is not None and self._shared_ensemble is None:
+            described["ensemble"] = ensemble_document(bands.ensemble)
         return described
 
     def _measure_residual(self, place: int) -> ResidualStructure:
@@ -318,7 +352,7 @@ class CoupledResult(FittedCoupledModel):
         first, last = max(data.bounds, key=lambda bounds: bounds[1] - bounds[0])
         recording = data.map(lambda each: each[first:last])
         record, warm_up = recording.records[place], self.warm_up
-        one = one_step_ahead(self.model.models[place], recording.separate(place), warm_up)
+        one = one_step_ahead(self.model.models[place], self.model.separate(recording, place), warm_up)
         free = self.simulate(recording)
         one_step, simulated = (
             (record.y - y)[warm_up:] if outcome else None
@@ -329,7 +363,6 @@ class CoupledResult(FittedCoupledModel):
         )
 
     def _model_document(self, metrics: _Metrics) -> dict[str, Any]:
-        ensemble = self.prediction_bands[0].ensemble if self.prediction_bands else None
         written = self.model.equation()
         return {
             "kind": self.model.kind,
@@ -339,7 +372,7 @@ class CoupledResult(FittedCoupledModel):
             "equation": self.equation,
             "latex": written.latex,
             "signals": coupled_signals(self.model),
-            "terms": terms_in_result(self.model, ensemble),
+            "terms": terms_in_result(self.model, self._shared_ensemble),
             "metrics": {
                 part: {
                     mode: _average([parts[part][mode] for parts in metrics.values()])
@@ -357,10 +390,16 @@ class CoupledResult(FittedCoupledModel):
     def _names(self) -> dict[str, list[str]]:
         return {"inputs": list(self.model.input_names), "outputs": list(self.model.output_names)}
 
-    def __str__(self) -> str:
+    def _describe_parameters(self) -> str:
+        """Return the size of the model, and the estimate of its parameters."""
+        if isinstance(self.model, CoupledLatentModel):
+            return f"{self.model.size} parameters, those of separate searches"
         refined = "refined together on the free run" if self.refined else "those of the separate equations"
+        return f"{self.model.size} terms, parameters {refined}"
+
+    def __str__(self) -> str:
         lines = [
-            f"{len(self.model.models)} outputs, {self.model.size} terms, parameters {refined}:",
+            f"{len(self.model.models)} outputs, {self._describe_parameters()}:",
             "",
             *(line for single in self.model.models for line in [*term_table(single), ""]),
             *wrap(f"{coupled_signals(self.model) or f'k counts samples of {self.split.validation.dt:g} s'}."),

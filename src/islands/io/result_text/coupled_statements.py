@@ -3,6 +3,7 @@
 from typing import Final
 
 from islands.data.split import compare_input_ranges
+from islands.errors import name_option
 from islands.io.result_text.statements import (
     EXTRAPOLATION,
     NO_SIMULATION,
@@ -23,6 +24,7 @@ from islands.io.result_text.statements import (
     write_percent,
     write_statements,
 )
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.validation.prediction_bands import LEVEL
 
 
@@ -53,6 +55,8 @@ class CoupledFacts:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.model: Document = document["models"][0]
+        #: Whether every output has a latent model from a separate search.
+        self.is_latent = self.model.get("kind") == CoupledLatentModel.kind
         self.outputs = tuple(map(OutputFacts, document["outputs"]))
         record, ranges = document["estimation"], document["inputs"]
         self.extrapolation = compare_input_ranges(
@@ -109,6 +113,11 @@ def describe_coupled(document: Document) -> list[str]:
 
 def _describe_equations(facts: CoupledFacts) -> str:
     document = facts.document
+    if facts.is_latent:
+        return (
+            f"One latent model of the inputs for each of {len(facts.outputs)} outputs, {facts.model['size']} "
+            "parameters; each model is from a separate search."
+        )
     refined = "were refined together" if document["refined"] else "are those of separate searches"
     return (
         f"One equation for each of {len(facts.outputs)} outputs, {facts.model['size']} terms; the parameters "
@@ -132,6 +141,12 @@ def _describe_output(output: OutputFacts) -> str:
         half = output.write_amount(typical_half_width(output.bands))
         text += f"; a new measurement is within {half} of it in {100 * LEVEL:g} % of the samples"
     return text
+
+
+def _suggest_models(facts: CoupledFacts) -> str:
+    if facts.is_latent:
+        return f"another structure, or NARX equations ({name_option('model', 'narx')}), for the models"
+    return "other terms or more lags in the equations"
 
 
 def _list_names(outputs: list[OutputFacts]) -> str:
@@ -228,7 +243,7 @@ NEXT_STEPS: Final[tuple[Statement[CoupledFacts], ...]] = (
     Statement(
         "other-terms",
         lambda facts: facts.structured,
-        lambda facts: f"try other terms or more lags in the equations of {_list_names(facts.structured)}",
+        lambda facts: f"try {_suggest_models(facts)} of {_list_names(facts.structured)}",
     ),
     Statement(
         "wider-record",

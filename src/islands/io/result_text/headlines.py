@@ -42,12 +42,12 @@ def write_coupled_headline(outputs: Sequence[Document]) -> str:
     errors = [each["metrics"]["validation"]["free_run"] for each in outputs]
     names = " and ".join(each["name"] for each in outputs)
     if any(each["rmse"] is None for each in errors):
-        return f"The free run of the equations of {names} diverges on the validation data"
+        return f"The free run of the model of {names} diverges on the validation data"
     stated = [
         f"{each['name']} with a {_state_error(error, each['unit'])}"
         for each, error in zip(outputs, errors, strict=True)
     ]
-    return f"{len(outputs)} equations simulate {' and '.join(stated)}"
+    return f"The model of {len(outputs)} outputs simulates {' and '.join(stated)}"
 
 
 def write_comparison_headline(

@@ -7,12 +7,12 @@ import islands
 from islands.benchmarks.definition import CLASSES, LATENT, LINEAR, NARX
 from islands.benchmarks.model_searches import MODEL_SEARCHES, count_terms
 from islands.data.dataset import Dataset
-from islands.errors import SettingsError
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel
 from islands.progress import ignore_progress, never_stop
 from islands.simulation.predictors import free_run
-from support.coupled_systems import TWO_MASSES, make_coupled_record
-from support.latent_systems import make_model, smooth_input
+from support.coupled_systems import TWO_MASSES
+from support.latent_systems import curves_record, make_coupled_latent_model, make_model, smooth_input
 
 
 def find(kind, record):
@@ -24,14 +24,21 @@ def test_every_class_has_a_search():
     assert [each for each in CLASSES if MODEL_SEARCHES[each].is_random] == [LATENT]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", [LATENT, LINEAR])
-def test_a_class_of_one_output_says_so(kind):
-    with pytest.raises(SettingsError, match="no model of several outputs"):
-        find(kind, make_coupled_record(TWO_MASSES, 200))
+def test_every_output_of_several_has_a_latent_model(kind):
+    record = curves_record(300, 4)
+    model = find(kind, record)
+    assert isinstance(model, CoupledLatentModel)
+    assert model.output_names == record.output_names
+    assert count_terms(model) == sum(len(each.units) for each in model.models)
+    assert (count_terms(model) > 0) == (kind == LATENT)
+    assert free_run(model, record).outcome
 
 
 def test_terms_are_those_of_equations_and_the_units_of_state_spaces():
     assert count_terms(make_model()) == 1
+    assert count_terms(make_coupled_latent_model()) == 2
     assert count_terms(TWO_MASSES) == 8
     assert count_terms(TWO_MASSES.models[0]) == 4
 

@@ -38,7 +38,7 @@ def test_report_of_several_outputs_has_the_equations_and_the_free_run_of_each(tm
         name = json.loads((tmp_path / "result.json").read_text())["outputs"][number - 1]["folder"]
         (tmp_path / f"figures/free-run-{name.removeprefix('outputs/')}.svg").write_bytes(b"<svg/>")
     page = report_saved_result(tmp_path).decode()
-    assert "2 equations simulate" in page
+    assert "The model of 2 outputs simulates" in page
     assert page.count("<img ") == 2
 
 

@@ -110,6 +110,28 @@ def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(recor
     assert (part / "model.json").read_bytes() == (whole / "model.json").read_bytes()
 
 
+@pytest.mark.ci
+def test_latent_models_of_two_outputs_are_fitted_and_simulated(record, tmp_path) -> None:
+    with undrawn_figures():
+        printed = succeed("fit", record, *COLUMNS, "--model", "latent", "--out", tmp_path / "result")
+    assert "2 outputs, " in printed
+    assert "those of separate searches" in printed
+    printed = succeed("simulate", tmp_path / "result", record, "--bands", 0.9)
+    assert "y2: 90 % band: median half-width" in printed
+    assert succeed("show", tmp_path / "result", "--format", "plain").startswith("y1(k) =")
+
+
+@pytest.mark.ci
+def test_an_evolution_of_latent_models_of_two_outputs_is_resumed(record, tmp_path) -> None:
+    settings = ("--preset", "latent", "--population", 4, "--generations", 1, "--islands", 1)
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    with undrawn_figures():
+        succeed("identify", record, *COLUMNS, *settings, "--engine", "serial", "--out", whole)
+        succeed("identify", record, *COLUMNS, *settings, "--wall-time", 1e-9, "--out", part)
+        succeed("identify", "--resume", part, "--engine", "serial")
+    assert (part / "model.json").read_bytes() == (whole / "model.json").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("command", "options", "message"),
     [
@@ -117,6 +139,7 @@ def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(recor
         ("fit", ("--output", "y1", "--output", "u"), "u is an input and an output"),
         ("fit", ("--output", "y1,y2", "--constraints", "gain = 2"), "are for one output"),
         ("fit", ("--output", "y1,y2", "--feedthrough", "yes"), "as u+1"),
+        ("fit", ("--output", "y1,y2", "--model", "latent", "--lags", "3"), "are settings of NARX models"),
         ("identify", ("--output", "y1,y2", "--test", "120:150"), "other samples for estimation"),
         ("identify", ("--output", "y1,y1"), "y1 is given twice"),
     ],

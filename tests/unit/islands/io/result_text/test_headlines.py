@@ -45,8 +45,8 @@ def output(name: str, error: dict[str, Any]) -> dict[str, Any]:
 def test_headline_of_several_outputs_states_every_error():
     stated = write_coupled_headline([output("a", FREE), output("b", {**FREE, "mape": 0.5})])
     assert stated == (
-        "2 equations simulate a with a mean absolute error of 1.23 % of its range and b with a mean absolute "
-        "error of 0.5 % of its range"
+        "The model of 2 outputs simulates a with a mean absolute error of 1.23 % of its range and b with a "
+        "mean absolute error of 0.5 % of its range"
     )
     assert "diverges" in write_coupled_headline([output("a", FREE), output("b", LOST)])
 

@@ -1,0 +1,114 @@
+"""Latent models of several outputs: both systems are found, files, and searches that continue."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.coupled_record import CoupledRecord
+from islands.errors import SettingsError
+from islands.facade.coupled.identification import StoppedCouplingError, fit_coupled, identify_coupled
+from islands.io.checkpoints import (
+    archipelago_from_document,
+    checkpoint_text,
+    state_document,
+    state_from_document,
+)
+from islands.models.coupled_latent import CoupledLatentModel
+from support.latent_systems import curves_record
+from support.undrawn import undrawn_figures
+
+#: A search that takes two seconds.
+SHORT = {"preset": "latent", "population": 6, "generations": 4, "migrate_every": 2}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return identify_coupled(curves_record(300, 1), **SHORT)
+
+
+@pytest.mark.ci
+def test_two_outputs_with_different_curves_are_found():
+    record, test = curves_record(400, 1), curves_record(1500, 7)
+    result = fit_coupled(record, model="latent")
+    assert isinstance(result.model, CoupledLatentModel)
+    assert [model.order for model in result.model.models] == [1, 2]
+    assert [model.units for model in result.model.models] == [("tanh",), ("square",)]
+    errors = np.sqrt(np.mean((result.simulate(test, 100).y - test.y)[100:] ** 2, axis=0))
+    assert errors == pytest.approx([0.01, 0.01], rel=0.15)
+    for name, model in zip(("y1", "y2"), result.model.models, strict=True):
+        # The inputs alone determine a latent model, so that its errors are those of the free run.
+        errors = result.metrics[name]["validation"]
+        assert errors["one_step_ahead"].rmse == pytest.approx(errors["free_run"].rmse, rel=1e-9)
+        assert model.input_names == result.split.estimation.input_names
+    assert "One latent model of the inputs for each of 2 outputs" in result.sentences()[0]
+
+
+@pytest.mark.ci
+def test_a_saved_result_is_read_with_the_same_bands(found, tmp_path):
+    with undrawn_figures():
+        folder = found.save(tmp_path / "result")
+    loaded = islands.load(folder)
+    assert loaded.model == found.model
+    record = curves_record(200, 5)
+    for stored, band in zip(loaded.bands(record), found.bands(record), strict=True):
+        np.testing.assert_array_equal(stored.lower, band.lower)
+    document = json.loads((folder / "result.json").read_text())
+    assert document["ensemble"] is None
+    assert all(each["ensemble"] for each in document["outputs"])
+    assert "parameters, those of separate searches" in (folder / "summary.txt").read_text()
+    assert islands.load(folder / "outputs" / "2-y2").best.model.units == found.results[1].best.model.units
+
+
+@pytest.mark.ci
+def test_a_search_that_continues_has_the_same_result(found):
+    states = []
+    again = identify_coupled(
+        curves_record(300, 1), on_epoch=lambda state, _settings: states.append(state), **SHORT
+    )
+    assert again.model == found.model
+    assert [len(state.earlier) for state in states] == [0, 0, 0, 1, 1, 1]
+    for state in (states[1], states[4]):
+        text = checkpoint_text(state.archipelago, state_document(state))
+        stored = state_from_document(*archipelago_from_document(text, "test"))
+        assert identify_coupled(curves_record(300, 1), start=stored, **SHORT).model == found.model
+
+
+@pytest.mark.ci
+def test_a_search_that_is_stopped_names_the_outputs_that_are_missing(found):
+    calls = iter(range(10_000))
+    with pytest.raises(StoppedCouplingError, match="y1") as stopped:
+        identify_coupled(curves_record(300, 1), stop=lambda: next(calls) >= 0, **SHORT)
+    assert (stopped.value.outputs, stopped.value.found) == (("y1", "y2"), ())
+
+
+@pytest.mark.ci
+def test_inputs_that_one_output_reads_at_once_are_read_early_by_all():
+    record = curves_record(300, 1)
+    first, second = record.records
+    direct = CoupledRecord((first, replace(second, y=second.y + 0.5 * first.u[:, 0])))
+    result = identify_coupled(direct, **SHORT)
+    assert result.model.input_names == ("u+1",)
+    for name in ("y1", "y2"):
+        assert result.metrics[name]["validation"]["free_run"].rmse < 0.05
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"model": "latent", "library": "polynomial"}, "are settings of NARX models"),
+        ({"model": "latent", "refit": "all"}, "refit is 'none' with several outputs"),
+        ({"model": "latnet"}, "Did you mean 'latent'"),
+        ({"structure": "wiener"}, "a structure is a setting of latent models"),
+    ],
+)
+def test_settings_without_effect_are_refused(options, message):
+    with pytest.raises(SettingsError, match=message):
+        fit_coupled(curves_record(60, 1), **options)
+
+
+def test_settings_of_equations_are_refused_by_the_preset():
+    with pytest.raises(SettingsError, match="max_terms is a setting of NARX models"):
+        identify_coupled(curves_record(60, 1), preset="latent", max_terms=4)
