@@ -20,6 +20,9 @@ from islands.simulation.outcome import EvaluationOutcome
 #: rounding errors.
 _DIFFERENCE_STEP = 1e-5
 
+#: Directions whose differences are simulated together: the residuals of all would need much memory.
+_AT_ONCE = 16
+
 #: Initial damping, its factors after a failed and a successful step, and the value at which the steps end.
 #: The regressors of an oversampled record depend on each other almost, so that a damping of 1e-3 holds the
 #: parameters for several steps. A step that fails costs one simulation, one that is too short many.
@@ -143,11 +146,14 @@ def approximate_jacobian(
         A row is zero if the simulation diverges next to theta.
     """
     jacobian: NDArray[np.float64] = np.zeros((directions.shape[1], samples))
-    moved = [theta + sign * _DIFFERENCE_STEP * step for step in directions.T for sign in (1.0, -1.0)]
-    found = evaluate(np.array(moved)) if moved else []
-    for row, forward, backward in zip(jacobian, found[::2], found[1::2], strict=True):
-        if forward is not None and backward is not None:
-            row[:] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
+    for first in range(0, directions.shape[1], _AT_ONCE):
+        steps = directions.T[first : first + _AT_ONCE]
+        moved = [theta + sign * _DIFFERENCE_STEP * step for step in steps for sign in (1.0, -1.0)]
+        found = evaluate(np.array(moved))
+        rows = jacobian[first : first + _AT_ONCE]
+        for row, forward, backward in zip(rows, found[::2], found[1::2], strict=True):
+            if forward is not None and backward is not None:
+                row[:] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
     return jacobian
 
 

@@ -190,7 +190,7 @@ class BlockResidual(Residual):
 
     def _evaluate(self, thetas: NDArray[np.float64]) -> list[NDArray[np.float64] | None]:
         """Return the residual of each of several parameter vectors, which are simulated together."""
-        runs = self._simulate(thetas)[:, : len(self._y), self._predicted]
+        runs = self._simulate.simulate_outputs(thetas)[:, :, self._predicted]
         return [
             ((run - self._y) / self._scales).T.reshape(-1) if (np.abs(run) <= self._bounds).all() else None
             for run in runs

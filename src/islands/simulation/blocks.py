@@ -72,7 +72,14 @@ class BlockSimulator:
         ndarray, shape (sets, computed signals, samples)
             NaN outside of the intervals. A set and an interval do not depend on the others.
         """
-        computed = self._block.computed
+        return self._simulate(parameters, self._block.computed)
+
+    def simulate_outputs(self, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Simulate as a call, and return the outputs only, shape (sets, outputs, samples)."""
+        return self._simulate(parameters, self._block.outputs)
+
+    def _simulate(self, parameters: NDArray[np.float64], computed: int) -> NDArray[np.float64]:
+        """Return the first computed signals; those of many states would need much memory."""
         found: NDArray[np.float64] = np.full((len(parameters), computed, self._outputs.shape[1]), np.nan)
         runs = [(number, int(interval)) for interval in self._order for number in range(len(parameters))]
         for lanes in _make_groups(runs):

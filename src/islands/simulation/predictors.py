@@ -137,7 +137,7 @@ def _simulate_block(
     block, outputs = model.block(), np.atleast_2d(signals.y.T)
     bounds = [divergence_bound(y) if bound is None else bound for y in outputs]
     simulate_record = make_simulator(model, signals, interval, warm_up)
-    predicted = simulate_record(np.array([model.parameters]))[0, : len(outputs)]
+    predicted = simulate_record.simulate_outputs(np.array([model.parameters]))[0]
     failed = simulate_record.remove_diverged(predicted, bounds)
     y = np.ascontiguousarray(predicted.T.reshape(signals.y.shape)) + offsets
     if failed:
@@ -238,7 +238,7 @@ def free_runs(
         outputs = np.atleast_2d(signals.y.T)
         bounds = [divergence_bound(y) for y in outputs]
         simulate_record = make_simulator(model, signals, None, warm_up)
-        runs = simulate_record(thetas)[:, : len(outputs)]
+        runs = simulate_record.simulate_outputs(thetas)
         for run in runs:
             simulate_record.remove_diverged(run, bounds)
         return runs.transpose(0, 2, 1).reshape(len(runs), *signals.y.shape) + offset
