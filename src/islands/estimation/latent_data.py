@@ -5,7 +5,7 @@ estimation data prefers models that are too large. A simulation takes much less 
 that all other rows of a long record are held out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -23,6 +23,9 @@ _BLOCKS, _SMALLEST_BLOCK, _HELD_OUT = 5, 500, 0.2
 
 #: Rows of each block for the estimation in a search, and for the final one, at most.
 _USED_ROWS, _FINAL_ROWS = 1_200, 4_000
+
+#: Rows of all blocks for the estimation in a search, at most: of many recordings, some are left out.
+_ALL_USED_ROWS = 7_500
 
 #: Samples from which the initial states of a block are estimated, at least for a state and at most.
 SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
@@ -77,7 +80,7 @@ def make_latent_data(record: Dataset) -> LatentData:
     used: list[Segment] = []
     final: list[Segment] = []
     whole: list[Segment] = []
-    for begin, end in _cut_blocks(scaled):
+    for begin, end in _spread(list(_cut_blocks(scaled))):
         cut = end - round(_HELD_OUT * (end - begin))
         used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS)))
         final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS)))
@@ -97,6 +100,15 @@ def _cut_blocks(record: Dataset) -> Iterator[tuple[int, int]]:
     for begin, end in record.bounds:
         count = max(1, round((end - begin) / share))
         yield from pairwise(np.linspace(begin, end, count + 1).astype(int).tolist())
+
+
+def _spread(blocks: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return the blocks, or some of them at equal distances if all would have too many rows."""
+    longest = max(min(_USED_ROWS, end - begin) for begin, end in blocks)
+    most = max(_BLOCKS, _ALL_USED_ROWS // longest)
+    if len(blocks) <= most:
+        return list(blocks)
+    return [blocks[at] for at in np.linspace(0, len(blocks) - 1, most).round().astype(int)]
 
 
 def _take(record: Dataset, begin: int, end: int) -> Segment:

@@ -32,8 +32,13 @@ from islands.models.latent import LatentModel, StateSpaceLayout, find_codes
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 
-#: Numbers of states of the linear systems.
-ORDERS = (1, 2, 3, 4, 6)
+#: Numbers of states of the linear systems, and of those that have modes only. A system of 24 states has 576
+#: entries of the matrix A, and 48 in its modes.
+ORDERS, MODAL_ORDERS = (1, 2, 3, 4, 6), (8, 12, 16, 20, 24)
+
+#: Gain of the held-out error, as a fraction, of the last order over all smaller ones, without which no modal
+#: order is tried.
+_ORDER_GAIN = 0.2
 
 #: Rows of the first estimation of a linear system, at most.
 _LINEAR_ROWS = 20_000
@@ -72,7 +77,7 @@ def search_linear_models(record: Dataset, steps: Steps) -> list[LatentModel]:
 
 
 def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]:
-    """Fit linear systems of several orders.
+    """Fit linear systems of several orders; of large orders only as long as they gain much.
 
     Raises
     ------
@@ -81,20 +86,41 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
     """
     steps.check("linear state spaces")
     found: list[FittedStateSpace] = []
-    for order in ORDERS:
+    for order in (*ORDERS, *MODAL_ORDERS):
         if found and steps.skip("linear state spaces of larger orders"):
+            break
+        if order in MODAL_ORDERS and not _gains_much(found, data):
             break
         steps.report(f"linear state space of order {order}", 0.0)
         model = fit_linear_state_space(data.record[:_LINEAR_ROWS], order)
         if model is None:
             continue
-        theta, codes = model.theta, find_codes(())
-        states = np.array([estimate_start(theta, codes, each, order) for each in data.used])
-        draft = Draft(model.layout, (), theta, np.ones(theta.size, bool), states, steps=_LINEAR_STEPS)
+        theta, free = model.theta, np.ones(model.theta.size, bool)
+        if order in MODAL_ORDERS:
+            theta = _write_in_modes(model.layout, theta, (), data.used[0].u, np.zeros(order))
+            free = _free_modes(model.layout, theta)
+        states = np.array([estimate_start(theta, find_codes(()), each, order) for each in data.used])
+        draft = Draft(model.layout, (), theta, free, states, steps=_LINEAR_STEPS)
         system = draft.estimate(data)
         if not isinstance(system, EvaluationOutcome):
             found.append(system)
     return found
+
+
+def _gains_much(systems: Sequence[FittedStateSpace], data: LatentData) -> bool:
+    """Return whether the last system is much better than all before it, and than a constant."""
+    before = min([data.variance, *(each.fitness for each in systems[:-1])])
+    return bool(systems) and systems[-1].fitness < (1.0 - _ORDER_GAIN) * before
+
+
+def _free_modes(layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which parameters of a system in modes are free: not the entries of A between two modes."""
+    free = np.ones(theta.size, bool)
+    blocks = layout.split(free)
+    blocks["A"][...] = layout.split(theta)["A"] != 0.0
+    # The level of the output determines the drift of a linear system.
+    blocks["o"][...] = False
+    return free
 
 
 def find_front(systems: Sequence[FittedStateSpace], gain: float = _NEGLIGIBLE) -> list[FittedStateSpace]:
@@ -181,20 +207,34 @@ def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedS
     return draft.describe(fit, error)
 
 
-def _write_in_modes(system: FittedStateSpace, u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the parameters with one or two states for each mode, of the standard deviation 1 for inputs."""
-    theta, layout = np.array(system.theta), system.layout
+def _write_in_modes(
+    layout: StateSpaceLayout,
+    theta: NDArray[np.float64],
+    units: Sequence[str],
+    u: NDArray[np.float64],
+    start: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the parameters with one or two states for each mode, of the standard deviation 1 for inputs.
+
+    Parameters
+    ----------
+    layout, theta, units
+        Of a system.
+    u : ndarray, shape (rows, inputs)
+    start : ndarray, shape (states,)
+        States at the first row.
+    """
     found = find_modal_form(layout.split(theta)["A"])
     if found is None:
         return theta
     blocks, forward = found
     modal = _transform(theta, layout, forward)
     layout.split(modal)["A"][...] = blocks
-    start = np.linalg.solve(forward, np.array(system.states[0]))
-    scales = measure_deviations(modal, find_codes(system.units), u, start)
+    first = np.linalg.solve(forward, start).astype(np.float64)
+    scales = measure_deviations(modal, find_codes(units), u, first)
     if scales is None:
         return theta
-    for state, next_state in pairwise(range(system.order)):
+    for state, next_state in pairwise(range(layout.order)):
         if blocks[state, next_state]:  # both states of a pair have one scale
             scales[[state, next_state]] = np.hypot(*scales[[state, next_state]])
     scaled = _transform(modal, layout, np.diag(scales))
@@ -228,7 +268,10 @@ def make_latent_model(system: FittedStateSpace, data: LatentData, record: Datase
     record : Dataset
         The record with all inputs one sample early.
     """
-    theta, layout = _write_in_modes(system, data.used[0].u), system.layout
+    layout = system.layout
+    theta = _write_in_modes(
+        layout, np.array(system.theta), system.units, data.used[0].u, np.array(system.states[0])
+    )
     blocks = layout.split(theta)
     mean, scale = record.u.mean(axis=0), deviation(record.u)
     level, height = float(record.y.mean()), float(deviation(record.y))

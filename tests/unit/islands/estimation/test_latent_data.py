@@ -64,3 +64,12 @@ def test_the_error_is_in_the_squared_unit_of_the_output():
     small, large = (make(Dataset(u, factor * u, 1.0)) for factor in (1.0, 1e3))
     errors = [measure_held_out(fit_bistable(0.2, each), each) for each in (small, large)]
     assert errors[1] == pytest.approx(1e6 * errors[0])
+
+
+def test_many_recordings_are_used_in_part():
+    data = make(join([spring_record(1600, seed=seed) for seed in range(12)]))
+    assert len(data.used) == 6
+    assert sum(len(block.y) for block in data.used) <= 7500
+    # The blocks are from the whole record, with the first and the last recording.
+    assert np.array_equal(data.whole[0].y, data.record.y[1:1600])
+    assert np.array_equal(data.whole[-1].y, data.record.y[-1599:])
