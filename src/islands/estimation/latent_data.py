@@ -25,7 +25,7 @@ _BLOCKS, _SMALLEST_BLOCK, _HELD_OUT = 5, 500, 0.2
 _USED_ROWS, _FINAL_ROWS = 1_200, 4_000
 
 #: Rows of all blocks for the estimation in a search, at most: of many recordings, some are left out.
-_ALL_USED_ROWS = 7_500
+_ALL_USED_ROWS = 15_000
 
 #: Samples from which the initial states of a block are estimated, at least for a state and at most.
 SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100

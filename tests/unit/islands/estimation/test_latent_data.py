@@ -67,9 +67,9 @@ def test_the_error_is_in_the_squared_unit_of_the_output():
 
 
 def test_many_recordings_are_used_in_part():
-    data = make(join([spring_record(1600, seed=seed) for seed in range(12)]))
-    assert len(data.used) == 6
-    assert sum(len(block.y) for block in data.used) <= 7500
+    data = make(join([spring_record(1600, seed=seed) for seed in range(20)]))
+    assert len(data.used) == 12
+    assert sum(len(block.y) for block in data.used) <= 15_000
     # The blocks are from the whole record, with the first and the last recording.
     assert np.array_equal(data.whole[0].y, data.record.y[1:1600])
     assert np.array_equal(data.whole[-1].y, data.record.y[-1599:])
