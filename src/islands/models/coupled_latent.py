@@ -94,10 +94,12 @@ class CoupledLatentModel(CoupledModel):
 
     def measured_block(self) -> Block:
         """Return the block of the measured signals, with the offsets in its equations."""
-        blocks = [subtract_offsets(model.block(), model.preprocessing) for model in self._number()]
-        found, statement = self._join(blocks), _describe_symbols(self)
+        found = self._join([subtract_offsets(each.block(), each.preprocessing) for each in self._number()])
+        done = [each.preprocessing for each in self.models if each.preprocessing]
+        if not any(value for each in done for value in (each.output_offset, *each.input_offsets)):
+            return found
         # The text of the equations is in deviations, so that it states which.
-        return replace(found, texts=(*found.texts, f"where {statement}")) if statement else found
+        return replace(found, texts=(*found.texts, f"where {_describe_symbols(self)}"))
 
     def equation(self) -> EquationText:
         """Return the equations as text: those of each output, with its states after them."""
