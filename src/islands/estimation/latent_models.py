@@ -28,6 +28,7 @@ from islands.estimation.latent_data import (
 )
 from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
 from islands.estimation.modal_form import find_modal_form
+from islands.kernels.state_space import evaluate_unit
 from islands.models.latent import LatentModel, StateSpaceLayout, find_codes
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
@@ -159,7 +160,9 @@ def estimate_models(
         left = front[:-1] if direct else front
         reduced = list(threads.map(partial(_remove_blocks, data=data, direct=direct), left))
         reduced += [best] if direct else []
-        finished = threads.map(partial(_finish, data=data, steps=steps), reduced)
+        # Systems may be equal once blocks are removed.
+        different = {each.key: each for each in map(_remove_idle_units, reduced)}
+        finished = threads.map(partial(_finish, data=data, steps=steps), different.values())
         advanced = advance_all_inputs(record)
         models = [make_latent_model(each, data, advanced) for each in finished]
     return models if direct else [replace(each, input_names=record.input_names) for each in models]
@@ -194,6 +197,34 @@ def _fit_without(system: FittedStateSpace, block: NDArray[np.int64], data: Laten
         theta = tuple(np.where(free, draft.theta, 0.0).tolist())
         return replace(system, theta=theta, free=tuple(free.tolist()), fitness=np.inf)
     return found
+
+
+def _remove_idle_units(system: FittedStateSpace) -> FittedStateSpace:
+    """Return the system without units that act on nothing or read nothing; the latter are constants."""
+    draft = system.draft()
+    values, free = draft.layout.split(draft.theta), draft.layout.split(draft.free)
+    acts = free["E"].any(axis=0) | free["F"]
+    kept = [unit for unit in range(len(system.units)) if acts[unit] and free["W"][unit].any()]
+    if len(kept) == len(system.units):
+        return system
+    pairs = zip(find_codes(system.units), values["s"], strict=True)
+    constants = np.array([evaluate_unit(code, s)[0] for code, s in pairs])
+    constants[kept] = 0.0
+    values["o"] += values["E"] @ constants
+    values["level"] += values["F"] @ constants
+    free["o"] |= values["o"] != 0.0
+    free["level"] |= values["level"] != 0.0
+    taken = []
+    for blocks in (values, free):
+        left = {name: blocks[name][kept] for name in ("F", "W", "s")} | {"E": blocks["E"][:, kept]}
+        taken.append(np.concatenate([left.get(name, block).ravel() for name, block in blocks.items()]))
+    theta, used = taken
+    return replace(
+        system,
+        units=tuple(system.units[unit] for unit in kept),
+        theta=tuple(theta.tolist()),
+        free=tuple(used.tolist()),
+    )
 
 
 def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedStateSpace:

@@ -253,6 +253,10 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     if preset == AUTO:
         raise SettingsError("the preset auto needs the record of one output: name another preset")
     base = lookup({AUTO: _PAPER, **PRESETS}, preset, "preset")
+    if changes.get("model_class", base.model_class) != base.model_class:
+        raise SettingsError(
+            f"the preset {preset} searches {base.model_class} models: leave model_class out, or take another"
+        )
     for name, value in changes.items():
         lookup(_SETTING_NAMES, name, "setting")
         if base.model_class == LATENT and name not in LATENT_SETTINGS and value != getattr(base, name):

@@ -1,12 +1,20 @@
-"""Linear systems of large orders, which have modes only, and are tried as long as they gain much."""
+"""Linear systems of several orders, and the models of a front."""
 
 import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
 from islands.data.input_lead import advance_all_inputs
+from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.estimation.latent_data import make_latent_data
-from islands.estimation.latent_models import MODAL_ORDERS, ORDERS, fit_linear_systems
+from islands.estimation.latent_models import (
+    MODAL_ORDERS,
+    ORDERS,
+    _remove_idle_units,
+    estimate_models,
+    fit_linear_systems,
+)
+from islands.models.latent import StateSpaceLayout
 from islands.progress import Steps
 from support.latent_systems import spring_record
 
@@ -45,3 +53,36 @@ def test_a_system_with_many_resonances_has_modes():
 @pytest.mark.ci
 def test_no_large_order_is_tried_if_the_last_one_does_not_gain_much():
     assert not {each.order for each in fit(spring_record(1200, noise=0.02))} & set(MODAL_ORDERS)
+
+
+def make_system(**values):
+    """Return a system of one state, one input and two units with the given parameters."""
+    names = StateSpaceLayout(1, 1, 2).names
+    theta = tuple(values.get(name, 0.0) for name in names)
+    free = tuple(name in values for name in names)
+    return FittedStateSpace(1, 1, ("abs", "cube"), theta, free, ((0.1,),), 1.0, 1.0)
+
+
+def test_units_that_read_nothing_are_constants():
+    linear = {"a1_1": 0.5, "b1": 1.0, "c1": 2.0}
+    system = make_system(**linear, e1_1=3.0, f1=0.5, s1=-2.0, e1_2=0.1, w2_1=1.0, s2=0.0)
+    reduced = _remove_idle_units(system)
+    assert reduced.units == ("cube",)
+    found = dict(zip(reduced.layout.names, reduced.theta, strict=True))
+    assert (found["o1"], found["level"], found["e1_1"], found["w1_1"]) == (6.0, 1.0, 0.1, 1.0)
+    assert reduced.size == system.size - 3 + 2
+
+
+def test_units_that_act_on_nothing_are_removed():
+    kept = {"a1_1": 0.5, "b1": 1.0, "c1": 2.0, "e1_1": 3.0, "w1_1": 1.0, "s1": 0.2}
+    reduced = _remove_idle_units(make_system(**kept, w2_1=1.0, s2=0.5))
+    assert (reduced.units, reduced.size) == (("abs",), 6)
+    assert _remove_idle_units(reduced) is reduced
+
+
+def test_models_of_a_front_have_different_structures():
+    record = spring_record(240, noise=0.02)
+    data = make_latent_data(advance_all_inputs(record))
+    systems = fit_linear_systems(data, Steps())
+    models = estimate_models([systems[1], systems[1], systems[2]], data, record, Steps())
+    assert [each.order for each in models] == [2, 3]

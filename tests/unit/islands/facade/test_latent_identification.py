@@ -126,3 +126,5 @@ def test_settings_of_narx_models_are_refused():
         resolve_settings("latent", {"max_terms": 3})
     with pytest.raises(SettingsError, match="unknown structure of latent models 'phi'"):
         resolve_settings("latent", {"structure": "phi"})
+    with pytest.raises(SettingsError, match="the preset narx searches narx models: leave model_class out"):
+        resolve_settings("narx", {"model_class": "latent", "structure": "auto"})
