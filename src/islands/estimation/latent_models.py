@@ -37,9 +37,9 @@ from islands.simulation.outcome import EvaluationOutcome
 #: entries of the matrix A, and 48 in its modes.
 ORDERS, MODAL_ORDERS = (1, 2, 3, 4, 6), (8, 12, 16, 20, 24)
 
-#: Gain of the held-out error, as a fraction, of the last order over all smaller ones, without which no modal
-#: order is tried.
-_ORDER_GAIN = 0.2
+#: Gain of the squared held-out error, as a fraction, of a modal order over all smaller ones and over a
+#: constant; the first order without it is left out, and ends them.
+_ORDER_GAIN = 0.1
 
 #: Rows of the first estimation of a linear system, at most.
 _LINEAR_ROWS = 20_000
@@ -90,8 +90,6 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
     for order in (*ORDERS, *MODAL_ORDERS):
         if found and steps.skip("linear state spaces of larger orders"):
             break
-        if order in MODAL_ORDERS and not _gains_much(found, data):
-            break
         steps.report(f"linear state space of order {order}", 0.0)
         model = fit_linear_state_space(data.record[:_LINEAR_ROWS], order)
         if model is None:
@@ -103,15 +101,19 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
         states = np.array([estimate_start(theta, find_codes(()), each, order) for each in data.used])
         draft = Draft(model.layout, (), theta, free, states, steps=_LINEAR_STEPS)
         system = draft.estimate(data)
+        if order in MODAL_ORDERS and not _gains_much(system, found, data):
+            break
         if not isinstance(system, EvaluationOutcome):
             found.append(system)
     return found
 
 
-def _gains_much(systems: Sequence[FittedStateSpace], data: LatentData) -> bool:
-    """Return whether the last system is much better than all before it, and than a constant."""
-    before = min([data.variance, *(each.fitness for each in systems[:-1])])
-    return bool(systems) and systems[-1].fitness < (1.0 - _ORDER_GAIN) * before
+def _gains_much(
+    system: FittedStateSpace | EvaluationOutcome, smaller: Sequence[FittedStateSpace], data: LatentData
+) -> bool:
+    """Return whether a system is much better than all smaller ones, and than a constant."""
+    least = min([data.variance, *(each.fitness for each in smaller)])
+    return isinstance(system, FittedStateSpace) and system.fitness < (1.0 - _ORDER_GAIN) * least
 
 
 def _free_modes(layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -40,8 +40,8 @@ def fit(record):
 @pytest.mark.ci
 def test_a_system_with_many_resonances_has_modes():
     systems = fit(resonances_record(3000))
-    assert [each.order for each in systems] == [*ORDERS, 8, 12, 16]
-    found = systems[-2]
+    assert [each.order for each in systems] == [*ORDERS, 8, 12]
+    found = systems[-1]
     assert found.fitness**0.5 == pytest.approx(0.01, rel=0.2)
     # Two states of a resonance have four entries of A, and each state has one of B and one of C.
     assert found.size <= 4 * 6 + 12 + 12 + 2
@@ -51,7 +51,7 @@ def test_a_system_with_many_resonances_has_modes():
 
 
 @pytest.mark.ci
-def test_no_large_order_is_tried_if_the_last_one_does_not_gain_much():
+def test_no_large_order_is_kept_that_does_not_gain_much():
     assert not {each.order for each in fit(spring_record(1200, noise=0.02))} & set(MODAL_ORDERS)
 
 
