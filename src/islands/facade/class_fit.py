@@ -19,7 +19,7 @@ from islands.evolution.search_result import (
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.identification_progress import SEARCH
-from islands.facade.latent_identification import identify_latent
+from islands.facade.latent_identification import complete_latent, search_latent
 from islands.facade.results.model_simulation import SHOOTING
 from islands.io.models import MODEL_CLASSES, NARX
 from islands.models.latent import LatentModel
@@ -44,7 +44,7 @@ def fit_class(
     """Fit the models of a class.
 
     Every starting model of the class is refined on the free run of the estimation data. The model with the
-    least error is kept. Latent models are evolved instead (see `identify_latent`).
+    least error is kept. Latent models are evolved instead (see `search_latent`).
 
     Parameters
     ----------
@@ -75,7 +75,9 @@ def fit_class(
             done, whole = state.archipelago.generation, settings.generations
             steps.report(f"{SEARCH}: generation {done} of {whole}", (done + 1) / (whole + 1))
 
-        return identify_latent(record, split, searched, seed, steps, {"method": "fit"}, on_epoch=report)
+        method = {"method": "fit"}
+        latent = search_latent(record, split, searched, seed, steps, method, on_epoch=report)
+        return complete_latent(latent, steps)
     found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
     models = [model for _, model in found[:1]]
     if not models:

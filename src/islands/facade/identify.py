@@ -41,7 +41,7 @@ from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.final_models import estimate_candidates, select_final_models
-from islands.facade.latent_identification import identify_latent
+from islands.facade.latent_identification import complete_latent, search_latent
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
@@ -210,13 +210,13 @@ def identify_record(
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if settings.model_class == LATENT:
         described = {**_describe_preset(preset), "validation": held_out}
-        found = identify_latent(
+        found = search_latent(
             *(record, parts, settings, seed, steps, described),
             start=start,
             engine=engine,
             on_epoch=on_epoch or ignore_epoch,
         )
-        return Result.from_search(refit_models(found, validation, steps))
+        return Result.from_search(refit_models(complete_latent(found, steps), validation, steps))
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
     steps("sampling rate and direct feedthrough", 0.0)

@@ -74,7 +74,7 @@ def search_latent(
     Returns
     -------
     SearchResult
-        Without a linear model for comparison and without prediction bands.
+        Without a linear model for comparison and without prediction bands; see `complete_latent`.
     """
     problem = make_latent_problem(split.estimation, settings, steps)
     if not problem.linear:
@@ -108,22 +108,8 @@ def search_latent(
     return SearchResult(record, split, seed, described, search, rank_models(assessed))
 
 
-def identify_latent(
-    record: Dataset,
-    split: Split,
-    settings: Settings,
-    seed: int,
-    steps: Steps,
-    described: dict[str, Any],
-    *,
-    start: SearchState | None = None,
-    engine: Engine | Ray | str | None = None,
-    on_epoch: SearchCallback = ignore_epoch,
-) -> SearchResult:
-    """Return the complete result of a search; see `search_latent`."""
-    found = search_latent(
-        *(record, split, settings, seed, steps, described), start=start, engine=engine, on_epoch=on_epoch
-    )
+def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
+    """Return the result of a search with a linear model for comparison and with prediction bands."""
     found = with_linear_comparison(found, (), found.shooting_interval, steps)
     models = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
     warm_up = max(entry.model.maximum_lag for entry in found.models)
