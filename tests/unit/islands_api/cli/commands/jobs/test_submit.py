@@ -58,6 +58,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "characters": (("plain", "explorer"), ["plain", "explorer"]),
     "max_evaluations": (("100000",), 100_000),
     "target_error": (("0.001",), 0.001),
+    "structure": (("free",), "free"),
 }
 
 
