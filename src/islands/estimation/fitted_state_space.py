@@ -1,7 +1,8 @@
 """State space with units and estimated parameters, the individual of a search for latent models."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,27 @@ class Draft:
     states: NDArray[np.float64]
     steps: int = 0
     effect_steps: int = 0
+
+    def take(self, states: Sequence[int], units: Sequence[int]) -> "Draft":
+        """Return a draft with some of the states and units only, by their places."""
+        order, kept, used = self.layout.order, list(states), list(units)
+        inputs = range(order, order + self.layout.inputs)
+
+        def select(values: NDArray[Any]) -> NDArray[Any]:
+            blocks = self.layout.split(values)
+            taken = {"A": blocks["A"][np.ix_(kept, kept)], "E": blocks["E"][np.ix_(kept, used)]}
+            taken |= {name: blocks[name][kept] for name in ("B", "C", "o")}
+            taken |= {name: blocks[name][used] for name in ("F", "s")}
+            taken["W"] = blocks["W"][np.ix_(used, [*kept, *inputs])]
+            return np.concatenate([taken.get(name, block).ravel() for name, block in blocks.items()])
+
+        return Draft(
+            StateSpaceLayout(len(kept), self.layout.inputs, len(used)),
+            tuple(self.units[unit] for unit in used),
+            select(self.theta),
+            select(self.free),
+            self.states[:, kept],
+        )
 
     def begin(self, segments: tuple[Segment, ...]) -> StateSpaceFit:
         """Return the fit of the free parameters to segments, without any step."""

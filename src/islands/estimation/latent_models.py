@@ -216,17 +216,9 @@ def _remove_idle_units(system: FittedStateSpace) -> FittedStateSpace:
     values["level"] += values["F"] @ constants
     free["o"] |= values["o"] != 0.0
     free["level"] |= values["level"] != 0.0
-    taken = []
-    for blocks in (values, free):
-        left = {name: blocks[name][kept] for name in ("F", "W", "s")} | {"E": blocks["E"][:, kept]}
-        taken.append(np.concatenate([left.get(name, block).ravel() for name, block in blocks.items()]))
-    theta, used = taken
-    return replace(
-        system,
-        units=tuple(system.units[unit] for unit in kept),
-        theta=tuple(theta.tolist()),
-        free=tuple(used.tolist()),
-    )
+    taken = draft.take(range(system.order), kept)
+    theta, used = tuple(taken.theta.tolist()), tuple(taken.free.tolist())
+    return replace(system, units=taken.units, theta=theta, free=used)
 
 
 def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedStateSpace:

@@ -140,17 +140,7 @@ def _append(blocks: Blocks, entries: Blocks) -> Blocks:
 
 def _take(draft: Draft, states: Sequence[int], units: Sequence[int], effect_steps: int) -> Draft:
     """Return a draft with some of the states and units only."""
-    parts = []
-    inputs = range(draft.layout.order, draft.layout.order + draft.layout.inputs)
-    for vector in (draft.theta, draft.free):
-        blocks = draft.layout.split(vector)
-        taken = {"A": blocks["A"][np.ix_(states, states)], "E": blocks["E"][np.ix_(states, units)]}
-        taken |= {name: blocks[name][list(states)] for name in ("B", "C", "o")}
-        taken |= {name: blocks[name][list(units)] for name in ("F", "s")}
-        taken["W"] = blocks["W"][np.ix_(units, [*states, *inputs])]
-        parts.append({**blocks, **taken})
-    names = tuple(draft.units[unit] for unit in units)
-    return _join(draft, parts, names, draft.states[:, list(states)], effect_steps)
+    return replace(draft.take(states, units), steps=STEPS, effect_steps=effect_steps if units else 0)
 
 
 def _join(
