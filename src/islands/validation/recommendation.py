@@ -211,9 +211,9 @@ def _measure_estimation(entry: Assessment) -> float:
 
 
 def _measure_validation(entry: Assessment) -> float:
-    """Return the free-run error on the validation data relative to the output range."""
+    """Return the free-run error on the predicted validation data relative to the output range."""
     with np.errstate(invalid="ignore", over="ignore"):
-        return max(ROUNDING, float(np.sqrt(np.mean(entry.squared_errors))))
+        return max(ROUNDING, float(np.sqrt(np.nanmean(entry.squared_errors))))
 
 
 def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -46,7 +46,7 @@ class Candidate:
             ),
         )
         known = len(self.blocks) > 0
-        rmse = sqrt(np.mean(self.blocks)) if known else nan
+        rmse = sqrt(np.nanmean(self.blocks)) if known else nan
         return Assessment(
             None,
             {
@@ -145,6 +145,13 @@ def test_the_least_validation_error_by_chance_is_passed_over():
 @pytest.mark.parametrize(("estimated", "size"), [(0.0199, 3), (0.0201, 4), (nan, 4)])
 def test_a_model_with_a_large_error_on_the_estimation_data_is_no_reference(estimated, size):
     assert chosen(Candidate(3, NOISE, estimated=estimated), Candidate(4, 4 * NOISE)) == size
+
+
+def test_samples_without_a_prediction_do_not_hide_a_large_validation_error():
+    warm_up = np.full(3, nan)
+    right = Candidate(6, np.append(warm_up, NOISE), estimated=0.03)
+    lucky = Candidate(6, np.append(warm_up, 25.0 * NOISE), estimated=0.01)
+    assert recommend([6, 7], [right.assessment(), lucky.assessment()], False).rank == 1
 
 
 def test_the_reason_states_that_a_reference_is_left_out():
