@@ -8,13 +8,16 @@ that all other rows of a long record are held out.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.flat_extremes import find_limits
 from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
+from islands.models.latent import StateSpaceLayout
 from islands.simulation.initial_states import Segment, estimate_states, simulate_errors
 
 #: Blocks of a record, samples of a block at least, and the part of each that is held out at least. Slow
@@ -22,10 +25,10 @@ from islands.simulation.initial_states import Segment, estimate_states, simulate
 _BLOCKS, _SMALLEST_BLOCK, _HELD_OUT = 5, 500, 0.2
 
 #: Rows of each block for the estimation in a search, and for the final one, at most.
-_USED_ROWS, _FINAL_ROWS = 1_200, 4_000
+_USED_ROWS, _FINAL_ROWS = 400, 4_000
 
 #: Rows of all blocks for the estimation in a search, at most: of many recordings, some are left out.
-_ALL_USED_ROWS = 15_000
+_ALL_USED_ROWS = 6_000
 
 #: Samples from which the initial states of a block are estimated, at least for a state and at most.
 SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
@@ -34,8 +37,69 @@ SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
 #: that of the states, and the rows before and after the first held-out one, at most.
 _DISTURBED, _DISTURBANCE, _FORGETTING, _DISTURBED_ROWS = 2, 1.5, 1_500, 500
 
+#: Factor of the inputs of free runs that have to remain bounded. Units that are powers may diverge just
+#: outside of the range of the estimation data.
+_LARGER_INPUTS = 1.2
+
 #: Seed of the disturbances: all models are compared with the same ones.
 _SEED = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SignalScales:
+    """Means and standard deviations of the inputs and the output of a record, 1 of a constant.
+
+    Attributes
+    ----------
+    mean, deviation : ndarray, shape (inputs,)
+    level, height : float
+        Mean and standard deviation of the output.
+    """
+
+    mean: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    level: float
+    height: float
+
+    @classmethod
+    def measure(cls, record: Dataset) -> Self:
+        """Measure those of a record."""
+        height = _deviation(record.y[~np.isnan(record.y)])
+        return cls(record.u.mean(axis=0), _deviation(record.u), float(np.nanmean(record.y)), float(height))
+
+    def scale_inputs(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return inputs of the mean 0 and the standard deviation 1."""
+        return (u - self.mean) / self.deviation
+
+    def scale_outputs(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return outputs of the mean 0 and the standard deviation 1."""
+        return (y - self.level) / self.height
+
+    def use_record_units(self, layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the parameters for signals of the record, of those for scaled ones."""
+        found = theta.copy()
+        blocks = layout.split(found)
+        for block in (blocks["B"], blocks["W"][:, layout.order :], blocks["D"]):
+            block[...] = block / self.deviation
+        blocks["o"] -= blocks["B"] @ self.mean
+        blocks["s"] -= blocks["W"][:, layout.order :] @ self.mean
+        for name in ("C", "D", "F", "level"):
+            blocks[name] *= self.height
+        blocks["level"] += self.level - blocks["D"] @ self.mean
+        return found
+
+    def use_scaled_units(self, layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the parameters for scaled signals, of those for signals of the record."""
+        found = theta.copy()
+        blocks = layout.split(found)
+        blocks["level"] -= self.level - blocks["D"] @ self.mean
+        for name in ("C", "D", "F", "level"):
+            blocks[name] /= self.height
+        blocks["o"] += blocks["B"] @ self.mean
+        blocks["s"] += blocks["W"][:, layout.order :] @ self.mean
+        for block in (blocks["B"], blocks["W"][:, layout.order :], blocks["D"]):
+            block[...] = block * self.deviation
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,15 +115,15 @@ class LatentData:
         The same blocks with further rows, for the final estimation.
     whole : tuple of Segment
         The same blocks with all rows up to the next one, which are held out for the comparison of models.
-    variance : float
-        Of the output, by which mean squared errors of the scaled output are multiplied.
+    scales : SignalScales
+        Of the record, in its units.
     """
 
     record: Dataset
     used: tuple[Segment, ...]
     final: tuple[Segment, ...]
     whole: tuple[Segment, ...]
-    variance: float
+    scales: SignalScales
 
 
 def make_latent_data(record: Dataset) -> LatentData:
@@ -70,25 +134,22 @@ def make_latent_data(record: Dataset) -> LatentData:
     record : Dataset
         All inputs are read one sample early, so that the first row of a segment lacks them.
     """
-    height = deviation(record.y)
-    scaled = replace(
-        record,
-        u=(record.u - record.u.mean(axis=0)) / deviation(record.u),
-        y=(record.y - record.y.mean()) / height,
-        preprocessing=None,
-    )
+    scales = SignalScales.measure(record)
+    u, y = scales.scale_inputs(record.u), scales.scale_outputs(record.y)
+    scaled = replace(record, u=u, y=y, preprocessing=None)
+    limits = find_limits(scaled.y).range
     used: list[Segment] = []
     final: list[Segment] = []
     whole: list[Segment] = []
     for begin, end in _spread(list(_cut_blocks(scaled))):
         cut = end - round(_HELD_OUT * (end - begin))
-        used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS)))
-        final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS)))
-        whole.append(_take(scaled, begin, end))
-    return LatentData(scaled, tuple(used), tuple(final), tuple(whole), float(height**2))
+        used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS), limits))
+        final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), limits))
+        whole.append(_take(scaled, begin, end, limits))
+    return LatentData(scaled, tuple(used), tuple(final), tuple(whole), scales)
 
 
-def deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviation of each column, 1 for a constant."""
     found = values.std(axis=0)
     return np.where(found > 0.0, found, 1.0)
@@ -111,10 +172,11 @@ def _spread(blocks: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     return [blocks[at] for at in np.linspace(0, len(blocks) - 1, most).round().astype(int)]
 
 
-def _take(record: Dataset, begin: int, end: int) -> Segment:
+def _take(record: Dataset, begin: int, end: int, limits: tuple[float, float]) -> Segment:
     """Return rows with the inputs at the same samples."""
     first = begin + 1 if begin in {bounds[0] for bounds in record.bounds} else begin
-    return Segment(np.ascontiguousarray(record.u[first - 1 : end - 1]), record.y[first:end].copy())
+    u, y = np.ascontiguousarray(record.u[first - 1 : end - 1]), record.y[first:end].copy()
+    return Segment(u, y, *limits)
 
 
 def count_memory(segment: Segment, order: int) -> int:
@@ -126,8 +188,7 @@ def estimate_start(
     theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, order: int
 ) -> NDArray[np.float64]:
     """Estimate the states at the first row of a block."""
-    rows = count_memory(segment, order)
-    return estimate_states(theta, codes, Segment(segment.u[:rows], segment.y[:rows]), np.zeros(order))
+    return estimate_states(theta, codes, segment.take(0, count_memory(segment, order)), np.zeros(order))
 
 
 def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
@@ -136,7 +197,8 @@ def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
     It is the largest one of several free runs. That of the block goes on, since a start at the held-out rows
     would hide the error of slow states. Another one starts there from estimated states, as a simulation of
     the model does. The others start in the block from disturbed states, which a model with a second
-    equilibrium does not forget. The error is in the squared unit of the output.
+    equilibrium does not forget. The error is in the squared unit of the output. A free run with larger inputs
+    has no error, but may not diverge.
     """
     scales = measure_deviations(fit.theta, fit.codes, data.used[0].u, fit.states[0])
     if scales is None:
@@ -144,13 +206,16 @@ def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
     rng = np.random.default_rng(_SEED)
     blocks = []
     for segment, used, states in zip(data.whole, data.used, fit.states, strict=True):
+        larger = replace(segment, u=_LARGER_INPUTS * segment.u)
+        if simulate_errors(fit.theta, fit.codes, larger, states) is None:
+            return np.inf
         disturbed = _DISTURBANCE * scales * rng.standard_normal((_DISTURBED, len(states)))
         runs = _simulate_held_out(fit, segment, len(used.y), states, disturbed)
         if runs is None:
             return np.inf
         blocks.append(runs)
     errors = [np.concatenate(run) for run in zip(*blocks, strict=True)]
-    return max(_mean_square(each) for each in errors) * data.variance
+    return max(_mean_square(each) for each in errors) * data.scales.height**2
 
 
 def _simulate_held_out(
@@ -161,10 +226,10 @@ def _simulate_held_out(
     disturbed: NDArray[np.float64],
 ) -> list[NDArray[np.float64]] | None:
     """Return the errors of the rows of a block from row ``cut`` on, by free run; None after a divergence."""
-    held_out = Segment(segment.u[cut:], segment.y[cut:])
+    held_out = segment.take(cut, None)
     memory, first = count_memory(held_out, len(states)), max(0, cut - _FORGETTING)
     start = estimate_start(fit.theta, fit.codes, held_out, len(states))
-    late = Segment(*(signal[first : cut + _DISTURBED_ROWS] for signal in (segment.u, segment.y)))
+    late = segment.take(first, cut + _DISTURBED_ROWS)
     runs = [(segment, states, cut), (held_out, start, memory)]
     runs += [(late, each, cut - first) for each in disturbed]
     found = []

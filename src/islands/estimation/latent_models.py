@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.flat_extremes import find_limits
 from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
     LARGEST_MEMORY,
     SAMPLES_PER_STATE,
     LatentData,
-    deviation,
     estimate_start,
     make_latent_data,
     measure_held_out,
@@ -112,7 +112,7 @@ def _gains_much(
     system: FittedStateSpace | EvaluationOutcome, smaller: Sequence[FittedStateSpace], data: LatentData
 ) -> bool:
     """Return whether a system is much better than all smaller ones, and than a constant."""
-    least = min([data.variance, *(each.fitness for each in smaller)])
+    least = min([data.scales.height**2, *(each.fitness for each in smaller)])
     return isinstance(system, FittedStateSpace) and system.fitness < (1.0 - _ORDER_GAIN) * least
 
 
@@ -297,18 +297,9 @@ def make_latent_model(system: FittedStateSpace, data: LatentData, record: Datase
     theta = _write_in_modes(
         layout, np.array(system.theta), system.units, data.used[0].u, np.array(system.states[0])
     )
-    blocks = layout.split(theta)
-    mean, scale = record.u.mean(axis=0), deviation(record.u)
-    level, height = float(record.y.mean()), float(deviation(record.y))
-    for block in (blocks["B"], blocks["W"][:, layout.order :], blocks["D"]):
-        block[...] = block / scale
-    blocks["o"] -= blocks["B"] @ mean
-    blocks["s"] -= blocks["W"][:, layout.order :] @ mean
-    for name in ("C", "D", "F", "level"):
-        blocks[name] *= height
-    blocks["level"] += level - blocks["D"] @ mean
+    radius = float(np.abs(np.linalg.eigvals(layout.split(theta)["A"])).max())
+    theta = data.scales.use_record_units(layout, theta)
     wiring = tuple(name for name, value in zip(layout.names, theta, strict=True) if value != 0.0)
-    radius = float(np.abs(np.linalg.eigvals(blocks["A"])).max())
     decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
     shortest = min(record.segments) * _LARGEST_PART
     # The first sample of a segment lacks its input.
@@ -318,7 +309,8 @@ def make_latent_model(system: FittedStateSpace, data: LatentData, record: Datase
         units=system.units,
         wiring=wiring,
         memory=memory,
-        operating_inputs=tuple(mean.tolist()),
+        operating_inputs=tuple(data.scales.mean.tolist()),
+        limits=find_limits(record.y),
         parameters=tuple(value for value in theta.tolist() if value != 0.0),
         input_names=record.input_names,
         output_name=record.output_name,

@@ -103,7 +103,8 @@ class StateSpaceFit:
         for segment, start in zip(self.segments, self.states, strict=True):
             products = np.empty((size, size))
             rows = accumulate_products(
-                self.theta, self.places, self.codes, segment.u, start, segment.y, columns, products
+                *(self.theta, self.places, self.codes, segment.u, start),
+                *(segment.y, segment.lower, segment.upper, columns, products),
             )
             if rows < len(segment.y) or not np.isfinite(products).all():
                 return None

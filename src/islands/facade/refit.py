@@ -17,9 +17,11 @@ from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR, Criterion
 from islands.estimation.estimators import estimate_with
+from islands.estimation.latent_refit import refit_latent
 from islands.estimation.output_error import refit_output_error
 from islands.estimation.refinement import RefinedModel, refine
 from islands.evolution.search_result import SearchResult, mark_stopped
+from islands.models.latent import LatentModel
 from islands.models.narx import Model, require_narx
 from islands.models.protocol import DynamicModel
 from islands.parallel import map_over_record
@@ -113,6 +115,10 @@ def _estimate(
 ) -> DynamicModel | str:
     """Return a model with the parameters that minimise its criterion; a reason if there are none."""
     model, limits = entry.model, (constraints, entry.warm_up)
+    stop = partial(steps.skip, _REFIT)
+    if isinstance(model, LatentModel):
+        refitted = refit_latent(model, data, _STEPS, stop)
+        return f"the estimation fails ({refitted.reason})" if isinstance(refitted, EvaluationOutcome) else refitted
     found: FittedStructure | RefinedModel[DynamicModel] | EvaluationOutcome | None
     if criterion in (OUTPUT_ERROR, BOX_JENKINS):
         found = refit_output_error(require_narx(model), data, criterion)
@@ -122,7 +128,6 @@ def _estimate(
             found = estimate_with(criterion.estimator, found, data, *limits)
     else:
         has_errors = model.standard_errors is not None
-        stop = partial(steps.skip, _REFIT)
         found = refine(
             model, data, criterion.interval, *limits, _STEPS, standard_errors=has_errors, stop=stop
         )

@@ -229,6 +229,8 @@ def accumulate_products(
     u,
     x,
     y,  # float64 [row]: measured; NaN is left out
+    lower,  # limits of the sensor: a measured limit is no error of a simulation beyond it
+    upper,
     columns,  # number of free parameters; the states at the first row have the columns after them
     out,  # out, float64 [columns + states + 1, columns + states + 1]
 ):
@@ -256,11 +258,12 @@ def accumulate_products(
     for k in range(u.shape[0]):
         signals[n:] = u[k]
         _evaluate_units(theta, at_w, at_bias, codes, signals, h, slope)
-        if not math.isnan(y[k]):
+        error = y[k] - _compute_output(theta, n, signals, h)
+        if not (math.isnan(y[k]) or (y[k] >= upper and error < 0.0) or (y[k] <= lower and error > 0.0)):
             _differentiate_output(theta, places, n, signals, h, slope, now, width, gain, slopes)
             for p in range(free):
                 chunk[p * CHUNK + filled] = slopes[p]
-            chunk[free * CHUNK + filled] = y[k] - _compute_output(theta, n, signals, h)
+            chunk[free * CHUNK + filled] = error
             filled += 1
             if filled == CHUNK:
                 add_tiles(chunk, blocks, 0, tiles, running)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
+from islands.data.flat_extremes import Limits
 from islands.errors import ModelError
 from islands.models.equations import signal_names
 from islands.models.linear_system import LinearSystem, describe_poles
@@ -155,6 +156,8 @@ class LatentModel(ParametricModel):
         Number of samples from which the initial states of a free run are estimated.
     operating_inputs : tuple of float
         Inputs of the operating point, as the means of the estimation data.
+    limits : Limits
+        Least and greatest output that the sensor shows.
 
     Raises
     ------
@@ -170,6 +173,7 @@ class LatentModel(ParametricModel):
     wiring: tuple[str, ...]
     memory: int
     operating_inputs: tuple[float, ...]
+    limits: Limits = Limits()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -340,7 +344,7 @@ class LatentModel(ParametricModel):
         now = [(f"c{place}", f"{name}(k)") for place, name in enumerate(self.states, start=1)]
         now += self._read_inputs("d", "d", 0)
         now += [(f"f{unit}", text) for unit, text in zip(self._places, units[0], strict=True)]
-        sides = {self.signals[0]: self._sum([*now, ("level", "")], write)}
+        sides = {self.signals[0]: self.limits.write(self._sum([*now, ("level", "")], write))}
         for row, state in enumerate(self.states, start=1):
             past = [(f"a{row}_{place}", f"{name}(k-1)") for place, name in enumerate(self.states, start=1)]
             past += self._read_inputs(f"b{row}", f"b{row}_", 1)
@@ -376,7 +380,7 @@ class LatentModel(ParametricModel):
     def document(self) -> dict[str, Any]:
         """Return the model as JSON values."""
         structure: dict[str, Any] = {"order": self.order, "units": list(self.units), "memory": self.memory}
-        structure["operating_inputs"] = list(self.operating_inputs)
+        structure |= {"operating_inputs": list(self.operating_inputs), "limits": list(self.limits)}
         return {**structure, **super().document()}
 
     @classmethod
@@ -387,6 +391,7 @@ class LatentModel(ParametricModel):
             "units": tuple(map(str, document["units"])),
             "memory": int(document["memory"]),
             "operating_inputs": tuple(map(float, document["operating_inputs"])),
+            "limits": Limits(*(None if each is None else float(each) for each in document.get("limits", ()))),
             "wiring": tuple(str(entry["name"]) for entry in document["parameters"]),
         }
 

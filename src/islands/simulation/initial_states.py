@@ -32,10 +32,18 @@ class Segment:
     u : ndarray, shape (rows, inputs)
     y : ndarray, shape (rows,)
         NaN where it is missing.
+    lower, upper : float
+        Limits of the sensor.
     """
 
     u: NDArray[np.float64]
     y: NDArray[np.float64]
+    lower: float = -np.inf
+    upper: float = np.inf
+
+    def take(self, begin: int, end: int | None) -> "Segment":
+        """Return some of the rows."""
+        return Segment(self.u[begin:end], self.y[begin:end], self.lower, self.upper)
 
 
 def simulate_errors(
@@ -54,12 +62,15 @@ def simulate_errors(
     Returns
     -------
     ndarray, shape (rows,), or None
-        NaN where the output is missing.
+        NaN where the output is missing; zero where a limit is measured, and the simulation is beyond it.
     """
     y = np.empty(len(segment.y))
     if simulate_state_space(theta, codes, segment.u, start.copy(), y) < len(y):
         return None
-    return segment.y - y
+    errors = segment.y - y
+    beyond = (segment.y >= segment.upper) & (errors < 0.0) | (segment.y <= segment.lower) & (errors > 0.0)
+    errors[beyond] = 0.0
+    return errors
 
 
 def estimate_states(
@@ -87,7 +98,7 @@ def estimate_states(
         return found
     states, rows = rest, _FIRST_ROWS * len(rest)
     while rows < len(segment.y):
-        part = Segment(segment.u[:rows], segment.y[:rows])
+        part = segment.take(0, rows)
         states = _choose(_minimise(theta, codes, part, states, rest), states)
         rows *= 2
     return _choose(_minimise(theta, codes, segment, states, rest), rest).copy()
@@ -116,7 +127,9 @@ def _minimise(
     products = np.empty((order + 1, order + 1))
     for _ in range(_STATE_STEPS):
         states = best + step
-        rows = accumulate_products(theta, places, codes, segment.u, states, segment.y, 0, products)
+        rows = accumulate_products(
+            *(theta, places, codes, segment.u, states, segment.y, segment.lower, segment.upper, 0, products)
+        )
         error = products[-1, -1] + fixed * float(np.sum((states - rest) ** 2))
         if rows == len(segment.y) and np.isfinite(products).all() and error < least:
             best, least = states, error
@@ -181,7 +194,8 @@ def estimate_initial_states(
     for first in start.tolist():
         begin = first - warm_up
         u, late = read_inputs(record, model, begin, first)
-        x = estimate_states(theta, codes, Segment(u, record.y[begin + late : first]), model.rest)
+        segment = Segment(u, record.y[begin + late : first], *model.limits.range)
+        x = estimate_states(theta, codes, segment, model.rest)
         rows = len(u) - 1
         bounded = simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) == rows
         found.append(x if bounded else np.full(len(x), np.nan))

@@ -6,8 +6,9 @@ import pytest
 from islands.data.dataset import Dataset, join
 from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft
-from islands.estimation.latent_data import make_latent_data, measure_held_out
+from islands.estimation.latent_data import SignalScales, make_latent_data, measure_held_out
 from islands.models.latent import StateSpaceLayout
+from islands.simulation.initial_states import Segment, simulate_errors
 from support.latent_systems import spring_record
 
 
@@ -21,7 +22,7 @@ def test_every_row_is_in_one_block(samples):
     data = make(record)
     # The first sample lacks its input.
     assert sum(len(block.y) for block in data.whole) == samples - 1
-    assert max(len(block.y) for block in data.used) <= 1200
+    assert max(len(block.y) for block in data.used) <= 400
     assert max(len(block.y) for block in data.final) <= 4000
     for used, final, whole in zip(data.used, data.final, data.whole, strict=True):
         assert len(used.y) <= 0.8 * len(whole.y) + 1
@@ -66,10 +67,45 @@ def test_the_error_is_in_the_squared_unit_of_the_output():
     assert errors[1] == pytest.approx(1e6 * errors[0])
 
 
+def fit_spring(cubic, data):
+    """Return a fit of a state whose gain grows with the square of the state."""
+    layout = StateSpaceLayout(1, 1, 1)
+    theta = np.zeros(len(layout.names))
+    for name, value in {"a1_1": 0.5, "b1": 0.2, "c1": 1.0, "e1_1": cubic, "w1_1": 1.0}.items():
+        theta[layout.names.index(name)] = value
+    return Draft(layout, ("cube",), theta, theta != 0.0, np.zeros((len(data.used), 1))).begin(data.used)
+
+
+def test_a_model_that_diverges_for_somewhat_larger_inputs_has_no_error():
+    u = np.sign(np.sin(0.05 * np.arange(1000)))
+    data = make(Dataset(u, np.roll(u, 1), 1.0))
+    # x = 0.5 x + 0.2 u + e x^3 has no equilibrium from u = (2/3) (0.5/(3 e))^0.5 0.5/0.2 on.
+    limits = [(2.0 / 3.0) * np.sqrt(0.5 / (3.0 * cubic)) * 2.5 for cubic in (0.2, 0.4)]
+    assert limits[0] > 1.2 > limits[1] > 1.0
+    errors = [measure_held_out(fit_spring(cubic, data), data) for cubic in (0.2, 0.4)]
+    assert np.isfinite(errors[0])
+    assert errors[1] == np.inf
+    assert fit_spring(0.4, data).mean_square < 10.0
+
+
+def test_parameters_in_the_units_of_the_record_give_its_signals():
+    record = spring_record(300)
+    scales = SignalScales.measure(record)
+    layout, rng = StateSpaceLayout(2, 1, 1), np.random.default_rng(4)
+    theta = 0.3 * rng.standard_normal(len(layout.names))
+    codes, start = np.array([0]), rng.standard_normal(2)
+    scaled = Segment(scales.scale_inputs(record.u), scales.scale_outputs(record.y))
+    errors = simulate_errors(theta, codes, scaled, start)
+    measured = scales.use_record_units(layout, theta)
+    found = simulate_errors(measured, codes, Segment(record.u, record.y), start)
+    assert found == pytest.approx(scales.height * errors)
+    assert scales.use_scaled_units(layout, measured) == pytest.approx(theta)
+
+
 def test_many_recordings_are_used_in_part():
     data = make(join([spring_record(1600, seed=seed) for seed in range(20)]))
-    assert len(data.used) == 12
-    assert sum(len(block.y) for block in data.used) <= 15_000
+    assert len(data.used) == 15
+    assert sum(len(block.y) for block in data.used) <= 6_000
     # The blocks are from the whole record, with the first and the last recording.
     assert np.array_equal(data.whole[0].y, data.record.y[1:1600])
     assert np.array_equal(data.whole[-1].y, data.record.y[-1599:])

@@ -20,6 +20,9 @@ pytestmark = pytest.mark.ci
 ALL_UNITS = np.arange(BELL + 1)
 ORDER, INPUTS, ROWS = 3, 2, 300
 
+#: Limits of a sensor that has none.
+LIMITS = (-np.inf, np.inf)
+
 
 def make_system(codes, seed=0):
     """Return stable parameters, inputs and initial states."""
@@ -76,7 +79,7 @@ def test_the_products_are_those_of_the_derivatives_and_the_error(code):
     places[:4] = -1
     columns = theta.size - 4
     products = np.empty((columns + ORDER + 1,) * 2)
-    assert accumulate_products(theta, places, codes, u, x, y, columns, products) == ROWS
+    assert accumulate_products(theta, places, codes, u, x, y, *LIMITS, columns, products) == ROWS
     values = np.concatenate([theta[4:], x])
 
     def run(moved):
@@ -86,6 +89,24 @@ def test_the_products_are_those_of_the_derivatives_and_the_error(code):
     slopes = np.array([(run(values + step) - run(values - step)) / 2e-6 for step in steps])
     rows = np.vstack([slopes, y - run(values)])[:, known]
     assert products == pytest.approx(rows @ rows.T, rel=1e-4, abs=1e-4)
+
+
+def test_a_measured_limit_is_left_out_where_the_simulation_is_beyond_it():
+    codes = np.array([TANH])
+    theta, u, x = make_system(codes)
+    y = simulate(theta, codes, u, x)
+    lower, upper = np.quantile(y, [0.2, 0.7])
+    measured = np.clip(y, lower, upper)
+    places, size = np.arange(theta.size), theta.size + ORDER + 1
+    inside, missing = np.empty((size, size)), np.empty((size, size))
+    accumulate_products(theta, places, codes, u, x, measured, lower, upper, theta.size, inside)
+    y[(measured == lower) | (measured == upper)] = np.nan
+    accumulate_products(theta, places, codes, u, x, y, *LIMITS, theta.size, missing)
+    assert np.array_equal(inside, missing)
+    # A simulation that does not reach a measured limit has an error.
+    theta[-1] -= 10.0
+    accumulate_products(theta, places, codes, u, x, measured, lower, upper, theta.size, inside)
+    assert inside[-1, -1] > 50.0 * np.count_nonzero(measured == upper)
 
 
 def test_units_have_the_codes_of_the_kernel():
@@ -111,6 +132,6 @@ def test_a_divergence_ends_the_simulation_at_its_row():
     assert rows == int(np.log2(BOUND)) - 1
     fixed = np.full(theta.size, -1)
     found = accumulate_products(
-        theta, fixed, np.zeros(0, np.int64), np.ones((100, 1)), np.ones(1), np.ones(100), 0, products
+        theta, fixed, np.zeros(0, np.int64), np.ones((100, 1)), np.ones(1), np.ones(100), *LIMITS, 0, products
     )
     assert found == rows

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.data.flat_extremes import Limits
 from islands.errors import ModelError
 from islands.export import export
 from islands.models.latent import UNITS, LatentModel, StateSpaceLayout
@@ -70,8 +71,22 @@ def test_a_program_is_the_simulation_from_the_same_states(unit):
     assert found[20:] == pytest.approx(free_run(model, data).y[20:].tolist(), abs=1e-9)
 
 
+def test_the_output_is_limited_as_that_of_the_sensor():
+    model, module = make_model(limits=Limits(-0.5, 0.9)), {}
+    assert model.equation().line.startswith("y(k) = min(max(1.2*x1(k) + 0.3, -0.5), 0.9)")
+    exec(export(model, "python"), module)
+    record = spring_record(300)
+    run, unlimited = (free_run(each, record).y[20:] for each in (model, make_model()))
+    assert run.min() == -0.5
+    assert run.max() == 0.9
+    # The states are those of the sensor without limits, except for their estimate from the warm-up.
+    assert run[60:] == pytest.approx(np.clip(unlimited, -0.5, 0.9)[60:], abs=1e-3)
+    found = module["simulate"](record.u[:, 0].tolist(), record.y[:20].tolist())
+    assert (min(found[20:]), max(found[20:])) == (-0.5, 0.9)
+
+
 def test_a_document_has_the_whole_model():
-    model = make_model(standard_errors=(0.1,) * 10, operating_inputs=(0.2,))
+    model = make_model(standard_errors=(0.1,) * 10, operating_inputs=(0.2,), limits=Limits(None, 2.0))
     assert LatentModel.read(model.document(), "model.json") == model
 
 

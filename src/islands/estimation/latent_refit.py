@@ -1,0 +1,46 @@
+"""Estimation of the parameters of a latent model on a whole record, from those that it has."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.data.flat_extremes import find_limits
+from islands.estimation.fitted_state_space import number
+from islands.estimation.latent_data import SignalScales, estimate_start
+from islands.estimation.state_space_fit import StateSpaceFit
+from islands.models.latent import LatentModel
+from islands.simulation.initial_states import Segment, read_inputs
+from islands.simulation.outcome import EvaluationOutcome, Status
+
+
+def refit_latent(
+    model: LatentModel, record: Dataset, max_steps: int, stop: Callable[[], bool]
+) -> LatentModel | EvaluationOutcome:
+    """Estimate the parameters of a model by the error of the free run of each recording of a record.
+
+    Parameters
+    ----------
+    model : LatentModel
+    record : Dataset
+        Signals of the model.
+    max_steps : int
+        Largest number of steps.
+    stop : callable
+        Whether to end the estimation with the parameters so far.
+    """
+    scales, layout = SignalScales.measure(record), model.layout
+    theta = scales.use_scaled_units(layout, model.theta)
+    limits = scales.scale_outputs(np.array(find_limits(record.y).range))
+    segments = []
+    for begin, end in record.bounds:
+        u, late = read_inputs(record, model, begin, end)
+        segments.append(Segment(scales.scale_inputs(u), scales.scale_outputs(record.y[begin + late : end]), *limits))
+    states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
+    free = np.isin(layout.names, model.wiring)
+    fit = StateSpaceFit(theta, number(free), model.codes, segments, states)
+    if not np.isfinite(fit.mean_square):
+        return EvaluationOutcome(Status.DIVERGED, "a free run of the state space diverges")
+    fit.advance(max_steps, stop)
+    found = scales.use_record_units(layout, fit.theta)
+    return model.with_parameters(found[free].tolist())
