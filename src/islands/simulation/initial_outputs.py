@@ -208,7 +208,7 @@ def _linearise(
 ) -> tuple[NDArray[np.float64], float, float] | None:
     """Return better changes, the noise with them, and the factor of its variance in the mean squared error.
 
-    None if a simulation diverges.
+    None if a simulation diverges, or if the effects of the initial outputs are equal up to rounding.
     """
     depth = changes.shape[1]
     run = free_run(model, _perturb(record, depth, first, step), first)
@@ -227,7 +227,10 @@ def _linearise(
         # The initial outputs themselves are measured, too.
         normal = np.eye(depth) + np.einsum("ik,jk->ij", columns, columns)
         right = np.einsum("ik,k->i", columns, error) - changes[place]
-        further = np.linalg.solve(normal, right)
+        try:
+            further = np.linalg.solve(normal, right)
+        except np.linalg.LinAlgError:
+            return None
         solved[place] = changes[place] + further
         left = y[rows] - base[rows] - np.einsum("i,ik->k", further, slopes[:, rows])
         squares += float(np.add.reduce(left[: window.size] ** 2) + np.add.reduce(solved[place] ** 2))

@@ -263,8 +263,10 @@ def _describe_saturation(record: Dataset) -> str:
     A limited output and the output of a system at its limit look the same, so that the samples are used.
     """
     channel = channels(record)[-1]
-    if channel.known.size < _LEAST_SATURATED or np.ptp(channel.known) == 0.0:
-        return ""
+    # The range of numbers of the largest magnitude is infinite; a search refuses them.
+    with np.errstate(over="ignore"):
+        if channel.known.size < _LEAST_SATURATED or not 0.0 < np.ptp(channel.known) < np.inf:
+            return ""
     fact = find_saturation(channel, find_quantisation(channel))
     if not fact.value:
         return ""
