@@ -47,6 +47,10 @@ class Limits(NamedTuple):
         return text if self.upper is None else f"min({text}, {self.upper!r})"
 
 
+#: Limits of a sensor that has none.
+NO_LIMITS = Limits()
+
+
 def find_limits(values: NDArray[np.float64]) -> Limits:
     """Return the flat extremes of a signal; none of one that is held between steps or has two levels.
 
@@ -58,7 +62,7 @@ def find_limits(values: NDArray[np.float64]) -> Limits:
     levels = np.unique(values[np.isfinite(values)])
     step = find_step(levels) or 0.0
     if levels.size <= TWO or is_held(values, step):
-        return Limits()
+        return NO_LIMITS
     lower, upper = (count_flat(sign * values, step) > 0 for sign in (-1.0, 1.0))
     return Limits(float(levels[0]) if lower else None, float(levels[-1]) if upper else None)
 

@@ -7,6 +7,7 @@ that all other rows of a long record are held out.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Self
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.data.flat_extremes import find_limits
+from islands.data.input_lead import advance_all_inputs
 from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import StateSpaceLayout
@@ -104,11 +106,14 @@ class SignalScales:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LatentData:
-    """A record with the standard deviation 1 of all signals, in blocks.
+    """A record and its blocks, all signals of which have the standard deviation 1.
 
     Attributes
     ----------
     record : Dataset
+        In the units of the signals, with all inputs one sample early.
+    scaled : Dataset
+        The same record with the standard deviation 1 of all signals.
     used : tuple of Segment
         Blocks for the estimation.
     final : tuple of Segment
@@ -116,27 +121,28 @@ class LatentData:
     whole : tuple of Segment
         The same blocks with all rows up to the next one, which are held out for the comparison of models.
     scales : SignalScales
-        Of the record, in its units.
+        Of the record.
     """
 
     record: Dataset
+    scaled: Dataset
     used: tuple[Segment, ...]
     final: tuple[Segment, ...]
     whole: tuple[Segment, ...]
     scales: SignalScales
 
 
+# The islands of a process share the blocks of a record.
+@lru_cache(maxsize=2)
 def make_latent_data(record: Dataset) -> LatentData:
     """Scale a record and cut blocks out of it.
 
-    Parameters
-    ----------
-    record : Dataset
-        All inputs are read one sample early, so that the first row of a segment lacks them.
+    All inputs are read one sample early, so that the first row of a segment lacks them.
     """
+    record = advance_all_inputs(record)
     scales = SignalScales.measure(record)
     u, y = scales.scale_inputs(record.u), scales.scale_outputs(record.y)
-    scaled = replace(record, u=u, y=y, preprocessing=None)
+    scaled = replace(record, u=u, y=y)
     limits = find_limits(scaled.y).range
     used: list[Segment] = []
     final: list[Segment] = []
@@ -146,7 +152,7 @@ def make_latent_data(record: Dataset) -> LatentData:
         used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS), limits))
         final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), limits))
         whole.append(_take(scaled, begin, end, limits))
-    return LatentData(scaled, tuple(used), tuple(final), tuple(whole), scales)
+    return LatentData(record, scaled, tuple(used), tuple(final), tuple(whole), scales)
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -179,7 +185,7 @@ def _take(record: Dataset, begin: int, end: int, limits: tuple[float, float]) ->
     return Segment(u, y, *limits)
 
 
-def count_memory(segment: Segment, order: int) -> int:
+def _count_memory(segment: Segment, order: int) -> int:
     """Return the number of rows from which initial states are estimated."""
     return min(len(segment.y) // 3, max(SAMPLES_PER_STATE * order, LARGEST_MEMORY))
 
@@ -188,7 +194,7 @@ def estimate_start(
     theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, order: int
 ) -> NDArray[np.float64]:
     """Estimate the states at the first row of a block."""
-    return estimate_states(theta, codes, segment.take(0, count_memory(segment, order)), np.zeros(order))
+    return estimate_states(theta, codes, segment.take(0, _count_memory(segment, order)), np.zeros(order))
 
 
 def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
@@ -227,7 +233,7 @@ def _simulate_held_out(
 ) -> list[NDArray[np.float64]] | None:
     """Return the errors of the rows of a block from row ``cut`` on, by free run; None after a divergence."""
     held_out = segment.take(cut, None)
-    memory, first = count_memory(held_out, len(states)), max(0, cut - _FORGETTING)
+    memory, first = _count_memory(held_out, len(states)), max(0, cut - _FORGETTING)
     start = estimate_start(fit.theta, fit.codes, held_out, len(states))
     late = segment.take(first, cut + _DISTURBED_ROWS)
     runs = [(segment, states, cut), (held_out, start, memory)]

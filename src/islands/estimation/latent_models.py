@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.data.flat_extremes import find_limits
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
     LARGEST_MEMORY,
@@ -73,8 +72,8 @@ def search_linear_models(record: Dataset, steps: Steps) -> list[LatentModel]:
         Models that no other one exceeds in both the number of parameters and the held-out error, the smallest
         first; the last one has the least error. Empty if the record is too short.
     """
-    data = make_latent_data(advance_all_inputs(record))
-    return estimate_models(find_front(fit_linear_systems(data, steps)), data, record, steps)
+    data = make_latent_data(record)
+    return estimate_models(find_front(fit_linear_systems(data, steps)), record, steps)
 
 
 def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]:
@@ -91,7 +90,7 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
         if found and steps.skip("linear state spaces of larger orders"):
             break
         steps.report(f"linear state space of order {order}", 0.0)
-        model = fit_linear_state_space(data.record[:_LINEAR_ROWS], order)
+        model = fit_linear_state_space(data.scaled[:_LINEAR_ROWS], order)
         if model is None:
             continue
         theta, free = model.theta, np.ones(model.theta.size, bool)
@@ -135,9 +134,7 @@ def find_front(systems: Sequence[FittedStateSpace], gain: float = _NEGLIGIBLE) -
     return front
 
 
-def estimate_models(
-    front: Sequence[FittedStateSpace], data: LatentData, record: Dataset, steps: Steps
-) -> list[LatentModel]:
+def estimate_models(front: Sequence[FittedStateSpace], record: Dataset, steps: Steps) -> list[LatentModel]:
     """Reduce the systems of a front, estimate them on longer blocks, and return the models.
 
     If the output of the system with the least error reads an input at sample k, the inputs of all models are
@@ -147,15 +144,13 @@ def estimate_models(
     ----------
     front : sequence of FittedStateSpace
         The smallest first. No models if it is empty.
-    data : LatentData
-        Blocks of the record with all inputs one sample early.
     record : Dataset
-        The record itself.
     steps : Steps
     """
     if not front:
         return []
     steps.report("final estimation of state spaces", 0.7)
+    data = make_latent_data(record)
     with ThreadPoolExecutor() as threads:
         best = _remove_blocks(front[-1], data, direct=True)
         direct = best.reads_at_once
@@ -165,8 +160,7 @@ def estimate_models(
         # Systems may be equal once blocks are removed.
         different = {each.key: each for each in map(_remove_idle_units, reduced)}
         finished = threads.map(partial(_finish, data=data, steps=steps), different.values())
-        advanced = advance_all_inputs(record)
-        models = [make_latent_model(each, data, advanced) for each in finished]
+        models = [make_latent_model(each, data) for each in finished]
     return models if direct else [replace(each, input_names=record.input_names) for each in models]
 
 
@@ -282,7 +276,7 @@ def _transform(
     return found
 
 
-def make_latent_model(system: FittedStateSpace, data: LatentData, record: Dataset) -> LatentModel:
+def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel:
     """Return the model of a system in the units of a record.
 
     Parameters
@@ -290,10 +284,8 @@ def make_latent_model(system: FittedStateSpace, data: LatentData, record: Datase
     system : FittedStateSpace
     data : LatentData
         Blocks of the record.
-    record : Dataset
-        The record with all inputs one sample early.
     """
-    layout = system.layout
+    layout, record = system.layout, data.record
     theta = _write_in_modes(
         layout, np.array(system.theta), system.units, data.used[0].u, np.array(system.states[0])
     )

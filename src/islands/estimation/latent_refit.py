@@ -35,7 +35,8 @@ def refit_latent(
     segments = []
     for begin, end in record.bounds:
         u, late = read_inputs(record, model, begin, end)
-        segments.append(Segment(scales.scale_inputs(u), scales.scale_outputs(record.y[begin + late : end]), *limits))
+        y = scales.scale_outputs(record.y[begin + late : end])
+        segments.append(Segment(scales.scale_inputs(u), y, *limits))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
     fit = StateSpaceFit(theta, number(free), model.codes, segments, states)

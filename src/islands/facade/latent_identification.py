@@ -8,7 +8,6 @@ from islands.data.split import Split
 from islands.errors import SettingsError
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.fitted_state_space import FittedStateSpace
-from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front
 from islands.evolution.engine import Engine
 from islands.evolution.latent.problem import LatentProblem, make_latent_problem
@@ -121,5 +120,4 @@ def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> list[
     entries = state.archipelago.hall_of_fame.entries
     evolved = [each for each in entries if isinstance(each, FittedStateSpace)]
     front = find_front([*problem.linear, *evolved], _GAIN)[-_MOST_MODELS:]
-    data = make_latent_data(advance_all_inputs(problem.record))
-    return estimate_models(front, data, problem.record, steps)
+    return estimate_models(front, problem.record, steps)

@@ -118,7 +118,7 @@ def _estimate(
     stop = partial(steps.skip, _REFIT)
     if isinstance(model, LatentModel):
         refitted = refit_latent(model, data, _STEPS, stop)
-        return f"the estimation fails ({refitted.reason})" if isinstance(refitted, EvaluationOutcome) else refitted
+        return refitted if isinstance(refitted, LatentModel) else f"the estimation fails ({refitted.reason})"
     found: FittedStructure | RefinedModel[DynamicModel] | EvaluationOutcome | None
     if criterion in (OUTPUT_ERROR, BOX_JENKINS):
         found = refit_output_error(require_narx(model), data, criterion)

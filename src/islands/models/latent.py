@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
-from islands.data.flat_extremes import Limits
+from islands.data.flat_extremes import NO_LIMITS, Limits
 from islands.errors import ModelError
 from islands.models.equations import signal_names
 from islands.models.linear_system import LinearSystem, describe_poles
@@ -173,7 +173,7 @@ class LatentModel(ParametricModel):
     wiring: tuple[str, ...]
     memory: int
     operating_inputs: tuple[float, ...]
-    limits: Limits = Limits()
+    limits: Limits = NO_LIMITS
 
     def __post_init__(self) -> None:
         super().__post_init__()

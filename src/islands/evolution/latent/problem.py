@@ -12,7 +12,6 @@ from numpy.random import Generator, SeedSequence
 from threadpoolctl import threadpool_limits
 
 from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import fit_linear_systems, make_latent_model
@@ -73,9 +72,7 @@ class LatentProblem:
 
     def make_model(self, individual: AnyIndividual) -> LatentModel:
         """Return the model of a system before the final estimation."""
-        advanced = advance_all_inputs(self.record)
-        system = cast("FittedStateSpace", individual)
-        return make_latent_model(system, make_latent_data(advanced), advanced)
+        return make_latent_model(cast("FittedStateSpace", individual), make_latent_data(self.record))
 
 
 def make_latent_problem(record: Dataset, settings: Settings, steps: Steps) -> LatentProblem:
@@ -86,7 +83,7 @@ def make_latent_problem(record: Dataset, settings: Settings, steps: Steps) -> La
     StoppedError
         A stop is requested before the first linear system.
     """
-    linear = fit_linear_systems(make_latent_data(advance_all_inputs(record)), steps)
+    linear = fit_linear_systems(make_latent_data(record), steps)
     return LatentProblem(record, settings, tuple(linear))
 
 
@@ -102,7 +99,7 @@ class LatentEvolution:
 
     def __init__(self, problem: LatentProblem, threads: int) -> None:
         self.problem, self._threads = problem, threads
-        self._data: LatentData = make_latent_data(advance_all_inputs(problem.record))
+        self._data: LatentData = make_latent_data(problem.record)
         self._rows = sum(len(block.y) for block in self._data.used)
 
     @property

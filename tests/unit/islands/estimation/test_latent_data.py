@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset, join
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import Draft
 from islands.estimation.latent_data import SignalScales, make_latent_data, measure_held_out
 from islands.models.latent import StateSpaceLayout
@@ -12,14 +11,10 @@ from islands.simulation.initial_states import Segment, simulate_errors
 from support.latent_systems import spring_record
 
 
-def make(record):
-    return make_latent_data(advance_all_inputs(record))
-
-
 @pytest.mark.parametrize("samples", [240, 3000, 30_000])
 def test_every_row_is_in_one_block(samples):
     record = spring_record(samples)
-    data = make(record)
+    data = make_latent_data(record)
     # The first sample lacks its input.
     assert sum(len(block.y) for block in data.whole) == samples - 1
     assert max(len(block.y) for block in data.used) <= 400
@@ -31,14 +26,14 @@ def test_every_row_is_in_one_block(samples):
 
 
 def test_blocks_do_not_cross_segments():
-    data = make(join([spring_record(700), spring_record(300, seed=3)]))
+    data = make_latent_data(join([spring_record(700), spring_record(300, seed=3)]))
     assert [len(block.y) for block in data.whole] == [699, 299]
 
 
 def test_signals_have_the_standard_deviation_1():
-    data = make(spring_record(500))
-    assert data.record.y.std() == pytest.approx(1.0)
-    assert data.record.u.std() == pytest.approx(1.0)
+    data = make_latent_data(spring_record(500))
+    assert data.scaled.y.std() == pytest.approx(1.0)
+    assert data.scaled.u.std() == pytest.approx(1.0)
 
 
 def fit_bistable(weight, data):
@@ -54,7 +49,7 @@ def fit_bistable(weight, data):
 
 def test_a_second_equilibrium_has_a_large_error():
     u = np.random.default_rng(0).standard_normal(1000)
-    data = make(Dataset(u, u, 1.0))
+    data = make_latent_data(Dataset(u, u, 1.0))
     one, two = (measure_held_out(fit_bistable(weight, data), data) for weight in (0.2, 1.0))
     assert one < 1.5 * np.var(u)
     assert two > 3.0 * np.var(u)
@@ -62,7 +57,7 @@ def test_a_second_equilibrium_has_a_large_error():
 
 def test_the_error_is_in_the_squared_unit_of_the_output():
     u = np.random.default_rng(0).standard_normal(1000)
-    small, large = (make(Dataset(u, factor * u, 1.0)) for factor in (1.0, 1e3))
+    small, large = (make_latent_data(Dataset(u, factor * u, 1.0)) for factor in (1.0, 1e3))
     errors = [measure_held_out(fit_bistable(0.2, each), each) for each in (small, large)]
     assert errors[1] == pytest.approx(1e6 * errors[0])
 
@@ -78,7 +73,7 @@ def fit_spring(cubic, data):
 
 def test_a_model_that_diverges_for_somewhat_larger_inputs_has_no_error():
     u = np.sign(np.sin(0.05 * np.arange(1000)))
-    data = make(Dataset(u, np.roll(u, 1), 1.0))
+    data = make_latent_data(Dataset(u, np.roll(u, 1), 1.0))
     # x = 0.5 x + 0.2 u + e x^3 has no equilibrium from u = (2/3) (0.5/(3 e))^0.5 0.5/0.2 on.
     limits = [(2.0 / 3.0) * np.sqrt(0.5 / (3.0 * cubic)) * 2.5 for cubic in (0.2, 0.4)]
     assert limits[0] > 1.2 > limits[1] > 1.0
@@ -103,9 +98,9 @@ def test_parameters_in_the_units_of_the_record_give_its_signals():
 
 
 def test_many_recordings_are_used_in_part():
-    data = make(join([spring_record(1600, seed=seed) for seed in range(20)]))
+    data = make_latent_data(join([spring_record(1600, seed=seed) for seed in range(20)]))
     assert len(data.used) == 15
     assert sum(len(block.y) for block in data.used) <= 6_000
     # The blocks are from the whole record, with the first and the last recording.
-    assert np.array_equal(data.whole[0].y, data.record.y[1:1600])
-    assert np.array_equal(data.whole[-1].y, data.record.y[-1599:])
+    assert np.array_equal(data.whole[0].y, data.scaled.y[1:1600])
+    assert np.array_equal(data.whole[-1].y, data.scaled.y[-1599:])

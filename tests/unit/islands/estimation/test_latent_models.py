@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import (
@@ -33,8 +32,7 @@ def resonances_record(samples):
 
 
 def fit(record):
-    data = make_latent_data(advance_all_inputs(record))
-    return fit_linear_systems(data, Steps())
+    return fit_linear_systems(make_latent_data(record), Steps())
 
 
 @pytest.mark.ci
@@ -82,7 +80,6 @@ def test_units_that_act_on_nothing_are_removed():
 
 def test_models_of_a_front_have_different_structures():
     record = spring_record(240, noise=0.02)
-    data = make_latent_data(advance_all_inputs(record))
-    systems = fit_linear_systems(data, Steps())
-    models = estimate_models([systems[1], systems[1], systems[2]], data, record, Steps())
+    systems = fit(record)
+    models = estimate_models([systems[1], systems[1], systems[2]], record, Steps())
     assert [each.order for each in models] == [2, 3]

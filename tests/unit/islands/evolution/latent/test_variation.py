@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import fit_linear_systems
 from islands.evolution.latent import variation
@@ -17,7 +16,7 @@ from support.latent_systems import spring_record
 
 @pytest.fixture(scope="module")
 def data():
-    return make_latent_data(advance_all_inputs(spring_record(300, noise=0.02)))
+    return make_latent_data(spring_record(300, noise=0.02))
 
 
 @pytest.fixture(scope="module")

@@ -117,5 +117,6 @@ def test_an_output_that_is_flat_at_an_extreme_is_stated(tmp_path):
     assert note.endswith("in 9.7 % of the samples: it may be saturated; these samples are used")
     assert read_record(write(tmp_path / "s.csv"), ["u"], "y").reading == ()
     # The range of these numbers is infinite.
-    huge = write(tmp_path / "t.csv", y=np.where(Y > np.median(Y), 1.5e308, -1.5e308) * (1.0 - 1e-3 * np.sin(Y)))
+    signs = np.where(np.median(Y) < Y, 1.5e308, -1.5e308)
+    huge = write(tmp_path / "t.csv", y=signs * (1.0 - 1e-3 * np.sin(Y)))
     assert read_record(huge, ["u"], "y").reading == ()
