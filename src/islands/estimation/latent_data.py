@@ -27,7 +27,7 @@ from islands.simulation.initial_states import Segment, estimate_states, simulate
 _BLOCKS, _SMALLEST_BLOCK, _HELD_OUT = 5, 500, 0.2
 
 #: Rows of each block for the estimation in a search, and for the final one, at most.
-_USED_ROWS, _FINAL_ROWS = 400, 4_000
+_USED_ROWS, _FINAL_ROWS = 600, 4_000
 
 #: Rows of all blocks for the estimation in a search, at most: of many recordings, some are left out.
 _ALL_USED_ROWS = 6_000

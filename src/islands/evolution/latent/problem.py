@@ -39,6 +39,9 @@ _FIRST_UNITS = (
 #: the first population. On held-out rows, a linear system may drift whose units would not.
 _LARGEST_RATIO = 4.0
 
+#: Rows of the criterion of the elite, at most: of a long record, its penalty would have no effect.
+_MOST_ROWS = 6_000
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LatentProblem:
@@ -100,7 +103,7 @@ class LatentEvolution:
     def __init__(self, problem: LatentProblem, threads: int) -> None:
         self.problem, self._threads = problem, threads
         self._data: LatentData = make_latent_data(problem.record)
-        self._rows = sum(len(block.y) for block in self._data.used)
+        self._rows = min(problem.record.samples, _MOST_ROWS)
 
     @property
     def memory(self) -> Caches:

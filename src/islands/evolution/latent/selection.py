@@ -26,7 +26,7 @@ def select_latent_elite(
     systems : iterable of FittedStateSpace
     count : int
     rows : int
-        Rows of the estimation.
+        Samples of the criterion.
 
     Returns
     -------

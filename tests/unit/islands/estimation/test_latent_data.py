@@ -17,8 +17,8 @@ def test_every_row_is_in_one_block(samples):
     data = make_latent_data(record)
     # The first sample lacks its input.
     assert sum(len(block.y) for block in data.whole) == samples - 1
-    assert max(len(block.y) for block in data.used) <= 400
-    assert max(len(block.y) for block in data.final) <= 4000
+    assert max(len(block.y) for block in data.used) <= 600
+    assert max(len(block.y) for block in data.final) <= 6000
     for used, final, whole in zip(data.used, data.final, data.whole, strict=True):
         assert len(used.y) <= 0.8 * len(whole.y) + 1
         assert np.array_equal(used.y, whole.y[: len(used.y)])
@@ -99,7 +99,7 @@ def test_parameters_in_the_units_of_the_record_give_its_signals():
 
 def test_many_recordings_are_used_in_part():
     data = make_latent_data(join([spring_record(1600, seed=seed) for seed in range(20)]))
-    assert len(data.used) == 15
+    assert len(data.used) == 10
     assert sum(len(block.y) for block in data.used) <= 6_000
     # The blocks are from the whole record, with the first and the last recording.
     assert np.array_equal(data.whole[0].y, data.scaled.y[1:1600])
