@@ -11,7 +11,7 @@ from support.latent_systems import smooth_input
 #: Fields of a row of the document.
 FIELDS = {
     *("benchmark", "test", "metric", "unit", "model", "median", "worst", "per_seed", "published", "linear"),
-    *("terms", "parameters", "wall_s", "is_tuned"),
+    *("claimed", "coverage", "terms", "parameters", "wall_s", "is_tuned"),
 }
 
 
@@ -58,6 +58,8 @@ def test_a_run_has_a_row_for_each_class_and_test(folder):
     assert rows["latent"]["linear"] == rows["linear"]["median"]
     assert rows["latent"]["published"][0]["value"] == 0.191
     assert "cascaded-tanks, RMSE in V" in shown
+    assert all(title in shown for title in ("claimed", "coverage"))
+    assert (rows["linear"]["claimed"], rows["linear"]["coverage"]) == (None, None)
     for row in rows.values():  # a search that the budget ends has a model or a reason
         assert (row["median"] is None) == (row["per_seed"][0]["reason"] is not None)
 

@@ -1,13 +1,13 @@
 """Rows of a benchmark: searches on the estimation data, their models on each test, published errors."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, isfinite
 from statistics import median
 
 from islands.benchmarks.definition import CLASSES, LINEAR, METRIC, Benchmark, BenchmarkData, PublishedError
 from islands.benchmarks.model_searches import MODEL_SEARCHES, ModelSearch, count_terms
-from islands.benchmarks.scoring import measure_rmse
+from islands.benchmarks.scoring import measure_coverage, measure_rmse
 from islands.errors import IslandsError, SettingsError, check_at_least, check_seconds, lookup
 from islands.progress import ProgressCallback, Stop, StoppedError, ignore_progress, never_stop, report_part
 
@@ -69,6 +69,12 @@ class SeedOutcome:
     terms, parameters : int or None
         None without a model.
     wall_s : float
+    claimed : float or None
+        Error on the validation data in this unit, with the parameters before an estimation on all data. None
+        without validation data or without a model.
+    coverage : mapping
+        Fraction of the samples of each test inside of the band of 90 %, or None without a band. Tests without
+        an error are absent.
     """
 
     seed: int
@@ -76,15 +82,22 @@ class SeedOutcome:
     terms: int | None
     parameters: int | None
     wall_s: float
+    claimed: float | None = None
+    coverage: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class SeedError:
-    """Error of one seed on one test; None with a reason if there is none."""
+    """Error of one seed on one test; None with a reason if there is none.
+
+    ``claimed`` and ``coverage`` are those of a `SeedOutcome`.
+    """
 
     seed: int
     error: float | None
     reason: str | None
+    claimed: float | None
+    coverage: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +109,10 @@ class BenchmarkRow:
     benchmark, test, metric, unit, model : str
     median, worst : float or None
         Over the seeds. A seed without an error counts as infinite, which is None.
+    claimed : float or None
+        Error on the validation data that the results state; median of the seeds with one.
+    coverage : float or None
+        Fraction of the samples of the test inside of the band of 90 %; median of the seeds with a band.
     per_seed : tuple of SeedError
     published : tuple of PublishedError
         The smallest first.
@@ -114,6 +131,8 @@ class BenchmarkRow:
     model: str
     median: float | None
     worst: float | None
+    claimed: float | None
+    coverage: float | None
     per_seed: tuple[SeedError, ...]
     published: tuple[PublishedError, ...]
     linear: float | None
@@ -190,21 +209,24 @@ def _search(
         return stop() or (budget is not None and clock() - began >= budget)
 
     try:
-        model = search.find(data.estimation, seed, progress, must_stop)
+        found = search.find(data.estimation, seed, progress, must_stop)
     except IslandsError as error:
         reason = str(error)
         if isinstance(error, StoppedError):
             reason = f"the budget ends before the first model, at: {error.step}"
         return SeedOutcome(seed, dict.fromkeys(data.tests, reason), None, None, clock() - began)
-    wall_s = clock() - began
+    wall_s, model = clock() - began, found.model
     errors: dict[str, float | str] = {}
+    coverage: dict[str, float | None] = {}
     for name, test in data.tests.items():
         progress(f"test {name}", 1.0)
         try:
             errors[name] = benchmark.scale * measure_rmse(model, test)
+            coverage[name] = measure_coverage(model, found.bands, test)
         except IslandsError as error:
             errors[name] = str(error)
-    return SeedOutcome(seed, errors, count_terms(model), len(model.parameters), wall_s)
+    claimed = None if found.claimed is None else benchmark.scale * found.claimed
+    return SeedOutcome(seed, errors, count_terms(model), len(model.parameters), wall_s, claimed, coverage)
 
 
 def make_rows(
@@ -244,11 +266,13 @@ def _make_row(
         model=kind,
         median=_median(outcomes, test),
         worst=_finite(max(_as_number(each.errors[test]) for each in outcomes)),
+        claimed=_median_known([each.claimed for each in outcomes]),
+        coverage=_median_known([each.coverage.get(test) for each in outcomes]),
         per_seed=tuple(_describe_seed(each, test) for each in outcomes),
         published=benchmark.published.get(test, ()),
         linear=linear,
-        terms=_median_size([each.terms for each in outcomes]),
-        parameters=_median_size([each.parameters for each in outcomes]),
+        terms=_median_known([each.terms for each in outcomes]),
+        parameters=_median_known([each.parameters for each in outcomes]),
         wall_s=median(each.wall_s for each in outcomes),
         is_tuned=benchmark.is_tuned,
     )
@@ -258,8 +282,8 @@ def _median(outcomes: Sequence[SeedOutcome], test: str) -> float | None:
     return _finite(median(_as_number(each.errors[test]) for each in outcomes))
 
 
-def _median_size(sizes: Sequence[int | None]) -> float | None:
-    known = [each for each in sizes if each is not None]
+def _median_known(values: Sequence[float | None]) -> float | None:
+    known = [each for each in values if each is not None]
     return median(known) if known else None
 
 
@@ -273,8 +297,5 @@ def _finite(value: float) -> float | None:
 
 def _describe_seed(outcome: SeedOutcome, test: str) -> SeedError:
     error = outcome.errors[test]
-    return (
-        SeedError(outcome.seed, None, error)
-        if isinstance(error, str)
-        else SeedError(outcome.seed, error, None)
-    )
+    value, reason = (None, error) if isinstance(error, str) else (error, None)
+    return SeedError(outcome.seed, value, reason, outcome.claimed, outcome.coverage.get(test))

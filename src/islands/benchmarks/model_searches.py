@@ -6,6 +6,7 @@ separate tests.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from types import MappingProxyType
 from typing import Protocol
 
@@ -16,19 +17,41 @@ from islands.data.input_lead import advance_all_inputs
 from islands.errors import SettingsError
 from islands.estimation.latent_models import search_linear_models
 from islands.facade.coupled.identification import fit_coupled
+from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit_record
+from islands.facade.results.fitted_model import FittedModel
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.progress import ProgressCallback, Steps, Stop
 from islands.simulation.predictors import free_run
+from islands.validation.prediction_bands import PredictionBands
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundModel:
+    """Recommended model of a search, and what the search states about its predictions.
+
+    Attributes
+    ----------
+    model : DynamicModel or CoupledModel
+    claimed : float or None
+        RMSE of the free run on the validation data, over all outputs, with the parameters before an
+        estimation on all data. None if the search keeps no data for the validation.
+    bands : tuple of PredictionBands
+        One for each output; empty if there are none.
+    """
+
+    model: AnyModel
+    claimed: float | None = None
+    bands: tuple[PredictionBands, ...] = ()
 
 
 class FindModel(Protocol):
     """Search of a model on estimation data of one output or of several."""
 
-    def __call__(self, record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
+    def __call__(self, record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> FoundModel:
         """Return the recommended model.
 
         Raises
@@ -68,23 +91,42 @@ def count_terms(model: AnyModel) -> int:
     raise SettingsError(f"a {type(model).__name__} has no terms")
 
 
-def _find_latent(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
+def _find_latent(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> FoundModel:
     if isinstance(record, CoupledRecord):
-        return fit_coupled(record, model=LATENT, seed=seed, progress=progress, stop=stop).model
-    return fit_record(record, model=LATENT, seed=seed, refit="all", progress=progress, stop=stop).best.model
+        return _take_all(fit_coupled(record, model=LATENT, seed=seed, progress=progress, stop=stop))
+    found = fit_record(record, model=LATENT, seed=seed, refit="all", progress=progress, stop=stop)
+    return _take_one(found.best)
 
 
-def _find_narx(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
+def _find_narx(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> FoundModel:
     if isinstance(record, CoupledRecord):
-        return fit_coupled(record, seed=seed, progress=progress, stop=stop).model
-    return fit_record(record, seed=seed, refit="all", progress=progress, stop=stop).best.model
+        return _take_all(fit_coupled(record, seed=seed, progress=progress, stop=stop))
+    return _take_one(fit_record(record, seed=seed, refit="all", progress=progress, stop=stop).best)
 
 
-def _find_linear(record: AnyRecord, _seed: int, progress: ProgressCallback, stop: Stop, /) -> AnyModel:
+def _take_one(best: FittedModel) -> FoundModel:
+    """Return the recommended model of one output."""
+    bands = () if best.prediction_bands is None else (best.prediction_bands,)
+    return FoundModel(best.model, _claim([best.metrics["validation"]["free_run"].rmse]), bands)
+
+
+def _take_all(found: CoupledResult) -> FoundModel:
+    """Return the model of several outputs."""
+    errors = [parts["validation"]["free_run"].rmse for parts in found.metrics.values()]
+    return FoundModel(found.model, _claim(errors), found.prediction_bands)
+
+
+def _claim(errors: list[float]) -> float | None:
+    """Return the RMSE over all outputs; None if the free run diverges."""
+    claimed = (sum(each**2 for each in errors) / len(errors)) ** 0.5
+    return claimed if isfinite(claimed) else None
+
+
+def _find_linear(record: AnyRecord, _seed: int, progress: ProgressCallback, stop: Stop, /) -> FoundModel:
     if isinstance(record, CoupledRecord):
         found = [_find_linear_model(advance_all_inputs(each), progress, stop) for each in record.records]
-        return CoupledLatentModel(tuple(found))
-    return _find_linear_model(record, progress, stop)
+        return FoundModel(CoupledLatentModel(tuple(found)))
+    return FoundModel(_find_linear_model(record, progress, stop))
 
 
 def _find_linear_model(record: Dataset, progress: ProgressCallback, stop: Stop) -> LatentModel:

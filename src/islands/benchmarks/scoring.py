@@ -1,18 +1,26 @@
-"""Error of a model on the test of a benchmark, from the outputs that its rule allows only."""
+"""Error and coverage on the test of a benchmark, from the outputs that its rule allows only."""
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.benchmarks.definition import BenchmarkTest
+from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.errors import ModelError
+from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.model_simulation import predict
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.simulation.initial_outputs import simulate_freely
+from islands.validation.ensemble import Ensemble
+from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
+
+M = TypeVar("M", bound=AnyModel)
 
 
 def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
@@ -33,12 +41,8 @@ def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
     RecordError
         The test does not match the model.
     """
-    if isinstance(model, LatentModel):
-        model = _limit_memory(model, test)
-    elif isinstance(model, CoupledLatentModel):
-        model = CoupledLatentModel(tuple(_limit_memory(each, test) for each in model.models))
+    model, warm_up = _limit_memory(model, test), test.known // model.average
     average = model.average
-    warm_up = test.known // average
     if warm_up < model.maximum_lag:
         raise ModelError(
             f"the model needs {model.maximum_lag * average} initial samples, the test allows {test.known}"
@@ -54,9 +58,64 @@ def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def _limit_memory(model: LatentModel, test: BenchmarkTest) -> LatentModel:
+def measure_coverage(
+    model: AnyModel, bands: tuple[PredictionBands, ...], test: BenchmarkTest
+) -> float | None:
+    """Return the fraction of the scored samples of all outputs inside of the band of the default level.
+
+    The bands start as the free run of `measure_rmse`. Of a model of means, the samples are means.
+
+    Parameters
+    ----------
+    model : DynamicModel or CoupledModel
+        Model whose free run has an error on the test.
+    bands : tuple of PredictionBands
+        One for each output; empty if there are none.
+    test : BenchmarkTest
+
+    Returns
+    -------
+    float or None
+        None without bands.
+    """
+    if not bands:
+        return None
+    model, warm_up = _limit_memory(model, test), test.known // model.average
+    # The outputs of other models share an ensemble, which remains one.
+    if isinstance(model, LatentModel | CoupledLatentModel):
+        bands = tuple(_limit_members(each, test) for each in bands)
+    visible = test.visible
+    found: tuple[PredictionBand, ...]
+    if isinstance(visible, Dataset) and not isinstance(model, CoupledModel):
+        found = (bands[0].predict(model, match_rate(model, visible), LEVEL, warm_up),)
+    elif isinstance(visible, CoupledRecord) and isinstance(model, CoupledModel):
+        found = FittedCoupledModel(model, warm_up, bands).bands(visible)
+    else:
+        raise ModelError("the model and the test have different numbers of outputs")
+    records = (test.record,) if isinstance(test.record, Dataset) else test.record.records
+    inside: list[NDArray[np.bool_]] = []
+    for band, record in zip(found, records, strict=True):
+        measured = match_rate(model, record)
+        within = (band.lower <= measured.y) & (measured.y <= band.upper)
+        first = -(-test.unscored // model.average)
+        inside += [within[begin + first : end] for begin, end in measured.bounds]
+    return float(np.concatenate(inside).mean())
+
+
+def _limit_members(bands: PredictionBands, test: BenchmarkTest) -> PredictionBands:
+    """Return bands whose ensemble estimates its initial states from the samples that a test allows."""
+    structures = bands.ensemble.structures
+    limited = tuple(replace(each, model=_limit_memory(each.model, test)) for each in structures)
+    return replace(bands, ensemble=Ensemble(limited))
+
+
+def _limit_memory(model: M, test: BenchmarkTest) -> M:
     """Return a model that estimates its initial states from the samples that a test allows."""
-    return replace(model, memory=min(model.memory, test.known))
+    if isinstance(model, LatentModel):
+        return replace(model, memory=min(model.memory, test.known))
+    if isinstance(model, CoupledLatentModel):
+        return replace(model, models=tuple(_limit_memory(each, test) for each in model.models))
+    return model
 
 
 def _simulate(model: AnyModel, test: BenchmarkTest, warm_up: int) -> NDArray[np.float64]:

@@ -153,13 +153,14 @@ def _print_rows(name: str, rows: Sequence["BenchmarkRow"]) -> None:
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for column in ("test", "model"):
         table.add_column(column, no_wrap=True)
-    for column in ("median", "worst", "published", "terms", "parameters", "s"):
+    for column in ("median", "worst", "claimed", "coverage", "published", "terms", "parameters", "s"):
         table.add_column(column, justify="right", no_wrap=True)
     reasons: dict[str, None] = {}
     for row in rows:
         least = _write_least(row.published)
         sizes = ("-" if each is None else f"{each:g}" for each in (row.terms, row.parameters))
-        cells = (row.test, row.model, _write(row.median), _write(row.worst), least, *sizes)
+        errors = (_write(each) for each in (row.median, row.worst, row.claimed, row.coverage))
+        cells = (row.test, row.model, *errors, least, *sizes)
         table.add_row(*map(Text, (*cells, f"{row.wall_s:.0f}")))
         for each in row.per_seed:
             if each.reason is not None:

@@ -17,7 +17,7 @@ from islands.benchmarks.definition import (
     BenchmarkTest,
     PublishedError,
 )
-from islands.benchmarks.model_searches import ModelSearch
+from islands.benchmarks.model_searches import FoundModel, ModelSearch
 from islands.errors import SettingsError
 from islands.progress import StoppedError
 from support.latent_systems import SPRING, make_model, spring_record
@@ -35,8 +35,8 @@ SET = Benchmark(
 )
 
 
-def outcome(seed, error, parameters=7):
-    return SeedOutcome(seed, {"test": error}, 2, parameters, 1.0 + seed)
+def outcome(seed, error, parameters=7, claimed=None, coverage=None):
+    return SeedOutcome(seed, {"test": error}, 2, parameters, 1.0 + seed, claimed, {"test": coverage})
 
 
 def rows_of(outcomes):
@@ -50,7 +50,9 @@ def data():
 def use(monkeypatch, **searches):
     """Replace the searches by functions of the seed, the progress callback and the stop request."""
     table = {
-        name: ModelSearch(lambda _record, *rest, each=each: each(*rest), is_random=name == LATENT)
+        name: ModelSearch(
+            lambda _record, *rest, each=each: FoundModel(each(*rest), 0.5), is_random=name == LATENT
+        )
         for name, each in searches.items()
     }
     monkeypatch.setattr(comparison, "MODEL_SEARCHES", table)
@@ -72,6 +74,22 @@ def test_a_row_has_the_median_and_the_worst_of_the_seeds():
     assert (row.metric, row.unit, row.is_tuned) == ("RMSE", "um", True)
     assert row.published == SET.published["test"]
     assert found[LINEAR].linear == 4.0
+
+
+def test_a_row_has_the_medians_of_claims_and_coverages_that_are_known():
+    found = rows_of(
+        {
+            LATENT: [outcome(0, 0.3, 7, 0.2, 0.8), outcome(1, "reason"), outcome(2, 0.4, 7, 0.4, 0.9)],
+            LINEAR: [outcome(0, 4.0)],
+        }
+    )
+    assert (found[LATENT].claimed, found[LATENT].coverage) == pytest.approx((0.3, 0.85))
+    assert [(each.claimed, each.coverage) for each in found[LATENT].per_seed] == [
+        (0.2, 0.8),
+        (None, None),
+        (0.4, 0.9),
+    ]
+    assert (found[LINEAR].claimed, found[LINEAR].coverage) == (None, None)
 
 
 def test_a_seed_without_an_error_counts_as_infinite():
@@ -103,6 +121,7 @@ def test_each_class_is_measured_on_the_tests_in_the_unit_of_the_set(monkeypatch)
     assert found[0].median < 1.0
     assert found[1].median == found[0].linear > 100.0
     assert (found[0].terms, found[0].parameters) == (1, 10)
+    assert (found[0].claimed, found[0].coverage) == (500.0, None)
     assert messages[-1] == ("spring, linear, seed 0: test test", 1.0)
 
 

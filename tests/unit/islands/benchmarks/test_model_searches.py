@@ -15,8 +15,12 @@ from support.coupled_systems import TWO_MASSES
 from support.latent_systems import curves_record, make_coupled_latent_model, make_model, smooth_input
 
 
-def find(kind, record):
+def search(kind, record):
     return MODEL_SEARCHES[kind].find(record, 0, ignore_progress, never_stop)
+
+
+def find(kind, record):
+    return search(kind, record).model
 
 
 def test_every_class_has_a_search():
@@ -28,8 +32,10 @@ def test_every_class_has_a_search():
 @pytest.mark.parametrize("kind", [LATENT, LINEAR])
 def test_every_output_of_several_has_a_latent_model(kind):
     record = curves_record(300, 4)
-    model = find(kind, record)
+    found = search(kind, record)
+    model = found.model
     assert isinstance(model, CoupledLatentModel)
+    assert (len(found.bands), found.claimed is None) == ((2, False) if kind == LATENT else (0, True))
     assert model.output_names == record.output_names
     assert count_terms(model) == sum(len(each.units) for each in model.models)
     assert (count_terms(model) > 0) == (kind == LATENT)
@@ -50,7 +56,10 @@ def test_models_are_estimated_again_on_all_estimation_data(kind):
     record = Dataset(u, np.convolve(u, 0.2 * 0.8 ** np.arange(40))[:300] + 0.01 * noise, 0.1)
     expected = islands.fit(record, model=kind, refit="all").best
     assert expected.is_refitted
-    assert find(kind, record) == expected.model
+    found = search(kind, record)
+    assert found.model == expected.model
+    assert found.claimed == expected.metrics["validation"]["free_run"].rmse
+    assert found.bands[0].factors == expected.prediction_bands.factors
 
 
 @pytest.mark.ci

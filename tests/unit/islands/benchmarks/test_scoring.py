@@ -1,4 +1,4 @@
-"""The error on a test: of the free run after the initial samples, from no later output."""
+"""Error and coverage on a test: of the free run after the initial samples, from no later output."""
 
 from dataclasses import replace
 
@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from islands.benchmarks.definition import BenchmarkTest
-from islands.benchmarks.scoring import measure_rmse
+from islands.benchmarks.scoring import measure_coverage, measure_rmse
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset, join
 from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.validation.ensemble import Ensemble, EnsembleStructure
+from islands.validation.prediction_bands import LEVELS, PredictionBands
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.latent_systems import make_model as make_latent
 from support.latent_systems import spring_record
@@ -82,3 +84,42 @@ def test_the_error_of_several_outputs_is_that_of_all():
     one, other = record.records
     shifted = CoupledRecord((one, replace(other, y=np.concatenate([other.y[:10], other.y[10:] + 2.0]))))
     assert measure_rmse(TWO_MASSES, BenchmarkTest(shifted, 10, 10)) == pytest.approx(2.0**0.5)
+
+
+def bands(model, half_width):
+    """Return bands of one half-width at all levels, whose ensemble is the model alone."""
+    ensemble = Ensemble((EnsembleStructure(model, 1.0, np.array([model.parameters])),))
+    return PredictionBands(ensemble, half_width, half_width, dict.fromkeys(LEVELS, 1.0))
+
+
+def test_the_coverage_is_the_fraction_of_the_scored_samples_inside_of_the_band():
+    """From sample 20 on, the outputs have an offset of 3."""
+    model = narx({"y(k-1)": 0.8, "u(k-1)": 1.0})
+    test = BenchmarkTest(lag_record(60, 3.0), 10, 10)
+    assert measure_coverage(model, (bands(model, 2.0),), test) == pytest.approx(10 / 50)
+    assert measure_coverage(model, (bands(model, 4.0),), test) == 1.0
+    assert measure_coverage(model, (bands(model, 2.0),), replace(test, unscored=30)) == 0.0
+    assert measure_coverage(model, (), test) is None
+
+
+def test_the_band_of_a_latent_model_takes_the_initial_samples_only():
+    record = spring_record(400)
+    noisy = replace(record, y=np.concatenate([record.y[:9], record.y[9:] + 1.0]))
+    test = BenchmarkTest(noisy, 9, 9)
+    assert measure_coverage(make_latent(), (bands(make_latent(), 0.99),), test) == 0.0
+    assert measure_coverage(make_latent(), (bands(make_latent(), 1.01),), test) == 1.0
+
+
+def test_the_coverage_of_a_model_of_means_is_that_of_the_means():
+    """The samples are at 1, 2 and 3, their means at the prediction."""
+    y = np.concatenate([np.full(12, 2.0), np.tile([1.0, 2.0, 3.0], 10)])
+    record = replace(lag_record(42), y=y, dt=0.1 / 3)
+    model = narx({"y(k-1)": 1.0}, average=3)
+    assert measure_coverage(model, (bands(model, 0.5),), BenchmarkTest(record, 10, 10)) == 1.0
+
+
+def test_the_coverage_of_several_outputs_is_that_of_all():
+    one, other = make_coupled_record(TWO_MASSES, 200).records
+    shifted = CoupledRecord((one, replace(other, y=np.concatenate([other.y[:10], other.y[10:] + 2.0]))))
+    found = bands(TWO_MASSES, 1.0)
+    assert measure_coverage(TWO_MASSES, (found, found), BenchmarkTest(shifted, 10, 10)) == 0.5
