@@ -7,8 +7,14 @@ positive: a replicate never lacks the excitation of a rare block, as resampling 
 
 With the sums ``J'J`` and ``J'r`` of every block, a replicate costs one small linear system. The step is exact
 for least squares, which is linear in the parameters, and of first order for refined parameters.
+
+A state space has directions in which its parameters have no effect or hardly any: changes of the coordinates
+of the states. Noise moves the parameters far along them, beyond the validity of a step of first order.
+Replicates without steps along the directions of the least information remain close (truncation of the
+eigenvalues: Hansen, SIAM (1998), ch. 3).
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 from math import isqrt
 
@@ -24,6 +30,9 @@ from islands.models.coupled_narx import AnyModel
 from islands.simulation.initial_outputs import estimate_initial_outputs
 from islands.simulation.outcome import EvaluationOutcome
 
+#: Parts of the largest information below which a direction is left out, one after the other.
+_LEAST_INFORMATION = tuple(10.0**power for power in range(-8, -2))
+
 
 def draw_parameters(
     model: AnyModel,
@@ -33,8 +42,8 @@ def draw_parameters(
     warm_up: int | None,
     draws: int,
     rng: Generator,
-) -> NDArray[np.float64]:
-    """Draw parameters of a model from their block-bootstrap distribution.
+) -> Iterator[NDArray[np.float64]]:
+    """Yield draws of parameters from their block-bootstrap distribution, each time in fewer directions.
 
     Parameters
     ----------
@@ -52,39 +61,72 @@ def draw_parameters(
         Number of draws.
     rng : Generator
 
-    Returns
-    -------
+    Yields
+    ------
     ndarray, shape (kept, terms)
-        Draws with a sign that the constraints exclude are left out; if all have one, the parameters of the
-        model are the only draw. The draws are equal to the parameters of the model if the constraints leave
-        no direction free, or if the residual diverges or is not finite.
+        First steps in all directions, then without the directions whose information is below a growing part
+        of the largest. Draws with a sign that the constraints exclude are left out; if all have one, the
+        parameters of the model are the only draw. The draws are equal to the parameters of the model if the
+        constraints leave no direction free, or if the residual diverges or is not finite.
     """
     theta = np.array(model.parameters)
     repeated = np.tile(theta, (draws, 1))
     constrained = constrain_model(model, constraints)
     if isinstance(constrained, EvaluationOutcome):
-        return repeated
+        yield repeated
+        return
     directions = find_directions(theta, constrained)
     if isinstance(directions, EvaluationOutcome) or not directions.shape[1]:
-        return repeated
+        yield repeated
+        return
     if interval is None:
         record = estimate_initial_outputs(model, record, warm_up)
     residual = make_residual(model, record, interval, warm_up)
     error = residual(theta)
     if error is None or not np.isfinite(error).all():
-        return repeated
+        yield repeated
+        return
     normal, gradient = _block_sums(residual.differentiate(theta, directions), error)
     # The parameters are a minimum up to the tolerance of the refinement: replicates scatter about them.
     gradient -= np.add.reduce(gradient) / len(gradient)
-    for index in range(draws):
-        weights = rng.standard_exponential(len(normal))
-        left = np.add.reduce(weights[:, None, None] * normal)
-        scale = np.sqrt(np.where(np.diag(left) > 0.0, np.diag(left), 1.0))
-        right = np.add.reduce(weights[:, None] * gradient)
-        step = np.linalg.lstsq(left / scale / scale[:, None], right / scale, rcond=None)[0] / scale
-        repeated[index] -= directions @ step
-    signed = [draw for draw in repeated if constrained.has_signs(draw)]
-    return np.array(signed or [theta])
+    weights = rng.standard_exponential((draws, len(normal)))
+    for basis in _list_bases(np.add.reduce(normal)):
+        steps = np.array([_solve(normal, gradient, each, basis) for each in weights])
+        drawn = repeated - np.einsum("tf,df->dt", directions, steps)
+        signed = [draw for draw in drawn if constrained.has_signs(draw)]
+        yield np.array(signed or [theta])
+
+
+def _list_bases(information: NDArray[np.float64]) -> Iterator[NDArray[np.float64] | None]:
+    """Yield the directions of the steps as columns, without those of the least information; None for all."""
+    yield None
+    scale = np.sqrt(np.where(np.diag(information) > 0.0, np.diag(information), 1.0))
+    values, vectors = np.linalg.eigh(information / scale / scale[:, None])
+    kept = len(values)
+    for least in _LEAST_INFORMATION:
+        informative = values > least * values[-1]
+        count = int(np.count_nonzero(informative))
+        if 0 < count < kept:
+            kept = count
+            yield vectors[:, informative] / scale[:, None]
+
+
+def _solve(
+    normal: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    basis: NDArray[np.float64] | None,
+) -> NDArray[np.float64]:
+    """Return the step of a replicate, which weights the blocks, along the columns of a basis."""
+    left = np.add.reduce(weights[:, None, None] * normal)
+    right = np.add.reduce(weights[:, None] * gradient)
+    if basis is not None:
+        left = np.einsum("fi,fg,gj->ij", basis, left, basis)
+        right = np.einsum("fi,f->i", basis, right)
+    scale = np.sqrt(np.where(np.diag(left) > 0.0, np.diag(left), 1.0))
+    step: NDArray[np.float64]
+    step = np.linalg.lstsq(left / scale / scale[:, None], right / scale, rcond=None)[0] / scale
+    return step if basis is None else np.einsum("fi,i->f", basis, step)
 
 
 def _block_sums(

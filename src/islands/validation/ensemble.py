@@ -16,7 +16,7 @@ Structures with equal free runs state one law (see `find_laws`). In inclusion pr
 of them: the shortest, and of equal sizes the recommended one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Generic, TypeVar
@@ -48,7 +48,7 @@ _MIN_WEIGHT = 0.5 / MEMBERS
 #: validation data.
 LARGEST_ESTIMATION_RATIO = 1.5
 
-#: A member is left out if the squared error of its free run on the validation data exceeds that of its
+#: A member is left out if the squared error of its free run on a part of the data exceeds that of its
 #: structure by this factor: a replicate is a linear step, which may leave the stable models.
 _IMPLAUSIBLE = 4.0
 
@@ -240,18 +240,45 @@ def make_ensemble(
         drawn = draw_parameters(
             model, split.estimation, candidate.criterion.interval, constraints, warm_up, count, rng
         )
-        # The divergence of a member gives NaN, which is not plausible either.
-        started = estimate_initial_outputs(model, split.validation, warm_up)
-        predicted = find_predicted(free_run(model, started, warm_up).y)
-        runs = free_runs(model, drawn, started, warm_up)
-        errors = mean_squares(split.validation, runs, predicted)
-        plausible = errors <= _IMPLAUSIBLE * candidate.error + floor
-        members = drawn[plausible] if plausible.any() else np.array([model.parameters])
+        members = _take_plausible(model, drawn, split, warm_up)
         structure = model
         if isinstance(model, Model):
             structure = replace(model, theta=None, standard_errors=None)
         structures.append(EnsembleStructure(structure, weight, members, law))
     return Ensemble(tuple(structures)) if structures else None
+
+
+def _take_plausible(
+    model: AnyModel, drawn: Iterable[NDArray[np.float64]], split: Split | CoupledSplit, warm_up: int
+) -> NDArray[np.float64]:
+    """Return the plausible ones of the first draws at least half of which are plausible.
+
+    A draw is plausible if its error on both parts of the data is not far above that of the model. Without
+    such draws, the parameters of the model are the only member.
+    """
+    parts = [_find_limit(model, record, warm_up) for record in (split.validation, split.estimation)]
+    for parameters in drawn:
+        plausible = np.ones(len(parameters), bool)
+        for record, predicted, largest in parts:
+            # The divergence of a draw gives NaN, which is not plausible either.
+            runs = free_runs(model, parameters[plausible], record, warm_up)
+            plausible[plausible] = mean_squares(record, runs, predicted) <= largest
+            if 2 * np.count_nonzero(plausible) < len(plausible):
+                break
+        else:
+            return parameters[plausible]
+    return np.array([model.parameters])
+
+
+def _find_limit(
+    model: AnyModel, record: AnyRecord, warm_up: int
+) -> tuple[AnyRecord, NDArray[np.bool_], float]:
+    """Return the record from which free runs start, the samples that count, and the largest mean square."""
+    started = estimate_initial_outputs(model, record, warm_up)
+    run = free_run(model, started, warm_up).y
+    predicted = find_predicted(run)
+    square = float(mean_squares(record, run[None], predicted)[0])
+    return started, predicted, _IMPLAUSIBLE * square + _error_floor(record)
 
 
 def mean_squares(

@@ -30,7 +30,7 @@ def record(samples=900, noise=0.1, seed=0, scale=1.0):
 
 
 def draw(model, data, draws=200, constraints="none", interval=1, seed=3):
-    return draw_parameters(model, data, interval, constraints, None, draws, np.random.default_rng(seed))
+    return next(draw_parameters(model, data, interval, constraints, None, draws, np.random.default_rng(seed)))
 
 
 def test_draws_scatter_like_the_estimate_under_white_noise():
@@ -104,3 +104,19 @@ def test_no_draw_has_an_excluded_sign():
     drawn = draw(model, data, constraints=statement)
     assert 0 < len(drawn) < 200
     assert (drawn[:, 2] * free[2] >= 0.0).all()
+
+
+def test_later_draws_leave_out_directions_of_little_information():
+    """Two inputs are almost equal: the data hardly tell the difference of their parameters."""
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(600)
+    inputs = np.column_stack([u, u + 1e-3 * rng.standard_normal(600)])
+    y = np.append(0.0, inputs.sum(axis=1)[:-1]) + 0.1 * rng.standard_normal(600)
+    data = Dataset(inputs, y, 0.1)
+    model = estimate(terms("u1(k-1)", "u2(k-1)"), data).model
+    drawn = list(draw_parameters(model, data, 1, "none", None, 100, np.random.default_rng(3)))
+    assert len(drawn) == 2
+    sums, differences = ([np.std(each @ (1.0, sign)) for each in drawn] for sign in (1.0, -1.0))
+    assert sums[1] == pytest.approx(sums[0], rel=0.1)
+    assert differences[0] > 1.0
+    assert differences[1] < 0.1

@@ -16,6 +16,7 @@ from islands.models.narx import make_model
 from islands.models.regressor import regressor
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
+from islands.validation import ensemble as ensemble_module
 from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
 from islands.validation.prediction_bands import calibrate_bands
 
@@ -104,6 +105,20 @@ def test_implausible_members_are_left_out():
     found = ensemble(data, [("y(k-1)", "y(k-2)", "y(k-1)*y(k-1)", "u(k-1)")])
     errors = np.mean((found.simulate(data.validation, 2) - data.validation.y)[:, 2:] ** 2, axis=1)
     assert errors.max() <= 4.01 * candidate(("y(k-1)", "y(k-2)", "y(k-1)*y(k-1)", "u(k-1)"), data).error
+
+
+@pytest.mark.parametrize("plausible", [0, 2, 4])
+def test_members_are_of_the_first_draws_half_of_which_are_plausible(monkeypatch, plausible):
+    """The first draws have all but one an implausible error; the next ones are drawn in fewer directions."""
+    data = parts(0.02)
+    model = candidate(TRUE, data).model
+    theta = np.array(model.parameters)
+    near, far = 1.001 * theta, 2.0 * theta
+    drawn = [np.array([near, far, far, far]), np.array([near] * plausible + [far] * (4 - plausible))]
+    monkeypatch.setattr(ensemble_module, "draw_parameters", lambda *_: iter(drawn))
+    (structure,) = ensemble(data, [TRUE]).structures
+    expected = [near] * plausible or [theta]
+    assert structure.parameters == pytest.approx(np.array(expected))
 
 
 def test_members_equal_the_measured_output_before_they_start():
