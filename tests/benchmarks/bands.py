@@ -3,7 +3,8 @@
 ``python tests/benchmarks/bands.py --seeds 10`` prints a line for every system and kind of noise: the fraction
 of samples of new records inside the band of the best model, as mean, least and largest over the records. The
 new records have new inputs and new noise and take no part in the identification. The records ``shifted`` have
-an input of two fifths of the bandwidth, to which the level of the band does not refer.
+an input of two fifths of the bandwidth, to which the level of the band does not refer. Those of ``beyond``
+have an input of 1.35 times the amplitude, which leaves the range of the data.
 """
 
 import argparse
@@ -112,6 +113,13 @@ LAWS = {
         2,
         0.8,
     ),
+    "drive": Law(
+        lambda y, u, k: 1.55 * y[k - 1] - 0.65 * y[k - 2] + 0.1 * np.tanh(2.0 * u[k - 1]),
+        "polynomial",
+        3,
+        2,
+        0.6,
+    ),
     "dead time": Law(
         lambda y, u, k: 0.8 * y[k - 1] + 0.3 * u[k - 5] - 0.1 * u[k - 5] ** 2,
         "polynomial",
@@ -132,13 +140,18 @@ def simulate(law: Law, u: Signal, equation_error: Signal) -> Signal:
 
 
 def make_record(
-    law: Law, noise: str, samples: int, rng: np.random.Generator, cutoff: float = 0.1
+    law: Law,
+    noise: str,
+    samples: int,
+    rng: np.random.Generator,
+    cutoff: float = 0.1,
+    factor: float = 1.0,
 ) -> islands.Dataset:
-    """Return a record with a new input and new noise."""
+    """Return a record with a new input, of a multiple of the amplitude, and new noise."""
     length = samples + SETTLING
     raw = filtered_noise(1.0, length, cutoff, int(rng.integers(2**31)))
     # The standard deviation of the filtered noise is the root of twice the cutoff.
-    u = law.amplitude * np.clip(raw / np.sqrt(2.0 * cutoff), -2.2, 2.2)
+    u = factor * law.amplitude * np.clip(raw / np.sqrt(2.0 * cutoff), -2.2, 2.2)
     white = LEVEL * law.scale * rng.standard_normal(length)
     y = simulate(law, u, law.equation_noise * white * (noise == "equation"))
     if noise == "output":
@@ -190,13 +203,14 @@ def main() -> None:
     parser.add_argument("--method", choices=("fit", "identify"), default="fit")
     parser.add_argument("--system", action="append", choices=tuple(LAWS))
     arguments = parser.parse_args()
-    print(f"{'system':11s} {'noise':9s}  coverage mean, min, max   shifted mean, min, max")
+    titles = "   ".join(f"{each} mean, min, max" for each in ("coverage", "shifted", "beyond"))
+    print(f"{'system':11s} {'noise':9s}  {titles}")
     cells, within, terms = [], [], {noise: ([], []) for noise in NOISES}
     began = perf_counter()
     for name in arguments.system or LAWS:
         law = LAWS[name]
         for noise in NOISES:
-            tests, shifted = [], []
+            tests, shifted, beyond = [], [], []
             for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds):
                 rng = np.random.default_rng([seed, *map(ord, name + noise)])
                 record = make_record(law, noise, arguments.samples, rng)
@@ -207,6 +221,8 @@ def main() -> None:
                 ]
                 new = make_record(law, noise, TEST_SAMPLES, rng, 0.04)
                 shifted.append(coverage(best, new, arguments.level))
+                new = make_record(law, noise, TEST_SAMPLES, rng, factor=1.35)
+                beyond.append(coverage(best, new, arguments.level))
                 ensemble = best.search_result.ensemble
                 true = {regressor(islands.parse(text))[1] for text in law.terms}
                 found = {item for each in ensemble.structures for item in each.model.regressors}
@@ -216,7 +232,8 @@ def main() -> None:
             cells.append(np.mean(tests))
             within += [0.85 <= each <= 0.95 for each in tests]
             numbers = " ".join(
-                f"{np.mean(each):8.3f} {min(each):6.3f} {max(each):6.3f}   " for each in (tests, shifted)
+                f"{np.mean(each):8.3f} {min(each):6.3f} {max(each):6.3f}   "
+                for each in (tests, shifted, beyond)
             )
             print(f"{name:11s} {noise:9s} {numbers}", flush=True)
     print(

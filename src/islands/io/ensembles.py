@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from islands.io.models import model_from_json, model_json, read_coupled
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.models.regressor import Regressor, regressor
+from islands.validation.data_range import DataRange
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.prediction_bands import PredictionBands
 
@@ -36,8 +37,19 @@ class StructureDocument(BaseModel):
     law: Annotated[int, Field(ge=0)] | None = None
 
 
+class RangeDocument(BaseModel):
+    """Range of the data outside of which bands widen, and how: see `DataRange`."""
+
+    model_config = ConfigDict(frozen=True)
+
+    output: tuple[FiniteFloat, FiniteFloat]
+    inputs: tuple[tuple[FiniteFloat, FiniteFloat], ...]
+    predictable: Annotated[FiniteFloat, Field(ge=0, le=1)]
+    memory: Annotated[FiniteFloat, Field(gt=0)]
+
+
 class BandsDocument(BaseModel):
-    """Width of the bands of a model: the noise, the median width, and the factors by level."""
+    """Width of the bands of a model: the noise, the median width, the factors by level, and the range."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -46,6 +58,8 @@ class BandsDocument(BaseModel):
     levels: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
     factors: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
     coverage: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+    range: RangeDocument | None = None
+    independent_samples: Annotated[FiniteFloat, Field(gt=0)] | None = None
 
 
 def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
@@ -133,6 +147,8 @@ def bands_document(bands: PredictionBands | None) -> dict[str, Any] | None:
         "levels": list(bands.factors),
         "factors": list(bands.factors.values()),
         "coverage": bands.coverage,
+        "range": None if bands.data_range is None else asdict(bands.data_range),
+        "independent_samples": bands.independent_samples,
     }
 
 
@@ -149,6 +165,10 @@ def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionB
     try:
         found = BandsDocument.model_validate(document)
         factors = dict(zip(found.levels, found.factors, strict=True))
-        return PredictionBands(ensemble, found.noise, found.width, factors, found.coverage)
+        data_range = None if found.range is None else DataRange(**found.range.model_dump())
+        return PredictionBands(
+            *(ensemble, found.noise, found.width, factors, found.coverage, data_range),
+            found.independent_samples,
+        )
     except ValueError as error:
         raise ModelError(f"the bands of the result are damaged: {error}") from error

@@ -3,7 +3,8 @@
 A band of level ``p`` contains a new measured sample with probability ``p``. Its half-width at sample ``k`` is
 ``q sqrt(noise^2 + spread(k)^2)``. The spread of the ensemble varies with time: it is the uncertainty of the
 parameters and of the structure. The noise is the part of the residual that the spread does not explain:
-measurement noise, equation noise and the common error of all members.
+measurement noise, equation noise and the common error of all members. Outside of the range of the data, the
+error of the structure grows (see `DataRange`).
 
 The factor ``q`` is the quantile ``p`` of the normalised residuals of the free run on the estimation and the
 validation data, a conformal prediction with a normalised score (Lei et al., J. Am. Statist. Assoc. 113 (2018)
@@ -19,15 +20,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.compatibility import match_record
 from islands.data.coupled_record import AnyRecord, CoupledSplit
 from islands.data.dataset import Dataset
+from islands.data.signal_map import match_rate
 from islands.data.split import Split
 from islands.errors import SettingsError, check_numbers
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
+from islands.validation.data_range import DataRange, measure_range
 from islands.validation.ensemble import Ensemble, effective_samples
+from islands.validation.predictable_residual import predictable_share
 
 #: Levels whose factors are stored; others are interpolated.
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, 0.99)
@@ -76,6 +81,11 @@ class PredictionBands:
     coverage : float or None
         Fraction of the validation samples within the band of the default level. None for results of earlier
         versions.
+    data_range : DataRange or None
+        Range of the data, outside of which the bands widen. None for results of earlier versions.
+    independent_samples : float or None
+        Number of independent samples that the correlated residuals of the validation data are worth. None for
+        results of earlier versions.
     """
 
     ensemble: Ensemble
@@ -83,6 +93,8 @@ class PredictionBands:
     width: float
     factors: Mapping[float, float]
     coverage: float | None = None
+    data_range: DataRange | None = None
+    independent_samples: float | None = None
 
     def predict(
         self, model: DynamicModel, record: Dataset, level: float = LEVEL, warm_up: int | None = None
@@ -109,15 +121,22 @@ class PredictionBands:
         """
         first = model.maximum_lag if warm_up is None else warm_up
         run = simulate_freely(model, record, first).y
-        return self.band(run, self.ensemble.simulate(record, first), level)
+        runs = self.ensemble.simulate(record, first)
+        return self.band(match_record(model, match_rate(model, record)), run, runs, level)
 
     def band(
-        self, run: NDArray[np.float64], runs: NDArray[np.float64], level: float = LEVEL
+        self,
+        record: Dataset,
+        run: NDArray[np.float64],
+        runs: NDArray[np.float64],
+        level: float = LEVEL,
     ) -> PredictionBand:
         """Return the band about a free run.
 
         Parameters
         ----------
+        record : Dataset
+            Record of the free run, with its inputs in the order of the model.
         run : ndarray, shape (samples,)
             Free run of the model.
         runs : ndarray, shape (members, samples)
@@ -126,7 +145,10 @@ class PredictionBands:
             As for `predict`.
         """
         factor = self._factor(level)
-        half = factor * np.sqrt(self.noise**2 + self.ensemble.spread(runs, run) ** 2)
+        squares = self.noise**2 + self.ensemble.spread(runs, run) ** 2
+        if self.data_range is not None:
+            squares = squares + self.width**2 * self.data_range.increase(record, run)
+        half = factor * np.sqrt(squares)
         return PredictionBand(level, run, run - half, run + half)
 
     def typical_half_width(self, level: float = LEVEL) -> float:
@@ -176,7 +198,8 @@ def calibrate_bands(
         if not all(run.outcome for run in simulated):
             return None
         outputs = [
-            _Output(record.y, run.y, runs) for (record, runs), run in zip(parts, simulated, strict=True)
+            _Output(match_record(model, record), run.y, runs)
+            for (record, runs), run in zip(parts, simulated, strict=True)
         ]
         return _calibrate(ensemble, outputs)
 
@@ -205,7 +228,7 @@ def calibrate_output_bands(
         return ()
     for place in range(len(model.models)):
         outputs = [
-            _Output(record.records[place].y, run.y[:, place], runs[..., place]) for record, run, runs in parts
+            _Output(record.records[place], run.y[:, place], runs[..., place]) for record, run, runs in parts
         ]
         if (calibrated := _calibrate(ensemble, outputs)) is None:
             return ()
@@ -225,18 +248,18 @@ def _simulate_samples(ensemble: Ensemble, record: AnyRecord, warm_up: int) -> ND
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Output:
-    """Measured output and free run on a part of the data, and runs of the ensemble at some samples."""
+    """A part of the data, the free run on it, and runs of the ensemble at some samples."""
 
-    y: NDArray[np.float64]
+    record: Dataset
     run: NDArray[np.float64]
     runs: NDArray[np.float64]
 
 
 def _calibrate(ensemble: Ensemble, parts: Sequence[_Output]) -> PredictionBands | None:
-    residuals, spreads, count = [], [], 0.0
+    residuals, spreads, counts = [], [], []
     for part in parts:
-        residual = part.y - part.run
-        count += effective_samples(residual[~np.isnan(residual)])
+        residual = part.record.y - part.run
+        counts.append(effective_samples(residual[~np.isnan(residual)]))
         samples = _list_samples(len(residual))
         spread = ensemble.spread(part.runs, part.run[samples])
         known = ~np.isnan(residual[samples]) & np.isfinite(spread)
@@ -250,11 +273,32 @@ def _calibrate(ensemble: Ensemble, parts: Sequence[_Output]) -> PredictionBands 
     width = np.sqrt(noise**2 + spread**2)
     scores = np.sort(residual / np.where(width > 0.0, width, 1.0))
     # The correction of a conformal prediction for a finite number of residuals.
-    ranks = [int(len(scores) * level * (1.0 + 1.0 / count)) for level in LEVELS]
+    ranks = [int(len(scores) * level * (1.0 + 1.0 / sum(counts))) for level in LEVELS]
     factors = [float(scores[min(len(scores) - 1, rank)]) for rank in ranks]
-    bands = PredictionBands(ensemble, noise, float(np.median(width)), dict(zip(LEVELS, factors, strict=True)))
+    bands = PredictionBands(
+        ensemble,
+        noise,
+        float(np.median(width)),
+        dict(zip(LEVELS, factors, strict=True)),
+        data_range=_measure_range(parts),
+    )
     validated = len(residuals[-1])
     if not validated:
         return bands
     inside = residual[-validated:] <= bands.typical_factor * width[-validated:]
-    return replace(bands, coverage=float(inside.mean()))
+    return replace(bands, coverage=float(inside.mean()), independent_samples=counts[-1])
+
+
+def _measure_range(parts: Sequence[_Output]) -> DataRange:
+    """Return the range of the data, with the properties of the residual on the estimation data."""
+    part = parts[0]
+    begin, end = max(part.record.bounds, key=lambda bounds: bounds[1] - bounds[0])
+    residual = part.record.y[begin:end] - part.run[begin:end]
+    rows = np.flatnonzero(~np.isnan(residual))[:_SAMPLES]
+    residual, y, u = residual[rows], part.record.y[begin:end][rows], part.record.u[begin:end][rows]
+    return measure_range(
+        [each.record for each in parts],
+        [each.run for each in parts],
+        predictable_share(residual, u, y) if rows.size else 0.0,
+        rows.size / effective_samples(residual) if rows.size else 1.0,
+    )

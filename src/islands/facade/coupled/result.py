@@ -124,7 +124,8 @@ class FittedCoupledModel:
         run = free_run(self.model, data, first).y
         runs = self._simulate_ensembles(data, first)
         return tuple(
-            each.band(run[:, place], runs[place], level) for place, each in enumerate(self.prediction_bands)
+            each.band(data.records[place], run[:, place], runs[place], level)
+            for place, each in enumerate(self.prediction_bands)
         )
 
     @property

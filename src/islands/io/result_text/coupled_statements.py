@@ -9,6 +9,7 @@ from islands.io.result_text.statements import (
     NO_SIMULATION,
     SIMULATION_USES,
     TEST,
+    UNCERTAIN_RATIO,
     VERDICTS,
     Document,
     RunFacts,
@@ -16,6 +17,7 @@ from islands.io.result_text.statements import (
     describe_error_level,
     describe_estimation_error,
     describe_excess,
+    describe_few_errors,
     describe_insignificant,
     describe_unexplained_error,
     describe_wide_band,
@@ -177,7 +179,9 @@ OUTPUT_DETAILS: Final[tuple[Statement[OutputFacts], ...]] = (
             "band"
         ),
     ),
+    Statement("few-errors", lambda output: output.likely_ratio >= UNCERTAIN_RATIO, describe_few_errors),
 )
+
 
 #: Checks that an output fails.
 OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (

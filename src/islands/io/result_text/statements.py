@@ -46,6 +46,16 @@ _ROUNDING = 1e-6
 #: Least fraction of the validation samples inside a band of 90 %: two standard errors of 20 independent ones.
 _LEAST_COVERAGE = 0.75
 
+#: Ratio of a likely error on new data and the error on the validation data from which on it is stated: of
+#: fewer than 17 independent samples.
+UNCERTAIN_RATIO = 1.4
+
+#: Largest ratio that is stated: of two independent samples, and as an order of magnitude.
+_LARGEST_RATIO = 5.0
+
+#: Normal quantile of 5 %: a likely error is one that is exceeded in one of twenty cases.
+_LOWER_QUANTILE = -1.645
+
 #: Error of a linear model relative to that of the model below which the model is no better.
 _BETTER_THAN_LINEAR = 1.05
 
@@ -153,6 +163,26 @@ class RunFacts:
     def is_covered(self) -> bool:
         """Whether the band contains enough of the validation samples, as far as that is known."""
         return self.coverage is None or self.coverage >= _LEAST_COVERAGE
+
+    @property
+    def independent_samples(self) -> float | None:
+        """Number of independent samples that the errors on the validation data are worth."""
+        found: float | None = self.bands.get("independent_samples")
+        return found
+
+    @property
+    def likely_ratio(self) -> float:
+        """Largest likely ratio of the error on new data and that on the validation data; 0 if it is unknown.
+
+        The variance of normal errors is estimated with as many degrees of freedom as there are independent
+        samples. The quantile of its chi-square distribution is that of Wilson and Hilferty (1931).
+        """
+        count = self.independent_samples
+        if count is None or self.error()["rmse"] is None or self.is_rounding(self.error()["rmse"]):
+            return 0.0
+        share = 2.0 / (9.0 * count)
+        root = 1.0 - share + _LOWER_QUANTILE * share**0.5
+        return root**-1.5 if root > 0.0 else inf
 
     @property
     def is_vague(self) -> bool:
@@ -747,6 +777,15 @@ def describe_estimation_error(facts: RunFacts) -> str:
     return f"the free-run error on the estimation data is {ratio:.2g} times that on the validation data"
 
 
+def describe_few_errors(facts: RunFacts) -> str:
+    """State how much larger the error on new data may be, since the errors are correlated."""
+    return (
+        "its errors are correlated and count as about "
+        f"{facts.independent_samples or 0.0:.0f} independent samples, so that the RMSE on new data may be "
+        f"{min(facts.likely_ratio, _LARGEST_RATIO):.2g} times as large"
+    )
+
+
 def describe_wide_band() -> str:
     """State that the models that the data do not exclude disagree by more than the output moves."""
     return (
@@ -1025,6 +1064,7 @@ VERDICT_DETAILS: Final[tuple[Statement[ResultFacts], ...]] = (
             f"{100 * LEVEL:g} % band"
         ),
     ),
+    Statement("few-errors", lambda facts: facts.likely_ratio >= UNCERTAIN_RATIO, describe_few_errors),
     Statement(
         "one-step-share",
         lambda facts: facts.share("one_step_ahead") is not None,

@@ -41,6 +41,8 @@ def test_a_result_folder_reproduces_the_bands_bit_for_bit(folder):
         expected = result().search_result.ensemble
         own = model.prediction_bands
         assert (bands.noise, bands.width, bands.factors) == (own.noise, own.width, own.factors)
+        assert own.data_range is not None
+        assert (bands.coverage, bands.data_range) == (own.coverage, own.data_range)
         for found, each in zip(bands.ensemble.structures, expected.structures, strict=True):
             assert (found.model, found.weight) == (each.model, each.weight)
             assert (found.parameters == each.parameters).all()
@@ -50,6 +52,12 @@ def test_terms_have_their_inclusion_probability_in_a_result(folder):
     document = json.loads((folder / "result.json").read_text())
     for model, entry in zip(result().models, document["models"], strict=True):
         assert tuple(term["inclusion"] for term in entry["terms"]) == model.inclusion
+
+
+def test_bands_of_earlier_versions_have_no_range():
+    document = bands_document(result().best.prediction_bands)
+    del document["range"]
+    assert bands_from_document(document, result().search_result.ensemble).data_range is None
 
 
 def test_no_ensemble_and_no_bands_are_null():

@@ -70,6 +70,34 @@ def test_a_band_widens_outside_the_data():
     assert np.nanmax(wide.upper - wide.lower) > 1.2 * np.nanmax(band.upper - band.lower)
 
 
+def test_white_residuals_are_independent_samples():
+    bands = result().best.prediction_bands
+    samples = result().best.validation.samples - 2
+    assert 0.7 * samples < bands.independent_samples <= samples
+
+
+def drive(samples, seed, amplitude):
+    """A lag behind a saturation, which no polynomial of the second degree describes outside of the data."""
+    u, x = amplitude * filtered_noise(1.0, samples, 0.1, seed), np.zeros(samples)
+    for k in range(1, samples):
+        x[k] = 0.8 * x[k - 1] + 0.2 * np.tanh(3.0 * u[k - 1])
+    return islands.Dataset(u, x + 0.002 * np.random.default_rng(seed).standard_normal(samples), 1.0)
+
+
+def test_a_band_allows_for_the_error_of_the_structure_outside_of_the_data():
+    best = islands.fit(drive(600, 0, 1.0), library="polynomial", degree=2, lags=2, max_terms=4).best
+    new = drive(600, 1, 2.0)
+
+    def cover(bands):
+        band = bands.predict(best.model, new)
+        return np.mean(((band.lower <= new.y) & (new.y <= band.upper))[2:])
+
+    bands = best.prediction_bands
+    assert bands.data_range.predictable > 0.5
+    assert cover(replace(bands, data_range=None)) < 0.8
+    assert cover(bands) > 0.85
+
+
 @pytest.mark.parametrize("level", [0.0, 0.49, 0.995, 1.0, float("nan")])
 def test_a_level_without_a_band_is_refused(level):
     with pytest.raises(SettingsError, match=r"between 0\.5 and 0\.99"):

@@ -73,7 +73,7 @@ def test_an_extrapolating_validation_and_a_growing_error_are_failures(document):
 
 
 def test_a_band_that_misses_the_validation_data_and_a_poor_output_are_failures(document):
-    document["outputs"][0]["bands"]["coverage"] = 0.5
+    document["outputs"][0]["bands"] |= {"coverage": 0.5, "independent_samples": 7.0}
     document["outputs"][0]["bands"]["width"] = 10.0 * document["outputs"][0]["data"]["output_range"]
     document["outputs"][1]["metrics"]["validation"]["free_run"]["r2"] = 0.3
     found = said(document)
@@ -81,3 +81,4 @@ def test_a_band_that_misses_the_validation_data_and_a_poor_output_are_failures(d
     assert "y1: the 90 % prediction band is wider than the output range" in found["Fails at"]
     assert "simulation from the inputs alone: R2 0.300 of y2" in found["Fails at"]
     assert found["As a simulation"].startswith("As a simulation: unsuitable")
+    assert "about 7 independent samples, so that the RMSE on new data may be 1.8" in found["As a simulation"]

@@ -397,6 +397,25 @@ def test_a_band_that_misses_the_validation_data_is_a_failure(findings):
     assert "prediction band" not in said(findings)["Fails at"]
 
 
+@pytest.mark.parametrize(
+    ("samples", "expected"),
+    [
+        (7.2, "count as about 7 independent samples, so that the RMSE on new data may be 1.8 times as large"),
+        (3.0, "may be 3 times as large"),
+        (2.0, "may be 5 times as large"),
+        (16.0, "may be 1.4 times as large"),
+        (18.0, ""),
+        (None, ""),
+    ],
+)
+def test_an_error_that_few_independent_samples_measure_is_uncertain(findings, samples, expected):
+    """The ratios are those of the quantile of 5 % of the chi-square distribution, at most 5."""
+    bands = replace(findings.recommended.bands, independent_samples=samples)
+    found = said(findings, bands=bands)["As a simulation"]
+    assert expected in found
+    assert ("independent samples" in found) == bool(expected)
+
+
 def test_a_band_that_is_wider_than_the_output_range_is_a_failure(findings):
     bands, output_range = findings.recommended.bands, findings.record.output_range
     half = bands.typical_half_width()
