@@ -1,5 +1,6 @@
 """Identification of latent models: state spaces with static units, evolved on the islands."""
 
+from dataclasses import replace
 from typing import Any
 
 from islands.data.dataset import Dataset
@@ -9,6 +10,7 @@ from islands.errors import SettingsError
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.estimation.latent_models import estimate_models, find_front
+from islands.estimation.quantity_errors import with_quantity_errors
 from islands.evolution.engine import Engine
 from islands.evolution.latent.problem import LatentProblem, make_latent_problem
 from islands.evolution.presets import LATENT_SETTINGS
@@ -25,12 +27,16 @@ from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.results.model_simulation import SHOOTING
 from islands.models.latent import LatentModel
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps
-from islands.validation.assessment import assess
+from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
 
 #: Gain of the held-out error, as a fraction, that justifies a larger model of the result, and most models.
 _GAIN, _MOST_MODELS = 0.15, 10
+
+#: Name of the step.
+_ERRORS = "standard errors"
 
 #: Latent models are estimated by the error of the free run.
 _CRITERION = refinement_criterion(None)
@@ -108,11 +114,21 @@ def search_latent(
 
 
 def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
-    """Return the result of a search with a linear model for comparison and with prediction bands."""
+    """Return the result of a search with standard errors, a linear model for comparison and bands."""
+    if not steps.skip(_ERRORS):
+        data = found.split.estimation
+        found = replace(
+            found, models=tuple(replace(entry, model=_add_errors(entry, data)) for entry in found.models)
+        )
     found = with_linear_comparison(found, (), found.shooting_interval, steps)
     models = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
     warm_up = max(entry.model.maximum_lag for entry in found.models)
     return with_bands(found, models, "none", warm_up, steps)
+
+
+def _add_errors(entry: Assessment, record: Dataset) -> DynamicModel:
+    model = entry.model
+    return with_quantity_errors(model, record, entry.warm_up) if isinstance(model, LatentModel) else model
 
 
 def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> list[LatentModel]:

@@ -19,6 +19,7 @@ from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR, Criter
 from islands.estimation.estimators import estimate_with
 from islands.estimation.latent_refit import refit_latent
 from islands.estimation.output_error import refit_output_error
+from islands.estimation.quantity_errors import with_quantity_errors
 from islands.estimation.refinement import RefinedModel, refine
 from islands.evolution.search_result import SearchResult, mark_stopped
 from islands.models.latent import LatentModel
@@ -80,6 +81,8 @@ def refit_models(found: SearchResult, validation: Dataset | float, steps: Steps)
         else:
             changed = entry.model.with_parameters(estimated.parameters, estimated.standard_errors)
             reason = _find_fault(entry, changed, data, constraints)
+            if isinstance(changed, LatentModel) and not reason:
+                changed = with_quantity_errors(changed, data, entry.warm_up)
         made = with_refit(entry, changed, data.samples, reason, found.split, constraints)
         # A recommendation states the checks that a model passes.
         passes = [is_sound(each, found.requires_property_1) for each in (entry.physics, made.final_physics)]

@@ -22,6 +22,7 @@ from islands.io.models import model_json, terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.models.coupled_narx import AnyModel
 from islands.models.equations import named_signals, named_statement
+from islands.models.latent import LatentModel
 from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
 from islands.models.signal_statement import describe_signals
@@ -140,6 +141,7 @@ def _model_document(
         "named_equation": written.named,
         "named_signals": named_signals(model),
         "terms": terms_in_result(model, ensemble),
+        **({"quantities": model.list_quantities()} if isinstance(model, LatentModel) else {}),
         "bands": bands_document(assessment.bands),
         "recordings": {
             part: {name: asdict(value) for name, value in by_name.items()}

@@ -9,11 +9,11 @@ Schoukens and Toth, Automatica 113 (2020) 108731).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from math import prod
 from types import MappingProxyType
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,15 @@ from islands.data.channel_names import parse_channel_name
 from islands.data.flat_extremes import NO_LIMITS, Limits
 from islands.errors import ModelError
 from islands.models.equations import signal_names
-from islands.models.linear_system import LinearSystem, describe_poles
+from islands.models.linear_system import (
+    LinearSystem,
+    Quantity,
+    describe_poles,
+    list_modes,
+    measure_gains,
+    measure_mode,
+    write_error,
+)
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
@@ -158,6 +166,9 @@ class LatentModel(ParametricModel):
         Inputs of the operating point, as the means of the estimation data.
     limits : Limits
         Least and greatest output that the sensor shows.
+    quantity_errors : tuple of float or None
+        Standard errors of ``quantities``. The parameters have none: a change of the coordinates of the states
+        alters them without an effect on the output. None if unknown.
 
     Raises
     ------
@@ -174,6 +185,7 @@ class LatentModel(ParametricModel):
     memory: int
     operating_inputs: tuple[float, ...]
     limits: Limits = NO_LIMITS
+    quantity_errors: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -182,6 +194,8 @@ class LatentModel(ParametricModel):
         if tuple(name for name in self.layout.names if name in self.names) != self.names:
             known = ", ".join(self.layout.names)
             raise ModelError(f"the parameters of a model {self.kind} are some of {known}, in this order")
+        if self.quantity_errors is not None and len(self.quantity_errors) != len(self.quantities):
+            raise ModelError(f"a model {self.kind} has a standard error for each of its quantities")
         early = [parse_channel_name(name).at_once for name in self.input_names]
         if self.reads_at_once and not all(early):
             raise ModelError("the output reads the inputs at sample k: read them one sample early (u+1)")
@@ -304,19 +318,59 @@ class LatentModel(ParametricModel):
     def equation(self) -> EquationText:
         """Return the equations as text, with the values of the parameters and with the units as signals."""
         written = self.write_equation(*self._display())
-        if not (modes := self.describe_modes()):
+        if not self.describe_modes():
             return written
+        note = "" if self.quantity_errors is None else " (+- standard errors)"
         plain, named = (
-            f"\nabout {self._name_point(names)}: {'; '.join(modes)}"
+            f"\nabout {self._name_point(names)}{note}: {'; '.join(self._describe_modes(names))}"
             for names in (symbols(self.inputs)[1:], signal_names(self)[1:])
         )
         return replace(written, plain=written.plain + plain, named=written.named + named)
 
     def describe_modes(self) -> tuple[str, ...]:
-        """State the time constants and resonances at rest at the operating point; empty without a time."""
+        """State the time constants and resonances at rest at the operating point; empty without a time.
+
+        With standard errors, the static gains follow, with the columns of the record.
+        """
+        return self._describe_modes(signal_names(self)[1:])
+
+    def _describe_modes(self, names: Sequence[str]) -> tuple[str, ...]:
         if self.dt is None:
             return ()
-        return describe_poles(self.linearise(self.rest).poles, self.dt)
+        errors = self.quantity_errors
+        modes = describe_poles(self.linearise(self.rest).poles, self.dt, errors)
+        if errors is None:
+            return modes
+        gains = zip(names, self.quantities[-self.inputs :], errors[-self.inputs :], strict=True)
+        written = (
+            f"static gain of {name} {gain.value:.4g}{write_error(error)}" for name, gain, error in gains
+        )
+        return (*modes, *written)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Quantities of the modes, slowest first, and static gains, at rest at the operating point.
+
+        Empty without a time.
+        """
+        if self.dt is None:
+            return ()
+        system = self.linearise(self.rest)
+        modes = (each for pole in list_modes(system.poles) for each in measure_mode(pole, self.dt))
+        return (*modes, *measure_gains(system))
+
+    def with_parameters(
+        self, values: Sequence[float], standard_errors: Sequence[float] | None = None
+    ) -> Self:
+        """Return a copy of the model with other parameters; standard errors of quantities are unknown."""
+        return replace(super().with_parameters(values, standard_errors), quantity_errors=None)
+
+    def list_quantities(self) -> list[dict[str, Any]]:
+        """Return the quantities with their standard errors as JSON values."""
+        found = self.quantities
+        errors = self.quantity_errors or (None,) * len(found)
+        pairs = zip(found, errors, strict=True)
+        return [{**asdict(each), "standard_error": error} for each, error in pairs]
 
     def _display(self) -> tuple[dict[str, str], tuple[str, ...]]:
         """Return the right sides of all displayed signals with numbers, and the names of the units."""
@@ -381,12 +435,14 @@ class LatentModel(ParametricModel):
         """Return the model as JSON values."""
         structure: dict[str, Any] = {"order": self.order, "units": list(self.units), "memory": self.memory}
         structure |= {"operating_inputs": list(self.operating_inputs), "limits": list(self.limits)}
-        return {**structure, **super().document()}
+        return {**structure, **super().document(), "quantities": self.list_quantities()}
 
     @classmethod
     def read_structure(cls, document: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of the structure of JSON values."""
+        errors = [entry.get("standard_error") for entry in document.get("quantities", ())]
         return {
+            "quantity_errors": None if None in errors or not errors else tuple(map(float, errors)),
             "order": int(document["order"]),
             "units": tuple(map(str, document["units"])),
             "memory": int(document["memory"]),

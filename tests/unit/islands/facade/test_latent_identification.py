@@ -52,6 +52,17 @@ def test_the_cubic_spring_is_found():
     assert any(name.startswith("w1") for name in best.names)
 
 
+@pytest.mark.ci
+def test_modes_have_standard_errors(result, tmp_path):
+    for each in result.models:
+        assert len(each.model.quantity_errors) == len(each.model.quantities)
+    result.save(tmp_path, figures=())
+    saved = islands.load(tmp_path)
+    assert saved.best.model == result.best.model
+    errors = [each["standard_error"] for each in saved.best.document["quantities"]]
+    assert tuple(errors) == result.best.model.quantity_errors
+
+
 @pytest.mark.nightly
 def test_a_saturation_of_the_input_is_found():
     best = identify_record(saturated_record(1200, 1), preset="latent").best.model

@@ -60,6 +60,13 @@ def test_a_diagram_names_the_signals_the_units_and_the_modes():
         "with the units, about rest at u_V = 0:",
         "resonance at 5.189 Hz with a damping ratio of 0.162",
     ]
+    with_errors = make_model(quantity_errors=(0.003, 0.001, 0.02))
+    assert list_texts(with_errors)[0].split("\n")[2:] == [
+        "resonance at 5.189 +- 0.003 Hz with a damping ratio of",
+        "0.162 +- 0.001",
+        "static gain of u_V 0.564 +- 0.02",
+        "(+- standard errors)",
+    ]
 
 
 def test_an_arrow_of_some_inputs_names_them():

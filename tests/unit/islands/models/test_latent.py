@@ -130,3 +130,34 @@ def test_modes_are_those_about_the_operating_point():
     (stiff,) = make_model(operating_inputs=(1.0,)).describe_modes()
     assert float(stiff.split("resonance at ")[1].split()[0]) > 5.2
     assert replace(lag, dt=None).describe_modes() == ()
+
+
+def test_standard_errors_follow_the_quantities():
+    model = make_model(quantity_errors=(0.0123, 0.0045, 0.067))
+    assert [(each.name, each.unit, each.input) for each in model.quantities] == [
+        ("frequency", "Hz", None),
+        ("damping ratio", "", None),
+        ("static gain", "", 1),
+    ]
+    assert model.equation().plain.splitlines()[-1] == (
+        "about rest at u = 0 (+- standard errors): resonance at 5.189 +- 0.012 Hz with a damping ratio of "
+        "0.162 +- 0.0045; static gain of u 0.564 +- 0.067"
+    )
+    assert model.equation().named.endswith("static gain of u_V 0.564 +- 0.067")
+
+
+def test_a_document_has_the_quantities_with_their_standard_errors():
+    model = make_model(quantity_errors=(0.01, 0.004, 0.06))
+    entries = model.document()["quantities"]
+    assert [each["standard_error"] for each in entries] == [0.01, 0.004, 0.06]
+    assert entries[2]["value"] == pytest.approx(0.564)
+    assert LatentModel.read(model.document(), "file") == model
+    earlier = {name: value for name, value in make_model().document().items() if name != "quantities"}
+    assert LatentModel.read(earlier, "file") == make_model()
+    with pytest.raises(ModelError, match="for each of its quantities"):
+        make_model(quantity_errors=(0.01,))
+
+
+def test_standard_errors_are_those_of_one_estimate():
+    model = make_model(quantity_errors=(0.01, 0.004, 0.06))
+    assert model.with_parameters(model.parameters).quantity_errors is None

@@ -35,6 +35,23 @@ def test_resonances_are_those_of_the_continuous_system():
     )
 
 
+def test_standard_errors_of_modes_are_stated_in_their_order():
+    poles = [np.exp(-0.01 / 0.5), 0.5 + 0.5j, 0.5 - 0.5j, 0.0, -0.3, 1.1]
+    assert describe_poles(poles, 0.01, (0.001, 0.02, 0.31, 0.0123, 0.004)) == (
+        "a mode that does not decay (pole 1.1 +- 0.001)",
+        "time constant 0.5 +- 0.02 s",
+        "resonance at 13.66 +- 0.31 Hz with a damping ratio of 0.404 +- 0.012",
+        "an alternating mode (pole -0.3 +- 0.004)",
+        "a delay of one sample",
+    )
+
+
+def test_the_static_gain_is_the_response_at_rest():
+    lag = LinearSystem(np.array([[0.9]]), np.array([[0.5, 0.0]]), np.array([2.0]), np.array([0.0, 0.3]))
+    assert lag.static_gains == pytest.approx(lag.respond(np.zeros(1))[:, 0].real)
+    assert np.isnan(LinearSystem(np.eye(1), np.ones((1, 1)), np.ones(1), np.zeros(1)).static_gains).all()
+
+
 @pytest.mark.ci
 @pytest.mark.parametrize("frequency", [0.02, 0.0525, 0.2])
 def test_the_response_at_rest_is_the_ratio_of_a_small_sine(frequency):

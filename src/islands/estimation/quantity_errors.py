@@ -1,0 +1,101 @@
+"""Standard errors of the modes and of the static gains of latent models.
+
+The parameters of a state space have no unique coordinates. The modes and the gains of its linear system at
+rest do not depend on the coordinates, so that they have standard errors, by the delta method: the covariance
+of the parameters, times the derivatives of a quantity on both sides. The covariance is the sandwich of the
+free run with its coloured residual (see `covariance`), on the directions that have an effect on the free run
+(a pseudo-inverse of the information). A change of the coordinates has none, neither on the free run nor on
+the quantities.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.estimation.covariance import sandwich
+from islands.estimation.damped_least_squares import inner_products
+from islands.estimation.shooting_residual import make_residual
+from islands.models.latent import LatentModel
+from islands.models.linear_system import list_modes, measure_gains, measure_mode
+
+#: Information of a direction, relative to the largest, up to which it has no effect: of changes of the
+#: coordinates, it is the rounding error of the sums, 1e-17 to 1e-15.
+_NO_EFFECT = 1e-13
+
+#: Step of a difference of parameters in units of their magnitudes.
+_STEP = 1e-6
+
+
+def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | None = None) -> LatentModel:
+    """Return a model with the standard errors of its quantities.
+
+    Parameters
+    ----------
+    model : LatentModel
+        Model whose parameters minimise the error of the free run.
+    record : Dataset
+        Data of the estimation, with all outputs.
+    warm_up : int or None
+        Number of samples before the first prediction. None is the memory of the model.
+
+    Returns
+    -------
+    LatentModel
+        The model itself if the free run diverges, if it has no sampling time, if the record has no more
+        samples than parameters, or if a quantity has no derivative.
+    """
+    theta = np.array(model.parameters)
+    residual = make_residual(model, record, None, warm_up)
+    error = residual(theta)
+    if model.dt is None or error is None or not np.isfinite(error).all() or error.size <= theta.size:
+        return model
+    slopes = _differentiate(model, theta)
+    if slopes is None:
+        return model
+    unit = np.where(theta == 0.0, 1.0, np.abs(theta))
+    jacobian = residual.differentiate(theta, np.diag(unit))
+    norms = np.sqrt(np.einsum("fk,fk->f", jacobian, jacobian))
+    norms[norms == 0.0] = 1.0
+    jacobian /= norms[:, None]
+    # Sums in a written order have the same bits on every number of threads.
+    values, vectors = np.linalg.eigh(inner_products(jacobian, error, 0, error.size)[0])
+    kept = values > _NO_EFFECT * values[-1]
+    basis = vectors[:, kept] / np.sqrt(values[kept])
+    # Effect of the residual of every row on a quantity, which no change of the coordinates alters.
+    effects = np.einsum("qf,fi,gi->qg", slopes * (unit / norms), basis, basis)
+    influences = np.einsum("qg,gk->qk", effects, jacobian)
+    variances = np.array([sandwich(each[None], error)[0, 0] for each in influences])
+    variances *= (error.size - 1) / max(1, error.size - int(np.count_nonzero(kept)))
+    return replace(model, quantity_errors=tuple(np.sqrt(variances).tolist()))
+
+
+def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the derivatives of the quantities, shape (quantities, parameters); None if there are none."""
+    poles = list_modes(model.linearise(model.rest).poles)
+    slopes = np.empty((len(model.quantities), theta.size))
+    for place, value in enumerate(theta):
+        step = _STEP * (abs(value) or 1.0)
+        found = []
+        for sign in (1.0, -1.0):
+            moved = theta.copy()
+            moved[place] += sign * step
+            found.append(_measure(model.with_parameters(moved.tolist()), poles))
+        if not len(found[0]) == len(found[1]) == len(slopes):
+            return None
+        slopes[:, place] = (found[0] - found[1]) / (2.0 * step)
+    return slopes if np.isfinite(slopes).all() else None
+
+
+def _measure(model: LatentModel, poles: Sequence[complex]) -> NDArray[np.float64]:
+    """Return the quantities of a model, with its modes in the order of the nearest of the given poles."""
+    system = model.linearise(model.rest)
+    left, ordered = list_modes(system.poles), []
+    for pole in poles[: len(left)]:
+        nearest = min(left, key=lambda each: abs(each - pole))
+        left.remove(nearest)
+        ordered.append(nearest)
+    modes = (each for pole in ordered for each in measure_mode(pole, model.dt or 1.0))
+    return np.array([each.value for each in (*modes, *measure_gains(system))])
