@@ -28,15 +28,15 @@ _LEAST_RATIO = 4.0
 _HELD = 0.4
 
 
-class Limits(NamedTuple):
-    """Least and greatest value that a sensor shows; None where a signal has no flat extreme."""
+class SensorLimits(NamedTuple):
+    """Least and greatest value that a sensor shows; None for an extreme that is not flat."""
 
     lower: float | None = None
     upper: float | None = None
 
     @property
     def range(self) -> tuple[float, float]:
-        """Both limits, infinite where there is none."""
+        """Both limits, infinite without one."""
         lower = -np.inf if self.lower is None else self.lower
         return lower, np.inf if self.upper is None else self.upper
 
@@ -47,11 +47,11 @@ class Limits(NamedTuple):
         return text if self.upper is None else f"min({text}, {self.upper!r})"
 
 
-#: Limits of a sensor that has none.
-NO_LIMITS = Limits()
+#: SensorLimits of a sensor that has none.
+NO_LIMITS = SensorLimits()
 
 
-def find_limits(values: NDArray[np.float64]) -> Limits:
+def find_limits(values: NDArray[np.float64]) -> SensorLimits:
     """Return the flat extremes of a signal; none of one that is held between steps or has two levels.
 
     Parameters
@@ -64,7 +64,7 @@ def find_limits(values: NDArray[np.float64]) -> Limits:
     if levels.size <= TWO or is_held(values, step):
         return NO_LIMITS
     lower, upper = (count_flat(sign * values, step) > 0 for sign in (-1.0, 1.0))
-    return Limits(float(levels[0]) if lower else None, float(levels[-1]) if upper else None)
+    return SensorLimits(float(levels[0]) if lower else None, float(levels[-1]) if upper else None)
 
 
 def count_flat(values: NDArray[np.float64], step: float) -> int:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
-from islands.data.flat_extremes import NO_LIMITS, Limits
+from islands.data.flat_extremes import NO_LIMITS, SensorLimits
 from islands.errors import ModelError
 from islands.models.equations import signal_names
 from islands.models.linear_system import (
@@ -164,7 +164,7 @@ class LatentModel(ParametricModel):
         Number of samples from which the initial states of a free run are estimated.
     operating_inputs : tuple of float
         Inputs of the operating point, as the means of the estimation data.
-    limits : Limits
+    limits : SensorLimits
         Least and greatest output that the sensor shows.
     quantity_errors : tuple of float or None
         Standard errors of ``quantities``. The parameters have none: a change of the coordinates of the states
@@ -184,7 +184,7 @@ class LatentModel(ParametricModel):
     wiring: tuple[str, ...]
     memory: int
     operating_inputs: tuple[float, ...]
-    limits: Limits = NO_LIMITS
+    limits: SensorLimits = NO_LIMITS
     quantity_errors: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -441,13 +441,14 @@ class LatentModel(ParametricModel):
     def read_structure(cls, document: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of the structure of JSON values."""
         errors = [entry.get("standard_error") for entry in document.get("quantities", ())]
+        limits = document.get("limits", ())
         return {
             "quantity_errors": None if None in errors or not errors else tuple(map(float, errors)),
             "order": int(document["order"]),
             "units": tuple(map(str, document["units"])),
             "memory": int(document["memory"]),
             "operating_inputs": tuple(map(float, document["operating_inputs"])),
-            "limits": Limits(*(None if each is None else float(each) for each in document.get("limits", ()))),
+            "limits": SensorLimits(*(None if each is None else float(each) for each in limits)),
             "wiring": tuple(str(entry["name"]) for entry in document["parameters"]),
         }
 

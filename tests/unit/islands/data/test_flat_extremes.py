@@ -1,9 +1,9 @@
-"""Limits of a sensor: flat extremes of a signal."""
+"""SensorLimits of a sensor: flat extremes of a signal."""
 
 import numpy as np
 import pytest
 
-from islands.data.flat_extremes import Limits, find_limits
+from islands.data.flat_extremes import SensorLimits, find_limits
 
 
 def wave(samples=2000):
@@ -12,23 +12,25 @@ def wave(samples=2000):
 
 @pytest.mark.parametrize(("lower", "upper"), [(None, 0.7), (-0.5, None), (-0.6, 0.8), (None, None)])
 def test_the_limits_of_a_clipped_signal_are_found(lower, upper):
-    assert find_limits(np.clip(wave(), lower, upper)) == Limits(lower, upper)
+    assert find_limits(np.clip(wave(), lower, upper)) == SensorLimits(lower, upper)
 
 
 def test_missing_samples_are_no_limit():
     y = np.clip(wave(), None, 0.7)
     y[100:200] = np.nan
-    assert find_limits(y) == Limits(None, 0.7)
-    assert find_limits(np.full(50, np.nan)) == Limits()
+    assert find_limits(y) == SensorLimits(None, 0.7)
+    assert find_limits(np.full(50, np.nan)) == SensorLimits()
 
 
 def test_signals_that_are_held_or_have_two_levels_have_no_limits():
     held = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, 40), 25)
-    assert find_limits(held) == Limits()
-    assert find_limits(np.sign(wave())) == Limits()
+    assert find_limits(held) == SensorLimits()
+    assert find_limits(np.sign(wave())) == SensorLimits()
 
 
-@pytest.mark.parametrize("limits", [Limits(), Limits(-1.0), Limits(None, 2.5), Limits(-1.0, 2.5)])
+@pytest.mark.parametrize(
+    "limits", [SensorLimits(), SensorLimits(-1.0), SensorLimits(None, 2.5), SensorLimits(-1.0, 2.5)]
+)
 def test_the_expression_of_limits_is_their_range(limits):
     names = {"min": min, "max": max, "y": 0.0}
     for value in (-4.0, 0.5, 4.0):

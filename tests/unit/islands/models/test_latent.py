@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.data.flat_extremes import Limits
+from islands.data.flat_extremes import SensorLimits
 from islands.errors import ModelError
 from islands.export import export
 from islands.models.latent import UNITS, LatentModel, StateSpaceLayout
@@ -72,7 +72,7 @@ def test_a_program_is_the_simulation_from_the_same_states(unit):
 
 
 def test_the_output_is_limited_as_that_of_the_sensor():
-    model, module = make_model(limits=Limits(-0.5, 0.9)), {}
+    model, module = make_model(limits=SensorLimits(-0.5, 0.9)), {}
     assert model.equation().line.startswith("y(k) = min(max(1.2*x1(k) + 0.3, -0.5), 0.9)")
     exec(export(model, "python"), module)
     record = spring_record(300)
@@ -86,7 +86,7 @@ def test_the_output_is_limited_as_that_of_the_sensor():
 
 
 def test_a_document_has_the_whole_model():
-    model = make_model(standard_errors=(0.1,) * 10, operating_inputs=(0.2,), limits=Limits(None, 2.0))
+    model = make_model(standard_errors=(0.1,) * 10, operating_inputs=(0.2,), limits=SensorLimits(None, 2.0))
     assert LatentModel.read(model.document(), "model.json") == model
 
 
