@@ -165,6 +165,15 @@ def report_part(progress: ProgressCallback, begin: float, end: float) -> Progres
     return report
 
 
+def prefix_messages(progress: ProgressCallback, title: str) -> ProgressCallback:
+    """Return a callback that writes a title before the messages."""
+
+    def report(message: str, fraction: float | None = None, /) -> None:
+        progress(title + message, fraction)
+
+    return report
+
+
 class TimeLeft:
     """Estimate of the time that a computation still takes, from the fractions that it reports.
 

@@ -9,7 +9,15 @@ from islands.benchmarks.definition import CLASSES, LINEAR, METRIC, Benchmark, Be
 from islands.benchmarks.model_searches import MODEL_SEARCHES, ModelSearch, count_terms
 from islands.benchmarks.scoring import measure_coverage, measure_rmse
 from islands.errors import IslandsError, SettingsError, check_at_least, check_seconds, lookup
-from islands.progress import ProgressCallback, Stop, StoppedError, ignore_progress, never_stop, report_part
+from islands.progress import (
+    ProgressCallback,
+    Stop,
+    StoppedError,
+    ignore_progress,
+    never_stop,
+    prefix_messages,
+    report_part,
+)
 
 #: Returns the time in seconds.
 Clock = Callable[[], float]
@@ -175,21 +183,12 @@ def compare(
     searches = settings.searches
     for place, (kind, seed) in enumerate(searches):
         part = report_part(progress, place / len(searches), (place + 1) / len(searches))
-        report = _prefix(part, f"{name}, {kind}, seed {seed}: ")
+        report = prefix_messages(part, f"{name}, {kind}, seed {seed}: ")
         found = _search(benchmark, data, MODEL_SEARCHES[kind], seed, clock, settings.budget, report, stop)
         if stop():  # the search is not complete
             break
         outcomes.setdefault(kind, []).append(found)
     return make_rows(name, benchmark, list(data.tests), outcomes)
-
-
-def _prefix(progress: ProgressCallback, title: str) -> ProgressCallback:
-    """Return a callback that writes a title before the messages."""
-
-    def report(message: str, fraction: float | None = None, /) -> None:
-        progress(title + message, fraction)
-
-    return report
 
 
 def _search(

@@ -47,10 +47,27 @@ def measure_rmse(model: AnyModel, test: BenchmarkTest) -> float:
         raise ModelError(
             f"the model needs {model.maximum_lag * average} initial samples, the test allows {test.known}"
         )
-    simulated = _simulate(model, test, warm_up)
+    return measure_simulation(_simulate(model, test, warm_up), test, average)
+
+
+def measure_simulation(simulated: NDArray[np.float64], test: BenchmarkTest, average: int = 1) -> float:
+    """Return the RMSE of a simulation over the scored samples and all outputs.
+
+    Parameters
+    ----------
+    simulated : ndarray
+        Of the shape of the outputs.
+    test : BenchmarkTest
+    average : int
+        Samples of a mean, if the model predicts means. The last samples may be fewer, and are not scored.
+
+    Raises
+    ------
+    ModelError
+        The simulation diverges.
+    """
     scored = np.zeros(test.record.samples, bool)
     for begin, end in test.record.bounds:
-        # The last samples may be fewer than those of a mean.
         scored[begin + test.unscored : begin + (end - begin) // average * average] = True
     errors = (simulated - test.record.y)[scored]
     if not np.isfinite(errors).all():
