@@ -1,12 +1,19 @@
-"""``islands benchmark``: the list, and a run from the files to the rows."""
+"""``islands benchmark``: the list, a run from the files to the rows, and other packages."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
+from islands.benchmarks.peers import environments
+from islands.benchmarks.peers.catalogue import PEERS
+from islands.benchmarks.peers.environments import PeerEnvironment
+from islands.cli.commands import benchmark
 from support.command_line import fail, succeed
 from support.latent_systems import smooth_input
+from support.peer_scripts import LEAST_SQUARES, make_peer
 
 #: Fields of a row of the document.
 FIELDS = {
@@ -71,3 +78,43 @@ def test_errors_come_before_the_searches(folder):
     assert "unknown class of models 'spline'" in unknown
     assert "no set is present" in fail("benchmark", "run", "all", "--data", folder / "none")
     assert "pip install nonlinear-benchmarks" in fail("benchmark", "run", "nonlinear_benchmarks:EMPS")
+
+
+@pytest.mark.ci
+def test_other_packages_have_a_row_for_each_test_with_their_cpu_time(folder, monkeypatch):
+    """A small script in place of an installed package."""
+    monkeypatch.setattr(benchmark, "PEERS", {"fastcan": make_peer(folder, LEAST_SQUARES)})
+    python = PeerEnvironment(sys.executable, ("numpy==2",))
+    monkeypatch.setattr(environments, "prepare_environment", lambda *_: python)
+    out = folder / "new" / "peers.json"
+    shown = succeed(
+        "benchmark", "peers", "--peer", "fastcan", "--data", folder, "--limit", "60", "--json", out
+    )
+    document = json.loads(out.read_text())
+    assert (document["limit_s"], document["packages"]) == (60.0, {"fastcan": ["numpy==2"]})
+    assert document["benchmarks"]["cascaded-tanks"]["other_files"] == ["cascaded_tanks.csv"]
+    (row,) = document["results"]
+    assert row["error"] == pytest.approx(0.02, rel=0.1)
+    assert (row["benchmark"], row["test"], row["reason"]) == ("cascaded-tanks", "validation", None)
+    assert "cascaded-tanks, RMSE in V" in shown
+    assert "tiny 1.2: A setting." in shown
+
+
+def test_an_unknown_package_or_limit_is_an_error(folder):
+    assert "unknown package 'sindy'" in fail("benchmark", "peers", "--peer", "sindy", "--data", folder)
+    assert "positive number of seconds" in fail("benchmark", "peers", "--limit", "0", "--data", folder)
+
+
+@pytest.mark.nightly
+def test_a_package_of_the_index_is_measured(folder):
+    """A lag is linear: any of the packages finds it, up to the noise of the output."""
+    pip = [sys.executable, "-m", "pip", "download", "--no-deps", "--quiet", "--dest", folder / "index"]
+    peer = PEERS["fastcan"]
+    answered = subprocess.run([*pip, f"{peer.package}=={peer.version}"], check=False, capture_output=True)
+    if answered.returncode != 0:
+        pytest.skip("the package index does not answer")
+    arguments = ("--peer", "fastcan", "--environments", folder / "venv", "--json", folder / "rows.json")
+    succeed("benchmark", "peers", "cascaded-tanks", "--data", folder, *arguments)
+    (row,) = json.loads((folder / "rows.json").read_text())["results"]
+    assert row["reason"] is None
+    assert row["error"] == pytest.approx(0.02, rel=0.2)

@@ -64,7 +64,7 @@ COMMANDS = make_commands(
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
         "reproduce": "Compute the tables and figures of the paper, and write them next to the published "
         "numbers.",
-        "benchmark": "Published sets of measurements: list them, run the searches on them.",
+        "benchmark": "Published sets of measurements: list them, run the searches or other packages on them.",
         "systems": "Simulated systems: list them, make records of them.",
     },
 )

@@ -1,4 +1,4 @@
-"""``islands benchmark``: errors of the searches on published sets, next to published errors."""
+"""``islands benchmark``: errors of the searches on published sets, next to published errors and to peers."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from platformdirs import user_cache_path
 from rich.table import Table
 from rich.text import Text
 
@@ -20,19 +21,22 @@ from islands.benchmarks.definition import (
     list_other_files,
     read_data,
 )
+from islands.benchmarks.peers.catalogue import PEERS
 from islands.benchmarks.public_package import list_package_sets
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import stop_requests
 from islands.distribution import read_version
-from islands.errors import SettingsError, lookup
-from islands.progress import report_part
+from islands.errors import SettingsError, check_seconds, lookup
+from islands.progress import prefix_messages, report_part
 
 if TYPE_CHECKING:
     from islands.benchmarks.comparison import BenchmarkRow
+    from islands.benchmarks.definition import BenchmarkData
+    from islands.benchmarks.peers.comparison import PeerRow
 
 benchmark = typer.Typer(
-    help="Published sets of measurements: list them, run the searches on them.",
+    help="Published sets of measurements: list them, run the searches or other packages on them.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -82,14 +86,7 @@ def run(
     for each in classes or ():
         lookup(dict.fromkeys(CLASSES), each, "class of models")
     chosen = {name: find_benchmark(name) for name in _expand(names, data)}
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    # Read first: an error in a file is shown before the searches, which take minutes.
-    found = {}
-    with progress("benchmark") as show:
-        for name, entry in chosen.items():
-            show(f"reading {name}", None)
-            found[name] = read_data(name, entry, data)
+    found = _read(chosen, data, out)
     compile_kernels()
     # The searches load the kernels, which the help of the command does not need.
     from islands.benchmarks.comparison import ComparisonSettings, compare  # noqa: PLC0415
@@ -105,10 +102,84 @@ def run(
             incomplete += [name] * stop()
     for name in dict.fromkeys(row.benchmark for row in rows):
         _print_rows(name, [row for row in rows if row.benchmark == name])
-    if out is not None:
-        document = _make_document(chosen, data, settings.budget, rows)
-        out.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
+    _write_document(out, chosen, data, rows, budget_s=settings.budget)
     stop.end(out, incomplete, "repeat the command for all searches")
+
+
+@benchmark.command()
+def peers(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Names from the list; by default all that are present.")
+    ] = None,
+    peer: Annotated[
+        list[str] | None,
+        typer.Option("--peer", help=f"Package; repeatable: {', '.join(PEERS)}; by default all."),
+    ] = None,
+    environments: Annotated[
+        Path | None,
+        typer.Option(
+            "--environments",
+            help="Folder for the virtual environments of the packages; by default in the user's cache.",
+        ),
+    ] = None,
+    limit: Annotated[float, typer.Option("--limit", help="CPU seconds of a package on a set.")] = 300.0,
+    out: Annotated[Path | None, typer.Option("--json", help="JSON file for the results.")] = None,
+    data: DataFolder = None,
+) -> None:
+    """Measure other packages on sets, by the same rule as the searches, with their CPU seconds.
+
+    Each package is installed from the package index into its own virtual environment. Ctrl-C keeps the
+    complete runs.
+    """
+    selected = {each: lookup(PEERS, each, "package") for each in peer or PEERS}
+    check_seconds(limit, "the limit")
+    chosen = {name: find_benchmark(name) for name in _expand(names or [ALL], data)}
+    found = _read(chosen, data, out)
+    # They load the simulation of models, which the help of the command does not need.
+    from islands.benchmarks.peers.comparison import compare_peer  # noqa: PLC0415
+    from islands.benchmarks.peers.environments import prepare_environment  # noqa: PLC0415
+
+    folder = environments or user_cache_path("islands", appauthor=False) / "peers"
+    runs = [(name, each) for name in chosen for each in selected]
+    rows: list[PeerRow] = []
+    incomplete: list[str] = []
+    with progress("benchmark") as show, stop_requests() as stop:
+        installed = {}
+        for name, each in selected.items():
+            show(f"installing {each.package} {each.version}", None)
+            installed[name] = prepare_environment(each, folder, stop)
+        for place, (name, package) in enumerate(runs):
+            title = f"{name}, {package}"
+            if not stop():
+                part = report_part(show, place / len(runs), (place + 1) / len(runs))
+                report = prefix_messages(part, f"{title}: ")
+                python = installed[package].python
+                rows += compare_peer(
+                    name, chosen[name], found[name], selected[package], python, limit, report, stop
+                )
+            incomplete += [title] * stop()
+    for name in dict.fromkeys(row.benchmark for row in rows):
+        _print_peers(name, chosen[name], [row for row in rows if row.benchmark == name])
+    for each in selected.values():
+        output.print(f"{each.package} {each.version}: {each.setting}", markup=False)
+    packages = {name: each.packages for name, each in installed.items()}
+    _write_document(out, chosen, data, rows, limit_s=limit, packages=packages)
+    stop.end(out, incomplete, "repeat the command for all runs")
+
+
+def _read(chosen: Mapping[str, Benchmark], data: Path | None, out: Path | None) -> dict[str, "BenchmarkData"]:
+    """Return the data of the sets, and make the folder of the results.
+
+    An error in a file is shown before the searches, which take minutes.
+    """
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    found = {}
+    with progress("benchmark") as show:
+        for name, entry in chosen.items():
+            show(f"reading {name}", None)
+            found[name] = read_data(name, entry, data)
+    return found
 
 
 def _expand(names: Sequence[str], data: Path | None) -> list[str]:
@@ -170,13 +241,42 @@ def _print_rows(name: str, rows: Sequence["BenchmarkRow"]) -> None:
         output.print(reason, markup=False)
 
 
-def _make_document(
-    chosen: Mapping[str, Benchmark], data: Path | None, budget: float | None, rows: Sequence["BenchmarkRow"]
-) -> dict[str, Any]:
-    """Return the rows, and the rules and options of the comparison, as JSON values."""
-    return {
+def _print_peers(name: str, entry: Benchmark, rows: Sequence["PeerRow"]) -> None:
+    """Print the table of a set, and below it what was chosen, or why rows have no error."""
+    title = f"{name}, {rows[0].metric} in {rows[0].unit or 'the unit of the output'}"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    for column in ("test", "package", "version"):
+        table.add_column(column, no_wrap=True)
+    for column in ("error", "published", "CPU s"):
+        table.add_column(column, justify="right", no_wrap=True)
+    remarks: dict[str, None] = {}
+    tests = dict.fromkeys(row.test for row in rows)
+    for row in (each for test in tests for each in rows if each.test == test):
+        least = _write_least(entry.published.get(row.test, ()))
+        cells = (row.test, row.peer, row.version, _write(row.error), least, f"{row.cpu_s:.0f}")
+        table.add_row(*map(Text, cells))
+        if row.reason is not None:
+            remarks[f"{row.test}, {row.peer}: {row.reason}"] = None
+        elif row.chosen is not None:
+            remarks[f"{row.peer}: {row.chosen}"] = None
+    output.print(table)
+    for remark in remarks:
+        output.print(remark, markup=False)
+
+
+def _write_document(
+    out: Path | None,
+    chosen: Mapping[str, Benchmark],
+    data: Path | None,
+    rows: Sequence["BenchmarkRow"] | Sequence["PeerRow"],
+    **options: Any,
+) -> None:
+    """Write the rows, and the rules and options of the comparison, to a file if one is given."""
+    if out is None:
+        return
+    document = {
         "islands": read_version(),
-        "budget_s": budget,
+        **options,
         "benchmarks": {
             name: {
                 "description": entry.description,
@@ -190,3 +290,4 @@ def _make_document(
         },
         "results": [asdict(row) for row in rows],
     }
+    out.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
