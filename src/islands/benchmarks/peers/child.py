@@ -189,6 +189,8 @@ def _read_request(folder: Path) -> tuple[list[PeerRecording], list[PeerRecording
 def main(script: str, folder: Path) -> None:
     """Answer the request of a folder by a script."""
     estimation, tests, limit = _read_request(folder)
+    # The signal at the limit writes the memory of the process to a file where the system allows it.
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(limit)), resource.RLIM_INFINITY))
     scales = {}
     for name in "uy":
