@@ -96,7 +96,7 @@ def extend_equations(
         screened = screen_effects(added.base, added.target, run) if is_single else ()
         added = replace(added, screened=screened, hypothesis=replace(added.hypothesis, fit=fit))
         described = describe_effects(added, run)[0]
-        findings += tuple(replace(each, is_claimed=each.confidence >= MIN_CONFIDENCE) for each in described)
+        findings += tuple(map(_withdraw_improbable, described))
     return replace(
         found,
         verdict=Verdict.DISCOVERED,
@@ -141,7 +141,8 @@ def make_diagnosis(
         findings, equivalents = describe_effects(fitted_outcome, run, rival)
         if verdict == Verdict.REMAINDER:
             findings = (findings[0], *(replace(each, is_claimed=False) for each in findings[1:]))
-        if all(each.confidence < MIN_CONFIDENCE for each in findings if each.is_claimed):
+        findings = tuple(map(_withdraw_improbable, findings))
+        if not any(each.is_claimed for each in findings):
             findings, equivalents, gain, verdict = (), (), None, Verdict.UNKNOWN
     residual = (record.y - hypothesis.fit.output)[:fitted]
     context = hypothesis.fit.simulation.context
@@ -174,6 +175,11 @@ def make_diagnosis(
         discovery=terms.discovery if terms is not None and _is_equivalent(findings) else None,
         shape=compare_shapes(replace(outcome, hypothesis=hypothesis)) if findings else None,
     )
+
+
+def _withdraw_improbable(finding: Finding) -> Finding:
+    """Return a finding that is not claimed if others are much more probable."""
+    return replace(finding, is_claimed=finding.is_claimed and finding.confidence >= MIN_CONFIDENCE)
 
 
 def _measure_confirmed_gain(

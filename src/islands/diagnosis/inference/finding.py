@@ -67,8 +67,7 @@ class Finding:
         Fraction of the explainable misfit that the cause explains; None for a property of the noise.
     is_claimed : bool
         Whether it is claimed as a cause. If a remainder shows that the simulation is still wrong, only the
-        first effect is: further ones may follow its wrong form. An effect next to discovered terms is not
-        if others are much more probable.
+        first effect is: further ones may follow its wrong form. No cause is if others are much more probable.
     """
 
     name: str

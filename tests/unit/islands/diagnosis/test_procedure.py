@@ -1,6 +1,7 @@
 """Diagnosis: findings, rejected input, hold-out part and reproducibility."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from islands.diagnosis import procedure as diagnosis
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.preparation import MIN_SAMPLES
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
+from islands.diagnosis.inference.finding import describe_effects
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
@@ -122,6 +124,23 @@ def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) 
     assert (found.verdict, found.effects, found.gain) == (Verdict.UNKNOWN, (), None)
     assert found.candidates[0].name == "offset"
     assert found.best is found.base
+
+
+def test_only_the_improbable_cause_of_several_is_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def describe(*arguments: Any) -> tuple:
+        findings, equivalents = describe_effects(*arguments)
+        return (*findings[:-1], replace(findings[-1], confidence=0.03)), equivalents
+
+    monkeypatch.setattr(diagnosis_assembly, "describe_effects", describe)
+    k = np.arange(400.0)
+    u, simulated = (
+        np.sin(0.7 * k - lag) + gain * np.sin(0.093 * k) for lag, gain in ((0.0, 0.6), (0.8, 0.9))
+    )
+    y = simulated + 2e-3 * k + 0.1 * np.sin(0.37 * k) + 0.02 * np.random.default_rng(1).standard_normal(400)
+    effects = [CATALOGUE["linear-drift"], CATALOGUE["periodic-disturbance"]]
+    found = diagnose(Dataset(u, y, 1.0), RecordedOutput("theirs", simulated), catalogue=effects)
+    assert [each.is_claimed for each in found.causes] == [True, False]
+    assert found.verdict == Verdict.NAMED
 
 
 def _nominal(record: Dataset) -> tuple:
