@@ -11,7 +11,7 @@ Schoukens and Toth, Automatica 113 (2020) 108731).
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from math import prod
+from math import isfinite, prod
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -366,11 +366,17 @@ class LatentModel(ParametricModel):
         return replace(super().with_parameters(values, standard_errors), quantity_errors=None)
 
     def list_quantities(self) -> list[dict[str, Any]]:
-        """Return the quantities with their standard errors as JSON values."""
+        """Return the quantities and standard errors as JSON values; the gain of an integrator is null."""
         found = self.quantities
         errors = self.quantity_errors or (None,) * len(found)
-        pairs = zip(found, errors, strict=True)
-        return [{**asdict(each), "standard_error": error} for each, error in pairs]
+        return [
+            {
+                **asdict(each),
+                "value": each.value if isfinite(each.value) else None,
+                "standard_error": error,
+            }
+            for each, error in zip(found, errors, strict=True)
+        ]
 
     def _display(self) -> tuple[dict[str, str], tuple[str, ...]]:
         """Return the right sides of all displayed signals with numbers, and the names of the units."""

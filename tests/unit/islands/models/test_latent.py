@@ -9,6 +9,7 @@ from islands.data.dataset import Dataset
 from islands.data.flat_extremes import SensorLimits
 from islands.errors import ModelError
 from islands.export import export
+from islands.io.models import model_from_json, model_json
 from islands.models.latent import UNITS, LatentModel, StateSpaceLayout
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
@@ -156,6 +157,13 @@ def test_a_document_has_the_quantities_with_their_standard_errors():
     assert LatentModel.read(earlier, "file") == make_model()
     with pytest.raises(ModelError, match="for each of its quantities"):
         make_model(quantity_errors=(0.01,))
+
+
+def test_the_gain_of_an_integrator_is_null_in_a_document():
+    model = make_model({"a1_1": 1.0, "b1": 0.1, "c1": 1.0}, (), 1)
+    assert np.isnan(model.quantities[-1].value)
+    assert model.list_quantities()[-1]["value"] is None
+    assert model_from_json(model_json(model)) == model
 
 
 def test_standard_errors_are_those_of_one_estimate():
