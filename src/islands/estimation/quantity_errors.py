@@ -19,7 +19,7 @@ from islands.estimation.covariance import sandwich
 from islands.estimation.damped_least_squares import inner_products
 from islands.estimation.shooting_residual import make_residual
 from islands.models.latent import LatentModel
-from islands.models.linear_system import list_modes, measure_gains, measure_mode
+from islands.models.linear_system import Quantity, list_modes, measure_gains, measure_mode
 
 #: Information of a direction, relative to the largest, up to which it has no effect: of changes of the
 #: coordinates, it is the rounding error of the sums, 1e-17 to 1e-15.
@@ -45,7 +45,7 @@ def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | Non
     -------
     LatentModel
         The model itself if the free run diverges, if it has no sampling time, if the record has no more
-        samples than parameters, or if a quantity has no derivative.
+        samples than parameters, or if a quantity has no derivative, as at a double pole or of an integrator.
     """
     theta = np.array(model.parameters)
     residual = make_residual(model, record, None, warm_up)
@@ -75,7 +75,8 @@ def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | Non
 def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return the derivatives of the quantities, shape (quantities, parameters); None if there are none."""
     poles = list_modes(model.linearise(model.rest).poles)
-    slopes = np.empty((len(model.quantities), theta.size))
+    names = [each.name for each in model.quantities]
+    slopes = np.empty((len(names), theta.size))
     for place, value in enumerate(theta):
         step = _STEP * (abs(value) or 1.0)
         found = []
@@ -83,13 +84,15 @@ def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np
             moved = theta.copy()
             moved[place] += sign * step
             found.append(_measure(model.with_parameters(moved.tolist()), poles))
-        if not len(found[0]) == len(found[1]) == len(slopes):
+        # A double pole becomes a resonance or two time constants, which are as many quantities.
+        if any([each.name for each in side] != names for side in found):
             return None
-        slopes[:, place] = (found[0] - found[1]) / (2.0 * step)
+        above, below = (np.array([each.value for each in side]) for side in found)
+        slopes[:, place] = (above - below) / (2.0 * step)
     return slopes if np.isfinite(slopes).all() else None
 
 
-def _measure(model: LatentModel, poles: Sequence[complex]) -> NDArray[np.float64]:
+def _measure(model: LatentModel, poles: Sequence[complex]) -> list[Quantity]:
     """Return the quantities of a model, with its modes in the order of the nearest of the given poles."""
     system = model.linearise(model.rest)
     left, ordered = list_modes(system.poles), []
@@ -98,4 +101,4 @@ def _measure(model: LatentModel, poles: Sequence[complex]) -> NDArray[np.float64
         left.remove(nearest)
         ordered.append(nearest)
     modes = (each for pole in ordered for each in measure_mode(pole, model.dt or 1.0))
-    return np.array([each.value for each in (*modes, *measure_gains(system))])
+    return [*modes, *measure_gains(system)]

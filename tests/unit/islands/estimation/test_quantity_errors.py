@@ -93,6 +93,17 @@ def test_a_standard_error_decreases_with_the_samples():
     assert measure(400) / measure(6400) == pytest.approx(np.full(3, 4.0), rel=0.5)
 
 
+@pytest.mark.parametrize("poles", [(0.9, 0.9), (0.7, 1.0 - 1e-9)])
+def test_a_mode_that_changes_its_kind_within_a_step_has_no_standard_error(poles):
+    """Equal poles become a resonance or two time constants; a pole next to 1 does not decay any more."""
+    data, found = make_record(SPRING, 0), []
+    for one, other in (poles, (0.7, 0.9)):
+        values = {"a1_2": 1.0, "a2_1": -one * other, "a2_2": one + other, "b2": 0.01, "c1": 1.0}
+        found.append(with_quantity_errors(make_model(values, (), 2), data).quantity_errors)
+    assert found[0] is None
+    assert found[1] is not None
+
+
 def test_a_model_without_a_time_or_with_few_samples_has_none():
     data = make_record(SPRING, 0)
     assert with_quantity_errors(replace(SPRING, dt=None), data).quantity_errors is None
