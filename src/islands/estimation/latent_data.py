@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.data.flat_extremes import find_limits
+from islands.data.flat_extremes import SensorLimits, find_limits
 from islands.data.input_lead import advance_all_inputs
 from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
@@ -77,6 +77,11 @@ class SignalScales:
         """Return outputs of the mean 0 and the standard deviation 1."""
         return (y - self.level) / self.height
 
+    def scale_limits(self, limits: SensorLimits) -> tuple[float, float]:
+        """Return the limits of scaled outputs, infinite without one."""
+        lower, upper = self.scale_outputs(np.array(limits.range)).tolist()
+        return lower, upper
+
     def use_record_units(self, layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the parameters for signals of the record, of those for scaled ones."""
         found = theta.copy()
@@ -122,6 +127,8 @@ class LatentData:
         The same blocks with all rows up to the next one, which are held out for the comparison of models.
     scales : SignalScales
         Of the record.
+    limits : SensorLimits
+        Of the output of the record.
     """
 
     record: Dataset
@@ -130,6 +137,7 @@ class LatentData:
     final: tuple[Segment, ...]
     whole: tuple[Segment, ...]
     scales: SignalScales
+    limits: SensorLimits
 
 
 # The islands of a process share the blocks of a record.
@@ -143,16 +151,17 @@ def make_latent_data(record: Dataset) -> LatentData:
     scales = SignalScales.measure(record)
     u, y = scales.scale_inputs(record.u), scales.scale_outputs(record.y)
     scaled = replace(record, u=u, y=y)
-    limits = find_limits(scaled.y).range
+    limits = find_limits(record.y)
+    scaled_limits = scales.scale_limits(limits)
     used: list[Segment] = []
     final: list[Segment] = []
     whole: list[Segment] = []
     for begin, end in _spread(list(_cut_blocks(scaled))):
         cut = end - round(_HELD_OUT * (end - begin))
-        used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS), limits))
-        final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), limits))
-        whole.append(_take(scaled, begin, end, limits))
-    return LatentData(record, scaled, tuple(used), tuple(final), tuple(whole), scales)
+        used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS), scaled_limits))
+        final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), scaled_limits))
+        whole.append(_take(scaled, begin, end, scaled_limits))
+    return LatentData(record, scaled, tuple(used), tuple(final), tuple(whole), scales, limits)
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:

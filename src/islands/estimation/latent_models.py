@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.data.flat_extremes import find_limits
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
     LARGEST_MEMORY,
@@ -302,7 +301,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
         wiring=wiring,
         memory=memory,
         operating_inputs=tuple(data.scales.mean.tolist()),
-        limits=find_limits(record.y),
+        limits=data.limits,
         parameters=tuple(value for value in theta.tolist() if value != 0.0),
         input_names=record.input_names,
         output_name=record.output_name,

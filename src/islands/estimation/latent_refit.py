@@ -1,6 +1,7 @@
 """Estimation of the parameters of a latent model on a whole record, from those that it has."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,8 @@ def refit_latent(
 ) -> LatentModel | EvaluationOutcome:
     """Estimate the parameters of a model by the error of the free run of each recording of a record.
 
+    The limits of the sensor become those of the record, which may be beyond those of the estimation data.
+
     Parameters
     ----------
     model : LatentModel
@@ -31,12 +34,12 @@ def refit_latent(
     """
     scales, layout = SignalScales.measure(record), model.layout
     theta = scales.use_scaled_units(layout, model.theta)
-    limits = scales.scale_outputs(np.array(find_limits(record.y).range))
+    limits = find_limits(record.y)
     segments = []
     for begin, end in record.bounds:
         u, late = read_inputs(record, model, begin, end)
         y = scales.scale_outputs(record.y[begin + late : end])
-        segments.append(Segment(scales.scale_inputs(u), y, *limits))
+        segments.append(Segment(scales.scale_inputs(u), y, *scales.scale_limits(limits)))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
     fit = StateSpaceFit(theta, number(free), model.codes, segments, states)
@@ -44,4 +47,4 @@ def refit_latent(
         return EvaluationOutcome(Status.DIVERGED, "a free run of the state space diverges")
     fit.advance(max_steps, stop)
     found = scales.use_record_units(layout, fit.theta)
-    return model.with_parameters(found[free].tolist())
+    return replace(model.with_parameters(found[free].tolist()), limits=limits)

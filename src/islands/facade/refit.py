@@ -78,11 +78,12 @@ def refit_models(found: SearchResult, validation: Dataset | float, steps: Steps)
         estimated = _estimate(entry, entry.criterion, data, constraints, steps)
         if isinstance(estimated, str):
             changed, reason = entry.model, estimated
+        elif isinstance(estimated, LatentModel):
+            reason = _find_fault(entry, estimated, data, constraints)
+            changed = estimated if reason else with_quantity_errors(estimated, data, entry.warm_up)
         else:
             changed = entry.model.with_parameters(estimated.parameters, estimated.standard_errors)
             reason = _find_fault(entry, changed, data, constraints)
-            if isinstance(changed, LatentModel) and not reason:
-                changed = with_quantity_errors(changed, data, entry.warm_up)
         made = with_refit(entry, changed, data.samples, reason, found.split, constraints)
         # A recommendation states the checks that a model passes.
         passes = [is_sound(each, found.requires_property_1) for each in (entry.physics, made.final_physics)]

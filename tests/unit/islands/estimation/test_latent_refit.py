@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import join
-from islands.data.flat_extremes import find_limits
+from islands.data.flat_extremes import NO_LIMITS, SensorLimits, find_limits
 from islands.data.input_lead import advance_all_inputs
 from islands.estimation.latent_refit import refit_latent
 from islands.simulation.outcome import EvaluationOutcome
@@ -58,6 +58,15 @@ def test_a_limited_sensor_does_not_bias_the_parameters():
     assert errors[1] < 1.1 * errors[0] < 1.3e-4
     # The limit belongs to the model, whose output is limited as that of the sensor.
     assert free_run(refit(limited, clipped), clipped, 60).mean_squared_error < errors[0]
+
+
+def test_the_limits_become_those_of_the_record():
+    record = spring_record(600)
+    lower = float(np.quantile(record.y, 0.1))
+    wrong = replace(make_model(), limits=SensorLimits(None, float(np.quantile(record.y, 0.6))))
+    found = refit(wrong, replace(record, y=np.maximum(record.y, lower)))
+    assert found.limits == (lower, None)
+    assert free_run(replace(found, limits=NO_LIMITS), record, 60).mean_squared_error < 1e-6
 
 
 def test_a_model_that_diverges_is_not_estimated():

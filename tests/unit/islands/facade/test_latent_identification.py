@@ -63,6 +63,16 @@ def test_modes_have_standard_errors(result, tmp_path):
     assert tuple(errors) == result.best.model.quantity_errors
 
 
+@pytest.mark.ci
+def test_a_refit_leaves_out_a_limit_that_the_validation_data_exceed():
+    record = spring_record(800, noise=0.02)
+    y = record.y.copy()
+    y[:600] = np.maximum(y[:600], -0.3)
+    settings = {"population": 4, "generations": 1, "islands": 1, "validation": 0.25}
+    found = [identify(replace(record, y=y), refit=each, **settings).best.model for each in ("none", "all")]
+    assert [each.limits.lower for each in found] == [-0.3, None]
+
+
 @pytest.mark.nightly
 def test_a_saturation_of_the_input_is_found():
     best = identify_record(saturated_record(1200, 1), preset="latent").best.model
