@@ -1,5 +1,9 @@
-"""Flat extremes of a signal, where a sensor, a converter or an actuator is at its limit, and its lattice."""
+"""Flat extremes of a signal, where a sensor, a converter or an actuator is at its limit (saturation).
 
+A quantised signal is flat at its peaks, too, so that the step of its lattice is found first.
+"""
+
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,20 +55,30 @@ class SensorLimits(NamedTuple):
 NO_LIMITS = SensorLimits()
 
 
-def find_limits(values: NDArray[np.float64]) -> SensorLimits:
+def find_limits(values: NDArray[np.float64], bounds: Sequence[tuple[int, int]] | None = None) -> SensorLimits:
     """Return the flat extremes of a signal; none of one that is held between steps or has two levels.
 
     Parameters
     ----------
     values : ndarray, shape (samples,)
         NaN marks a missing value.
+    bounds : sequence of (int, int), optional
+        First sample of every recording and the sample after its last. The equal samples at the start of a
+        recording are no flat extreme: the system may rest before its input moves.
     """
     levels = np.unique(values[np.isfinite(values)])
     step = find_step(levels) or 0.0
     if levels.size <= TWO or is_held(values, step):
         return NO_LIMITS
-    lower, upper = (count_flat(sign * values, step) > 0 for sign in (-1.0, 1.0))
-    return SensorLimits(float(levels[0]) if lower else None, float(levels[-1]) if upper else None)
+    moving = values.copy()
+    for begin, end in bounds or ((0, len(values)),):
+        moves = np.flatnonzero(values[begin:end] != values[begin])
+        moving[begin : begin + moves[0] if moves.size else end] = np.nan
+    lower, upper = (
+        float(extreme) if np.any(moving == extreme) and count_flat(sign * moving, step) > 0 else None
+        for sign, extreme in ((-1.0, levels[0]), (1.0, levels[-1]))
+    )
+    return SensorLimits(lower, upper)
 
 
 def count_flat(values: NDArray[np.float64], step: float) -> int:

@@ -151,7 +151,7 @@ def make_latent_data(record: Dataset) -> LatentData:
     scales = SignalScales.measure(record)
     u, y = scales.scale_inputs(record.u), scales.scale_outputs(record.y)
     scaled = replace(record, u=u, y=y)
-    limits = find_limits(record.y)
+    limits = find_limits(record.y, record.bounds)
     scaled_limits = scales.scale_limits(limits)
     used: list[Segment] = []
     final: list[Segment] = []

@@ -34,7 +34,7 @@ def refit_latent(
     """
     scales, layout = SignalScales.measure(record), model.layout
     theta = scales.use_scaled_units(layout, model.theta)
-    limits = find_limits(record.y)
+    limits = find_limits(record.y, record.bounds)
     segments = []
     for begin, end in record.bounds:
         u, late = read_inputs(record, model, begin, end)

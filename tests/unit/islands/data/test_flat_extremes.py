@@ -1,4 +1,4 @@
-"""SensorLimits of a sensor: flat extremes of a signal."""
+"""Limits of a sensor: flat extremes of a signal."""
 
 import numpy as np
 import pytest
@@ -20,6 +20,20 @@ def test_missing_samples_are_no_limit():
     y[100:200] = np.nan
     assert find_limits(y) == SensorLimits(None, 0.7)
     assert find_limits(np.full(50, np.nan)) == SensorLimits()
+
+
+def test_the_rest_before_a_recording_moves_is_no_limit():
+    move = 1.0 + wave()[:400] + 0.3 * np.sin(0.5 * np.arange(400))
+    rest = np.zeros(50)
+    two = np.concatenate([rest, move + 1.0, rest, move + 1.0])
+    assert find_limits(two[:450]) == SensorLimits()
+    assert find_limits(two, ((0, 450), (450, 900))) == SensorLimits()
+    # Without a new recording, the signal returns to its extreme.
+    assert find_limits(two) == SensorLimits(0.0)
+    constants = np.repeat([0.0, 1.0, 2.0], 4)
+    assert find_limits(constants, ((0, 4), (4, 8), (8, 12))) == SensorLimits()
+    # A sensor that is at its limit at the start, and later again.
+    assert find_limits(np.clip(-wave(), None, -0.1)) == SensorLimits(None, -0.1)
 
 
 def test_signals_that_are_held_or_have_two_levels_have_no_limits():
