@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 
+#: Excess in ranges above which a band has the same width: it is of no use, but finite.
+_LARGEST_EXCESS = 1e6
+
 #: Least and largest value of a signal.
 Interval: TypeAlias = tuple[float, float]
 
@@ -57,7 +60,7 @@ class DataRange:
         Returns
         -------
         ndarray, shape (samples,)
-            As a multiple of the mean square on the data; zero inside of the range.
+            As a multiple of the mean square on the data, finite; zero inside of the range.
         """
         u, offset = measure_signals(record)
         excess = np.zeros(record.samples)
@@ -65,7 +68,7 @@ class DataRange:
         for signal, (least, largest) in signals:
             if largest > least:
                 beyond = np.maximum(signal - largest, least - signal) / (largest - least)
-                excess = np.fmax(excess, beyond)
+                excess = np.fmax(excess, np.minimum(beyond, _LARGEST_EXCESS))
         # A half-range is the unit of Chebyshev polynomials.
         squares = (1.0 + 2.0 * self._decay(excess, record.bounds)) ** 2
         increase: NDArray[np.float64] = (8.0 * squares**2 - 8.0 * squares + 1.0) ** 2 - 1.0

@@ -42,6 +42,12 @@ def test_an_excess_decays_over_the_memory_of_its_segment():
     assert found == pytest.approx([0.0, *each, 0.0, 0.0], abs=1e-9)
 
 
+def test_a_band_is_finite_however_far_a_signal_is_outside_of_the_range():
+    found = RANGE.increase(record([0.0, 1e60, 1e300]), np.array([np.nan, 0.0, np.inf]))
+    assert found[0] == 0.0
+    assert found[1] == found[2] < np.inf
+
+
 def test_the_range_is_that_of_measured_and_simulated_signals():
     """NaN of a warm-up, and the value of an input that does not change, have no effect."""
     parts = [Dataset(np.full(3, 2.0), np.array([0.0, 1.0, 2.0]), 0.1) for _ in range(2)]
