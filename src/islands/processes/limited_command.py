@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from signal import SIGKILL, SIGXCPU
@@ -68,8 +69,10 @@ def run_command(
                 os.killpg(process.pid, SIGKILL)
                 found, status, usage = os.wait4(process.pid, 0)
     finally:
-        if not found:
+        # The group is absent once the command and all processes that it has started have ended.
+        with suppress(ProcessLookupError):
             os.killpg(process.pid, SIGKILL)
+        if not found:
             process.wait()
     process.returncode = os.waitstatus_to_exitcode(status)
     return EndedCommand(process.returncode, is_stopped, usage.ru_utime + usage.ru_stime, monotonic() - began)

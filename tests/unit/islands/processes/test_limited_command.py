@@ -37,6 +37,14 @@ def test_a_check_ends_a_command_and_the_processes_that_it_has_started(tmp_path):
         _wait_for_end(process)
 
 
+def test_processes_that_a_command_has_started_end_with_it(tmp_path):
+    program = (
+        "import os, time\nstarted = os.fork()\nif started: print(started, flush=True)\nelse: time.sleep(60)"
+    )
+    assert run(tmp_path, program).code == 0
+    _wait_for_end(int((tmp_path / "log").read_text()))
+
+
 def test_an_error_of_the_check_ends_the_command(tmp_path):
     log = tmp_path / "log"
 
