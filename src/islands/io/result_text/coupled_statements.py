@@ -182,7 +182,6 @@ OUTPUT_DETAILS: Final[tuple[Statement[OutputFacts], ...]] = (
     Statement("few-errors", lambda output: output.likely_ratio >= UNCERTAIN_RATIO, describe_few_errors),
 )
 
-
 #: Checks that an output fails.
 OUTPUT_FAILURES: Final[tuple[Statement[OutputFacts], ...]] = (
     NO_SIMULATION,
