@@ -70,12 +70,12 @@ class PeerTask:
 
     def split(self) -> tuple[list[PeerRecording], list[PeerRecording]]:
         """Return the recordings for the fit of candidates, and those for their comparison."""
-        ends = [int(_FITTED * len(each.u)) for each in self.recordings]
-        fitted = [PeerRecording(r.u[:end], r.y[:end]) for r, end in zip(self.recordings, ends, strict=True)]
-        held_out = [
-            PeerRecording(r.u[end - self.known :], r.y[end - self.known :])
-            for r, end in zip(self.recordings, ends, strict=True)
-        ]
+        fitted, held_out = [], []
+        for each in self.recordings:
+            end = int(_FITTED * len(each.u))
+            begin = max(0, end - self.known)
+            fitted.append(PeerRecording(each.u[:end], each.y[:end]))
+            held_out.append(PeerRecording(each.u[begin:], each.y[begin:]))
         return fitted, held_out
 
     def measure_error(self, simulate: Simulate, recordings: Sequence[PeerRecording]) -> float:

@@ -34,6 +34,13 @@ def test_the_last_quarter_of_each_recording_is_held_out_behind_initial_samples()
     assert [len(each.y) for each in held_out] == [13, 8]
 
 
+def test_a_recording_with_few_samples_is_held_out_from_its_start():
+    _, held_out = task(recording(4), known=3).split()
+    assert [len(each.u) for each in held_out] == [4]
+    _, held_out = task(recording(4), known=10).split()
+    assert [len(each.u) for each in held_out] == [4]
+
+
 def test_the_error_leaves_the_initial_samples_out():
     assert task().measure_error(repeat(105.0), [recording(5)]) == pytest.approx((0.5 * (2.0**2 + 1.0)) ** 0.5)
     assert task().measure_error(repeat(np.nan), [recording(5)]) == np.inf
