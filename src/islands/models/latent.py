@@ -318,7 +318,7 @@ class LatentModel(ParametricModel):
     def equation(self) -> EquationText:
         """Return the equations as text, with the values of the parameters and with the units as signals."""
         written = self.write_equation(*self._display())
-        if not self.describe_modes():
+        if self.dt is None:
             return written
         note = "" if self.quantity_errors is None else " (+- standard errors)"
         plain, named = (
