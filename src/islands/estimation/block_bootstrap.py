@@ -121,7 +121,8 @@ def _solve(
     left = np.add.reduce(weights[:, None, None] * normal)
     right = np.add.reduce(weights[:, None] * gradient)
     if basis is not None:
-        left = np.einsum("fi,fg,gj->ij", basis, left, basis)
+        # One product after the other: the sum over all operands at once takes the fourth power of the size.
+        left = np.einsum("fi,fj->ij", basis, np.einsum("fg,gj->fj", left, basis))
         right = np.einsum("fi,f->i", basis, right)
     scale = np.sqrt(np.where(np.diag(left) > 0.0, np.diag(left), 1.0))
     step: NDArray[np.float64]
