@@ -214,5 +214,5 @@ def _describe_linear(model: LatentModel) -> list[str]:
         slopes = "with the units, " * bool(model.units and of["E"].any() and of["W"].any())
         lines.append(f"{slopes}about {model.operating_point}:")
         lines += modes
-        lines += ["(+- standard errors)"] * (model.quantity_errors is not None)
+        lines += ["(+- standard errors)"] * (model.known_errors is not None)
     return [part for line in lines for part in wrap(line, _MODE_CHARACTERS)]

@@ -194,8 +194,6 @@ class LatentModel(ParametricModel):
         if tuple(name for name in self.layout.names if name in self.names) != self.names:
             known = ", ".join(self.layout.names)
             raise ModelError(f"the parameters of a model {self.kind} are some of {known}, in this order")
-        if self.quantity_errors is not None and len(self.quantity_errors) != len(self.quantities):
-            raise ModelError(f"a model {self.kind} has a standard error for each of its quantities")
         early = [parse_channel_name(name).at_once for name in self.input_names]
         if self.reads_at_once and not all(early):
             raise ModelError("the output reads the inputs at sample k: read them one sample early (u+1)")
@@ -320,7 +318,7 @@ class LatentModel(ParametricModel):
         written = self.write_equation(*self._display())
         if self.dt is None:
             return written
-        note = "" if self.quantity_errors is None else " (+- standard errors)"
+        note = "" if self.known_errors is None else " (+- standard errors)"
         plain, named = (
             f"\nabout {self._name_point(names)}{note}: {'; '.join(self._describe_modes(names))}"
             for names in (symbols(self.inputs)[1:], signal_names(self)[1:])
@@ -337,7 +335,7 @@ class LatentModel(ParametricModel):
     def _describe_modes(self, names: Sequence[str]) -> tuple[str, ...]:
         if self.dt is None:
             return ()
-        errors = self.quantity_errors
+        errors = self.known_errors
         modes = describe_poles(self.linearise(self.rest).poles, self.dt, errors)
         if errors is None:
             return modes
@@ -359,6 +357,15 @@ class LatentModel(ParametricModel):
         modes = (each for pole in list_modes(system.poles) for each in measure_mode(pole, self.dt))
         return (*modes, *measure_gains(system))
 
+    @property
+    def known_errors(self) -> tuple[float, ...] | None:
+        """Standard errors of the quantities; None if they are those of other ones.
+
+        A pole that is zero but for rounding may be a delay on one machine, and a mode on another.
+        """
+        errors = self.quantity_errors
+        return errors if errors is not None and len(errors) == len(self.quantities) else None
+
     def with_parameters(
         self, values: Sequence[float], standard_errors: Sequence[float] | None = None
     ) -> Self:
@@ -368,7 +375,7 @@ class LatentModel(ParametricModel):
     def list_quantities(self) -> list[dict[str, Any]]:
         """Return the quantities and standard errors as JSON values; the gain of an integrator is null."""
         found = self.quantities
-        errors = self.quantity_errors or (None,) * len(found)
+        errors = self.known_errors or (None,) * len(found)
         return [
             {
                 **asdict(each),
