@@ -3,7 +3,7 @@
 A quantised signal is flat at its peaks, too, so that the step of its lattice is found first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,11 +44,11 @@ class SensorLimits(NamedTuple):
         lower = -np.inf if self.lower is None else self.lower
         return lower, np.inf if self.upper is None else self.upper
 
-    def write(self, text: str) -> str:
-        """Return the expression of a signal within the limits."""
+    def write(self, text: str, number: Callable[[float], str] = repr) -> str:
+        """Return the expression of a signal within the limits, with these as ``number`` writes them."""
         if self.lower is not None:
-            text = f"max({text}, {self.lower!r})"
-        return text if self.upper is None else f"min({text}, {self.upper!r})"
+            text = f"max({text}, {number(self.lower)})"
+        return text if self.upper is None else f"min({text}, {number(self.upper)})"
 
 
 #: SensorLimits of a sensor that has none.

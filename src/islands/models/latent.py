@@ -77,7 +77,7 @@ Factor = Callable[[str, str], str]
 #: Newton steps that find the states at rest, and the step that ends them.
 _REST_STEPS, _STILL = 50, 1e-12
 
-#: Significant digits of the parameters in the text of an equation.
+#: Significant digits of the numbers in the text of an equation.
 _DIGITS = 6
 
 
@@ -311,7 +311,7 @@ class LatentModel(ParametricModel):
     def right_sides(self) -> Mapping[str, str]:
         """Return the equations of the output and of the states, with the units inside."""
         units = {lag: [self._write_unit(unit, lag, _name_factor) for unit in self._places] for lag in (0, 1)}
-        return self._write_sides(units, _name_factor)
+        return self._write_sides(units, _name_factor, repr)
 
     def equation(self) -> EquationText:
         """Return the equations as text, with the values of the parameters and with the units as signals."""
@@ -387,16 +387,14 @@ class LatentModel(ParametricModel):
 
     def _display(self) -> tuple[dict[str, str], tuple[str, ...]]:
         """Return the right sides of all displayed signals with numbers, and the names of the units."""
-        values = {
-            name: f"{value:.{_DIGITS}g}" for name, value in zip(self.names, self.parameters, strict=True)
-        }
+        values = {name: _round(value) for name, value in zip(self.names, self.parameters, strict=True)}
 
         def write(name: str, factor: str) -> str:
             return f"{values[name]}*{factor}" if factor else values[name]
 
         names = self.unit_signals
         units = {0: [f"{name}(k)" for name in names], 1: [f"{name}(k-1)" for name in names]}
-        sides = self._write_sides(units, write)
+        sides = self._write_sides(units, write, _round)
         for name, unit in zip(names, self._places, strict=True):
             text = _NAMED_POWERS.get(self.units[unit - 1], UNITS[self.units[unit - 1]])
             sides[name] = text.format(self._write_argument(unit, 0, write))
@@ -406,12 +404,14 @@ class LatentModel(ParametricModel):
     def _places(self) -> range:
         return range(1, len(self.units) + 1)
 
-    def _write_sides(self, units: Mapping[int, Sequence[str]], write: Factor) -> dict[str, str]:
+    def _write_sides(
+        self, units: Mapping[int, Sequence[str]], write: Factor, number: Callable[[float], str]
+    ) -> dict[str, str]:
         """Return the right sides of the output and of the states; ``units`` are the texts by lag."""
         now = [(f"c{place}", f"{name}(k)") for place, name in enumerate(self.states, start=1)]
         now += self._read_inputs("d", "d", 0)
         now += [(f"f{unit}", text) for unit, text in zip(self._places, units[0], strict=True)]
-        sides = {self.signals[0]: self.limits.write(self._sum([*now, ("level", "")], write))}
+        sides = {self.signals[0]: self.limits.write(self._sum([*now, ("level", "")], write), number)}
         for row, state in enumerate(self.states, start=1):
             past = [(f"a{row}_{place}", f"{name}(k-1)") for place, name in enumerate(self.states, start=1)]
             past += self._read_inputs(f"b{row}", f"b{row}_", 1)
@@ -485,6 +485,11 @@ def find_codes(units: Sequence[str]) -> NDArray[np.int64]:
     """Return the codes of units for the kernel."""
     names = list(UNITS)
     return np.array([names.index(unit) for unit in units], np.int64)
+
+
+def _round(value: float) -> str:
+    """Return a number for the text of an equation."""
+    return f"{value:.{_DIGITS}g}"
 
 
 def _name_factor(name: str, factor: str) -> str:

@@ -75,6 +75,9 @@ def test_a_program_is_the_simulation_from_the_same_states(unit):
 def test_the_output_is_limited_as_that_of_the_sensor():
     model, module = make_model(limits=SensorLimits(-0.5, 0.9)), {}
     assert model.equation().line.startswith("y(k) = min(max(1.2*x1(k) + 0.3, -0.5), 0.9)")
+    third = make_model(limits=SensorLimits(None, 1.0 / 3.0))
+    assert third.equation().line.startswith("y(k) = min(1.2*x1(k) + 0.3, 0.333333)")
+    assert str(1.0 / 3.0) in export(third, "python")
     exec(export(model, "python"), module)
     record = spring_record(300)
     run, unlimited = (free_run(each, record).y[20:] for each in (model, make_model()))
