@@ -1,6 +1,7 @@
 """Identification of latent models: state spaces with static units, evolved on the islands."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from islands.data.dataset import Dataset
@@ -27,7 +28,7 @@ from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.results.model_simulation import SHOOTING
 from islands.models.latent import LatentModel
-from islands.models.protocol import DynamicModel
+from islands.parallel import map_over_record
 from islands.progress import Steps
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
@@ -117,18 +118,19 @@ def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
     """Return the result of a search with standard errors, a linear model for comparison and bands."""
     if not steps.skip(_ERRORS):
         data = found.split.estimation
-        found = replace(
-            found, models=tuple(replace(entry, model=_add_errors(entry, data)) for entry in found.models)
-        )
+        models = map_over_record(partial(_add_errors, record=data), found.models, data.samples)
+        found = replace(found, models=tuple(models))
     found = with_linear_comparison(found, (), found.shooting_interval, steps)
-    models = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
+    validated = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
     warm_up = max(entry.model.maximum_lag for entry in found.models)
-    return with_bands(found, models, "none", warm_up, steps)
+    return with_bands(found, validated, "none", warm_up, steps)
 
 
-def _add_errors(entry: Assessment, record: Dataset) -> DynamicModel:
+def _add_errors(entry: Assessment, record: Dataset) -> Assessment:
     model = entry.model
-    return with_quantity_errors(model, record, entry.warm_up) if isinstance(model, LatentModel) else model
+    if not isinstance(model, LatentModel):
+        return entry
+    return replace(entry, model=with_quantity_errors(model, record, entry.warm_up))
 
 
 def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> list[LatentModel]:
