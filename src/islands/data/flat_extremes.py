@@ -51,7 +51,7 @@ class SensorLimits(NamedTuple):
         return text if self.upper is None else f"min({text}, {number(self.upper)})"
 
 
-#: SensorLimits of a sensor that has none.
+#: Of a sensor that has none.
 NO_LIMITS = SensorLimits()
 
 
