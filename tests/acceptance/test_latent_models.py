@@ -95,7 +95,17 @@ def test_a_structure_is_that_of_latent_models(folder):
 
 def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
-    budget = ("--preset", "latent", "--population", "6", "--generations", "2", "--structure")
+    budget = (
+        "--preset",
+        "latent",
+        "--islands",
+        "2",
+        "--population",
+        "6",
+        "--generations",
+        "2",
+        "--structure",
+    )
     succeed(*search, *budget, "wiener", "--out", tmp_path / "out")
     found = islands.load(tmp_path / "out")
     assert found.settings["structure"] == "wiener"

@@ -15,7 +15,7 @@ from islands.simulation.predictors import free_run
 from support.latent_systems import smooth_input, spring_record
 
 #: A search that takes a second.
-SHORT = {"population": 8, "generations": 4, "migrate_every": 2}
+SHORT = {"population": 8, "generations": 4, "migrate_every": 2, "islands": 2}
 
 
 def identify(record, **changes):

@@ -21,7 +21,7 @@ from support.latent_systems import curves_record
 from support.undrawn import undrawn_figures
 
 #: A search that takes two seconds.
-SHORT = {"preset": "latent", "population": 6, "generations": 4, "migrate_every": 2}
+SHORT = {"preset": "latent", "population": 6, "generations": 4, "migrate_every": 2, "islands": 2}
 
 
 @pytest.fixture(scope="module")
