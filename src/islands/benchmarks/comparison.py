@@ -7,7 +7,7 @@ from statistics import median
 
 from islands.benchmarks.definition import CLASSES, LINEAR, METRIC, Benchmark, BenchmarkData, PublishedError
 from islands.benchmarks.model_searches import MODEL_SEARCHES, ModelSearch, count_terms
-from islands.benchmarks.scoring import measure_coverage, measure_rmse
+from islands.benchmarks.scoring import measure_coverage, measure_rmse, separate_reason
 from islands.errors import IslandsError, SettingsError, check_at_least, check_seconds, lookup
 from islands.progress import (
     ProgressCallback,
@@ -295,6 +295,5 @@ def _finite(value: float) -> float | None:
 
 
 def _describe_seed(outcome: SeedOutcome, test: str) -> SeedError:
-    error = outcome.errors[test]
-    value, reason = (None, error) if isinstance(error, str) else (error, None)
+    value, reason = separate_reason(outcome.errors[test])
     return SeedError(outcome.seed, value, reason, outcome.claimed, outcome.coverage.get(test))

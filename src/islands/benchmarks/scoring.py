@@ -119,6 +119,11 @@ def measure_coverage(
     return float(np.concatenate(inside).mean())
 
 
+def separate_reason(error: float | str) -> tuple[float | None, str | None]:
+    """Return an error and no reason, or none and the reason why there is none."""
+    return (None, error) if isinstance(error, str) else (error, None)
+
+
 def _limit_members(bands: PredictionBands, test: BenchmarkTest) -> PredictionBands:
     """Return bands whose ensemble estimates its initial states from the samples that a test allows."""
     structures = bands.ensemble.structures

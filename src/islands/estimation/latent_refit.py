@@ -35,11 +35,12 @@ def refit_latent(
     scales, layout = SignalScales.measure(record), model.layout
     theta = scales.use_scaled_units(layout, model.theta)
     limits = find_limits(record.y, record.bounds)
+    scaled_limits = scales.scale_limits(limits)
     segments = []
     for begin, end in record.bounds:
         u, late = read_inputs(record, model, begin, end)
         y = scales.scale_outputs(record.y[begin + late : end])
-        segments.append(Segment(scales.scale_inputs(u), y, *scales.scale_limits(limits)))
+        segments.append(Segment(scales.scale_inputs(u), y, *scaled_limits))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
     fit = StateSpaceFit(theta, number(free), model.codes, segments, states)

@@ -13,7 +13,7 @@ from islands.benchmarks.peers import child
 from islands.benchmarks.peers.catalogue import Peer
 from islands.benchmarks.peers.child import PeerRecording
 from islands.benchmarks.peers.environments import read_last_line
-from islands.benchmarks.scoring import measure_simulation
+from islands.benchmarks.scoring import measure_simulation, separate_reason
 from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.errors import IslandsError
 from islands.processes.limited_command import run_command
@@ -104,7 +104,7 @@ def compare_peer(
         return []
     rows = []
     for test, error in found.errors.items():
-        value, reason = (None, error) if isinstance(error, str) else (error, None)
+        value, reason = separate_reason(error)
         rows.append(
             PeerRow(
                 benchmark=name,
