@@ -52,8 +52,8 @@ def run_command(
     log : Path
         File for the standard output and the standard error.
     must_end : callable
-        Called many times a second with the seconds since the start. The command is ended once it returns
-        true, or raises.
+        Called at the start, and many times a second, with the seconds since the start. The command is ended
+        once it returns true, or raises.
     """
     began = monotonic()
     with log.open("wb") as file:
@@ -61,13 +61,14 @@ def run_command(
     is_stopped, found = False, 0
     try:
         while not found:
-            sleep(_CHECK_SECONDS)
-            # It returns what `Popen.wait` does not: the CPU time.
-            found, status, usage = os.wait4(process.pid, os.WNOHANG)
-            if not found and must_end(monotonic() - began):
+            # `os.wait4` returns what `Popen.wait` does not: the CPU time.
+            if must_end(monotonic() - began):
                 is_stopped = True
                 os.killpg(process.pid, SIGKILL)
                 found, status, usage = os.wait4(process.pid, 0)
+            else:
+                sleep(_CHECK_SECONDS)
+                found, status, usage = os.wait4(process.pid, os.WNOHANG)
     finally:
         # The group is absent once the command and all processes that it has started have ended.
         with suppress(ProcessLookupError):
