@@ -212,6 +212,32 @@ class TimeLeft:
         return None if now - then > _VALID_PART * seconds else seconds - (now - then)
 
 
+class TimeLimit:
+    """Stop of a computation after a time, of which its parts can have shares.
+
+    Parameters
+    ----------
+    end : float
+        Time at which the computation stops, in seconds by the clock.
+    clock : callable
+        Returns the time in seconds.
+    stop : callable
+        Stops the computation earlier.
+    """
+
+    def __init__(self, end: float, clock: Callable[[], float], stop: Stop = never_stop) -> None:
+        self._end, self._clock, self._stop = end, clock, stop
+
+    def __call__(self) -> bool:
+        """Return whether the computation must end."""
+        return self._stop() or self._clock() >= self._end
+
+    def share(self, parts: int) -> "TimeLimit":
+        """Return the limit of the first of several parts that share the time left equally."""
+        now = self._clock()
+        return TimeLimit(now + (self._end - now) / parts, self._clock, self._stop)
+
+
 class StoppedError(IslandsError):
     """A computation was stopped.
 

@@ -13,6 +13,7 @@ from islands.progress import (
     ProgressCallback,
     Stop,
     StoppedError,
+    TimeLimit,
     ignore_progress,
     never_stop,
     prefix_messages,
@@ -203,12 +204,9 @@ def _search(
 ) -> SeedOutcome:
     """Search a model on the estimation data and measure it on all tests."""
     began = clock()
-
-    def must_stop() -> bool:
-        return stop() or (budget is not None and clock() - began >= budget)
-
+    limited = stop if budget is None else TimeLimit(began + budget, clock, stop)
     try:
-        found = search.find(data.estimation, seed, progress, must_stop)
+        found = search.find(data.estimation, seed, progress, limited)
     except IslandsError as error:
         reason = str(error)
         if isinstance(error, StoppedError):

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from islands.errors import IslandsError
-from islands.progress import Phase, PhasedProgress, Steps, StoppedError, TimeLeft, report_part
+from islands.progress import Phase, PhasedProgress, Steps, StoppedError, TimeLeft, TimeLimit, report_part
 
 
 def test_needed_steps_are_reported_until_a_stop_is_requested() -> None:
@@ -147,3 +147,21 @@ def test_time_left_begins_again_with_a_smaller_fraction() -> None:
     assert left.at(34.0) == pytest.approx(4.0)
     left.expect(60.0, 34.0)
     assert left.at(35.0) == pytest.approx(59.0)
+
+
+def test_parts_of_a_computation_share_the_time_that_is_left() -> None:
+    now, requests = [0.0], []
+    limit = TimeLimit(9.0, lambda: now[0], lambda: bool(requests))
+    first = limit.share(3)
+    assert not first()
+    now[0] = 3.0
+    assert (first(), limit()) == (True, False)
+    now[0] = 5.0  # the first part ended late
+    second = limit.share(2)
+    now[0] = 6.9
+    assert not second()
+    now[0] = 7.0
+    assert (second(), limit()) == (True, False)
+    requests.append("stop")
+    assert limit()
+    assert limit.share(1)()

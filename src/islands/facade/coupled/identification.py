@@ -47,6 +47,7 @@ from islands.progress import (
     Steps,
     Stop,
     StoppedError,
+    TimeLimit,
     ignore_progress,
     never_stop,
 )
@@ -131,7 +132,8 @@ def fit_coupled(
         Called with a message and the completed fraction.
     stop : callable, optional
         Called between all steps. Once it returns true and every output has models, the fit ends with the best
-        ones so far; ``left_out`` of the result names the steps that are missing.
+        ones so far; ``left_out`` of the result names the steps that are missing. The outputs share the time
+        of a `TimeLimit`.
     reading : mapping
         Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     **options
@@ -187,7 +189,7 @@ def fit_coupled_data(
     SettingsError, StoppedError, RecordError
         As `fit_coupled`.
     """
-    find, steps = partial(fit_record, seed=seed, stop=stop), Steps(progress, stop)
+    find, steps = partial(fit_record, seed=seed), Steps(progress, stop)
     kind = options.get("model", NARX)
     lookup(dict.fromkeys((NARX, LATENT)), kind, "class of models")
     if kind == LATENT:
@@ -305,7 +307,7 @@ def identify_coupled_data(
     chosen: dict[str, Any] = {"feedthrough": "no", **with_tuples(changes)}
     settings = resolve_coupled_settings(preset, chosen)
     preset = COUPLED_PRESET if preset == AUTO_PRESET else preset
-    search = partial(identify_record, preset=preset, seed=seed, stop=stop, engine=engine)
+    search = partial(identify_record, preset=preset, seed=seed, engine=engine)
     find, steps = _Searches(search, start, on_epoch), Steps(progress, stop)
     if settings.model_class == LATENT:
         return _couple_latent(data, chosen, steps, find)
@@ -383,12 +385,17 @@ def _search_outputs(
     steps: Steps,
     find: Callable[..., Result],
 ) -> list[Result]:
-    """Search every output; a stop before the models of an output is a `StoppedCouplingError`."""
+    """Search every output; a stop before the models of an output is a `StoppedCouplingError`.
+
+    The searches share the time of a `TimeLimit`, so that each of them finds models.
+    """
     results: list[Result] = []
     for name, split in zip(names, splits, strict=True):
-        show = partial(_report, steps.report, name)
+        show, stop = partial(_report, steps.report, name), steps.stop
+        if isinstance(stop, TimeLimit):
+            stop = stop.share(len(names) - len(results))
         try:
-            results.append(find(split.estimation, split.validation, progress=show, **options))
+            results.append(find(split.estimation, split.validation, progress=show, stop=stop, **options))
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
     return results

@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from itertools import count
+from math import inf
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from islands.io.checkpoints import (
     state_from_document,
 )
 from islands.models.coupled_latent import CoupledLatentModel
+from islands.progress import TimeLimit
 from support.latent_systems import curves_record
 from support.undrawn import undrawn_figures
 
@@ -82,6 +85,16 @@ def test_a_search_that_is_stopped_names_the_outputs_that_are_missing(found):
     with pytest.raises(StoppedCouplingError, match="y1") as stopped:
         identify_coupled(curves_record(300, 1), stop=lambda: next(calls) >= 0, **SHORT)
     assert (stopped.value.outputs, stopped.value.found) == (("y1", "y2"), ())
+
+
+@pytest.mark.ci
+def test_all_outputs_have_models_after_a_limit_of_time():
+    calls = count()
+    identify_coupled(curves_record(300, 1), stop=TimeLimit(inf, lambda: next(calls)), **SHORT)
+    half, calls = next(calls) // 2, count()
+    limited = identify_coupled(curves_record(300, 1), stop=TimeLimit(half, lambda: next(calls)), **SHORT)
+    assert [each.search_result.search.ended_by for each in limited.results] == ["stopped", "stopped"]
+    assert limited.left_out
 
 
 @pytest.mark.ci
