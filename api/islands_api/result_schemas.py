@@ -60,6 +60,14 @@ class FindingView(ResponseModel):
     score: float
     eta: float | None = Field(description="Fraction of the misfit; null for a property of the noise.")
     claimed: bool = True
+    error_share: float | None = Field(
+        default=None, description="Fraction of the mean squared error, noise included."
+    )
+    noise_share: float | None = Field(default=None, description="Fraction of that error that is noise.")
+    term: str = Field(default="", description="A missing term with its equation.")
+    summary: str = Field(default="", description="What the cause is.")
+    distinguished_by: str = Field(default="", description="What distinguishes it from similar causes.")
+    occurs_in: str = Field(default="", description="Parts of machines that have it.")
 
 
 class DiscrepancyResult(ResponseModel):

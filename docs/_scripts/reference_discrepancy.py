@@ -83,6 +83,8 @@ def _properties(entry: Entry) -> Iterator[tuple[str, str]]:
         yield "Parameters", escape(_parameters(entry.parameters(symbolic_context())))
     yield "Similar to", _link_effects(escape(entry.similar_to))
     yield "Distinguished by", escape(entry.distinguished_by)
+    if not isinstance(entry, NoiseDetector):
+        yield "Occurs in", entry.occurs_in
     if not isinstance(entry, EffectTemplate):
         yield "Source", escape(entry.source)
 

@@ -46,7 +46,8 @@ EXCLUSIVE = (
 
 #: A claimed cause that others together exceed in probability.
 _UNLIKELY = (
-    r"confidence (below )?0\.[0-4]\d, \d+ % of the misfit above the noise floor"
+    r"confidence (below )?0\.[0-4]\d, [\d.]+ % of the "
+    r"(misfit above the noise floor|mean squared error \([^)]*\))"
     r"(?!; improves|; confounded with [^;]*; improves)"
 )
 
@@ -66,7 +67,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"No significant discrepancy", r"(The remaining residual depends|none of which is confirmed)"),
     (
         r"No significant discrepancy",
-        r"confidence (above |below )?\d\.\d\d, \d+ % of the (misfit|mean squared error)",
+        r"confidence (above |below )?\d\.\d\d, [\d.]+ % of the (misfit|mean squared error)",
     ),
     (r"No significant discrepancy: ", _FAR),
     (_WHOLE, _FAR),

@@ -36,6 +36,7 @@ OFFSET = Effect(
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, even-nonlinearity, input-offset",
     distinguished_by="the mean of the residual",
+    occurs_in="zero of a sensor or of its amplifier",
 )
 
 
@@ -69,6 +70,7 @@ INPUT_OFFSET = EffectTemplate(
     "Constant flow or force in addition to the input: + c in the balance of one state",
     similar_to="offset, outflow-law",
     distinguished_by="an offset filtered by the equation; in tanks it shifts with the level",
+    occurs_in="gravity, preload, leakage, zero of a valve or amplifier",
 )
 
 
@@ -98,6 +100,7 @@ LINEAR_DRIFT = Effect(
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, thermal-drift, exponential-creep",
     distinguished_by="the residual over time",
+    occurs_in="zero of a sensor that warms up, integrated signals",
 )
 
 
@@ -129,6 +132,7 @@ JUMP = Effect(
     extra_degrees_of_freedom=1,
     similar_to="linear-drift, offset",
     distinguished_by="the residual over time, before and after one instant",
+    occurs_in="a sensor that was touched or set to zero, lost counts of an encoder",
 )
 
 
@@ -165,5 +169,6 @@ THERMAL_DRIFT = Effect(
     source="Doebelin, Measurement Systems, section 2",
     is_applicable=lambda context: has_channel(context, True),
     similar_to="cross-coupling; linear-drift if the temperature only rises",
-    distinguished_by="follows a channel in K, degC or degF",
+    distinguished_by="a residual that follows a channel in K, degC or degF",
+    occurs_in="thermal expansion, temperature coefficient of a sensor",
 )

@@ -92,10 +92,18 @@ OF_EACH: Mapping[str, EffectTemplate] = {
 }
 
 
+def find_entry(name: str) -> Effect | EffectTemplate | None:
+    """Return an effect or a template by its name, with or without a state or parameter; None if unknown."""
+    cause = name.partition(":")[0]
+    return CATALOGUE.get(cause) or OF_EACH.get(cause)
+
+
 def get_summary(name: str) -> str:
     """Return the summary of an effect, given its name with or without a state or parameter."""
-    cause = name.partition(":")[0]
-    return (CATALOGUE.get(cause) or OF_EACH[cause]).summary
+    entry = find_entry(name)
+    if entry is None:
+        raise KeyError(name)
+    return entry.summary
 
 
 def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:

@@ -76,6 +76,7 @@ EXPONENTIAL_CREEP = Effect(
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
     similar_to="relaxation, logarithmic-creep, linear-drift",
     distinguished_by="the output continues at constant input, with one time constant",
+    occurs_in="piezoelectric stacks, adhesives, polymers, heating of a load cell",
 )
 
 #: Time constants of the low-passes of logarithmic creep, in seconds.
@@ -108,4 +109,5 @@ LOGARITHMIC_CREEP = Effect(
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
     similar_to="exponential-creep",
     distinguished_by="the output continues at constant input, by equal steps in each decade of time",
+    occurs_in="piezoelectric stacks and ferroelectric materials",
 )

@@ -49,7 +49,8 @@ CROSS_COUPLING = Effect(
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),
     similar_to="thermal-drift",
-    distinguished_by="follows a channel that is not a temperature",
+    distinguished_by="a residual that follows a channel that is not a temperature",
+    occurs_in="cables without shield, a second axis, a common supply",
 )
 
 
@@ -121,4 +122,5 @@ PERIODIC_DISTURBANCE = Effect(
     extra_degrees_of_freedom=2,
     similar_to="resonance",
     distinguished_by="a line in the spectrum that is no multiple of the frequency of the input",
+    occurs_in="mains hum, fans, pumps, unbalance of a neighbouring machine",
 )

@@ -43,6 +43,7 @@ COULOMB_FRICTION = Effect(
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="backlash, second-hysteresis",
     distinguished_by="a step of the residual at rate zero",
+    occurs_in="guides, bearings, seals, brushes and their preload",
 )
 
 
@@ -78,6 +79,7 @@ VISCOUS = Effect(
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="delay, sensor-lag",
     distinguished_by="the hysteretic part of the output is not delayed",
+    occurs_in="lubricated guides and bearings, dampers, eddy currents, back-EMF of a motor",
 )
 
 
@@ -108,6 +110,7 @@ VISCOUS_ASYMMETRY = Effect(
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="offset, loop-asymmetry",
     distinguished_by="the slope over the rate differs with the sign of the rate",
+    occurs_in="one-way valves, dampers with different rebound, gears loaded on one flank",
 )
 
 
@@ -138,4 +141,5 @@ QUADRATIC_DRAG = Effect(
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="viscous; on a single sine also second-hysteresis",
     distinguished_by="drag grows with the square of the frequency, hysteresis does not",
+    occurs_in="fans, pumps, orifices and bodies in a fluid",
 )

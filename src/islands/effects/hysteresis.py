@@ -45,6 +45,7 @@ STICTION = Effect(
     linear_parameters=0,
     similar_to="backlash, dead-zone, coulomb-friction",
     distinguished_by="samples of one slip have the same error while the input is slow; noise can hide that",
+    occurs_in="valve packings, seals and dry guides that stick",
 )
 
 
@@ -75,6 +76,7 @@ BACKLASH = Effect(
     confounded_with=(STICTION, 2.0),
     similar_to="stiction, coulomb-friction, exponential-creep",
     distinguished_by="lost motion of constant width after each reversal",
+    occurs_in="gears, couplings, spindles and linkages with play",
 )
 
 
@@ -99,6 +101,7 @@ RELAXATION = Effect(
     source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
     similar_to="exponential-creep",
     distinguished_by="hysteresis decays while the input is constant; slow loops are narrower",
+    occurs_in="piezoelectric and magnetic materials, rubber",
 )
 
 
@@ -132,6 +135,7 @@ RATE_DEPENDENT_LOOP = Effect(
     source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
     similar_to="viscous, delay",
     distinguished_by="the width of the loop over the rate, at one amplitude",
+    occurs_in="piezoelectric and magnetic materials at changing frequencies, eddy currents",
 )
 
 
@@ -165,6 +169,7 @@ LOOP_ASYMMETRY = Effect(
     source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
     similar_to="jump, offset, viscous-asymmetry",
     distinguished_by="the two branches of the loop are not mirror images",
+    occurs_in="biased magnetic circuits, unipolar piezoelectric drives, preloaded springs",
 )
 
 #: Starting points of chi, times the peak of the coordinate.
@@ -249,4 +254,5 @@ SECOND_HYSTERESIS = Effect(
     project=_project_second_hysteresis,
     similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",
     distinguished_by="memory that does not depend on the rate: repeat the record at another frequency",
+    occurs_in="a second piezoelectric or magnetic part, joints that slip, rubber mounts",
 )

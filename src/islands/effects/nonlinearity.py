@@ -43,6 +43,7 @@ CUBIC_STIFFNESS = Effect(
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="input-saturation",
     distinguished_by="an odd curve over the coordinate, at all rates",
+    occurs_in="springs and flexures at large deflections, cables, buckled beams",
 )
 
 
@@ -79,6 +80,7 @@ EVEN_NONLINEARITY = Effect(
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="absolute-value-sensor, offset",
     distinguished_by="a parabola over the coordinate",
+    occurs_in="asymmetric springs, preloaded or cracked parts, magnetic attraction",
 )
 
 #: A dead zone is searched for only if the input comes closer to zero than this fraction of its peak.
@@ -127,6 +129,7 @@ DEAD_ZONE = Effect(
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     similar_to="backlash, input-saturation",
     distinguished_by="flat around zero in both directions; a negative `d` is a step at zero",
+    occurs_in="spool valves with overlap, drives below their breakaway command, worn linkages",
 )
 
 
@@ -163,6 +166,7 @@ INPUT_SATURATION = Effect(
     linear_parameters=0,
     similar_to="cubic-stiffness, output-saturation",
     distinguished_by="a plateau over the input",
+    occurs_in="limits of amplifier, valve or supply",
 )
 
 
@@ -184,6 +188,7 @@ OUTPUT_SATURATION = Effect(
     linear_parameters=0,
     similar_to="input-saturation, state-clip",
     distinguished_by="a plateau over the output",
+    occurs_in="range of a sensor or of its converter",
 )
 
 
@@ -213,6 +218,7 @@ ABSOLUTE_VALUE_SENSOR = Effect(
     source="Doebelin, Measurement Systems, section 3",
     similar_to="even-nonlinearity",
     distinguished_by="a kink at output zero",
+    occurs_in="rectified or squared signals, encoders without direction, flow meters",
 )
 
 
@@ -243,6 +249,7 @@ OUTFLOW_LAW = EffectTemplate(
     "The outflow has a linear term in addition to Bernoulli's law: + l x in the flow out of one state",
     similar_to="state-clip, input-offset, a nonlinear sensor",
     distinguished_by="the outflow grows more steeply with the level than a square root",
+    occurs_in="pipes and valves with laminar flow",
 )
 
 
@@ -292,4 +299,5 @@ STATE_CLIP = EffectTemplate(
     "A state is limited to a level, as in a tank that overflows; the next state may receive a fraction",
     similar_to="output-saturation, input-offset, outflow-law",
     distinguished_by="the output flattens later than the state: an unmeasured state is clipped",
+    occurs_in="tanks that overflow, end stops, limited integrators",
 )

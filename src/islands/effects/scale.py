@@ -32,6 +32,7 @@ INPUT_GAIN = Effect(
     is_gain=True,
     similar_to="sensor-gain, wrong-parameter",
     distinguished_by="only tolerances of all parameters distinguish them",
+    occurs_in="amplifier, valve or command scaling",
 )
 
 
@@ -62,6 +63,7 @@ SENSOR_GAIN = Effect(
     is_gain=True,
     similar_to="input-gain, wrong-parameter",
     distinguished_by="only tolerances of all parameters distinguish them",
+    occurs_in="calibration of the sensor or of its amplifier",
 )
 
 
@@ -92,4 +94,5 @@ WRONG_PARAMETER = EffectTemplate(
     "A parameter of the simulation differs from its nominal value by more than its tolerance",
     similar_to="input-gain, sensor-gain, other parameters",
     distinguished_by="only tolerances distinguish them; the name says which parameter",
+    occurs_in="data sheets, estimates of mass and geometry, a part that was exchanged",
 )

@@ -155,6 +155,7 @@ COGGING = Effect(
     extra_degrees_of_freedom=2,
     similar_to="coloured noise, periodic-disturbance at a constant speed, cyclic-error",
     distinguished_by="a line in the spectrum over the position; its frequency over time is that of the speed",
+    occurs_in="motors with permanent magnets, gear teeth, lead screws, unbalance",
 )
 
 
@@ -193,4 +194,5 @@ CYCLIC_ERROR = Effect(
     extra_degrees_of_freedom=2,
     similar_to="cogging, periodic-disturbance at a constant speed",
     distinguished_by="the same error at any speed; the motion due to a force is smaller at a higher speed",
+    occurs_in="encoders and interferometers: interpolation and alignment",
 )

@@ -89,6 +89,7 @@ GAIN_STEP = Effect(
     extra_degrees_of_freedom=1,
     similar_to="ageing",
     distinguished_by="the slope of output over input changes at one instant",
+    occurs_in="switched ranges, a part that broke or was exchanged during the record",
 )
 
 
@@ -112,4 +113,5 @@ AGEING = Effect(
     equation=lambda context: MapEquation(f"x*(1 + n0*t/{context.duration})"),
     similar_to="gain-step, linear-drift",
     distinguished_by="a residual proportional to time and output",
+    occurs_in="heating of a drive or sensor, wear, depolarisation during the record",
 )

@@ -40,6 +40,7 @@ DELAY = Effect(
     source="Ljung, System Identification, 2nd ed., section 16",
     similar_to="sensor-lag, resonance, viscous",
     distinguished_by="the phase grows with the frequency at constant amplitude; hysteresis is delayed too",
+    occurs_in="transport of material, sampling and communication of a controller, filters of the data logger",
 )
 
 
@@ -69,6 +70,7 @@ CLOCK_SKEW = Effect(
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
     similar_to="delay",
     distinguished_by="a delay that grows along the record",
+    occurs_in="two devices that record with their own clocks",
 )
 
 
@@ -123,6 +125,7 @@ RATE_LIMIT = Effect(
     linear_parameters=0,
     similar_to="sensor-lag, delay, input-saturation",
     distinguished_by="the lag grows with the amplitude; slow inputs are followed without error",
+    occurs_in="valve actuators, ramps of a drive, amplifiers with capacitive loads",
 )
 
 
@@ -152,6 +155,7 @@ SENSOR_LAG = Effect(
     source="Doebelin, Measurement Systems, section 3",
     similar_to="delay, resonance, viscous",
     distinguished_by="the amplitude falls with the frequency",
+    occurs_in="thermocouples in a sheath, pressure lines, filters of an amplifier",
 )
 
 #: Largest natural frequency in radians per sample; a faster mode has no effect on the record.
@@ -201,4 +205,5 @@ RESONANCE = Effect(
     source="Ljung, System Identification, 2nd ed., section 4",
     similar_to="delay, sensor-lag",
     distinguished_by="ringing after fast changes",
+    occurs_in="flexible shafts, couplings and frames between drive and sensor, sensor mounts",
 )

@@ -73,6 +73,11 @@ class Simulator(ABC):
         """Name in reports; that of the command line for a physical system."""
 
     @property
+    def equations(self) -> str:
+        """Equations in one line for reports; the name by default."""
+        return self.name
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of the simulator; none by default."""
         return ()
@@ -243,6 +248,11 @@ class SimulatorWrapper(Simulator):
     def name(self) -> str:
         """Name of the wrapped simulator."""
         return self.simulator.name
+
+    @property
+    def equations(self) -> str:
+        """Equations of the wrapped simulator."""
+        return self.simulator.equations
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -54,9 +54,21 @@ class LinearSimulator(Simulator):
     unit: str
     parameters: tuple[Parameter, ...] = field(init=False)
     state_at_rest: Signal = field(init=False)
-    name: ClassVar[str] = "linear"
     sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     built_in_effects: ClassVar[frozenset[str]] = frozenset(("offset",))
+
+    @property
+    def name(self) -> str:
+        """Name on the command line, with the order, and the delay if there is one."""
+        return f"linear:{self.denominator.size}{f':{self.delay}' if self.delay else ''}"
+
+    @property
+    def equations(self) -> str:
+        """Difference equation of deviations from the level and the reference input."""
+        inputs = [f"b{lag} u({_write_time(self.delay + lag)})" for lag in range(self.numerator.size)]
+        outputs = [f"a{lag} y({_write_time(lag)})" for lag in range(1, self.denominator.size + 1)]
+        terms = " + ".join([*outputs, *inputs])
+        return f"y(k) = {terms}, as deviations from the level and {self.reference_input:g}"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", self._list_parameters())
@@ -114,6 +126,10 @@ class LinearSimulator(Simulator):
         gain = float(self.numerator.sum()) / remainder if remainder > 0.0 else 0.0
         state: Signal = np.cumsum((self.numerator[1:] + gain * self.denominator)[::-1])[::-1]
         return state if remainder > 0.0 else np.zeros_like(state)
+
+
+def _write_time(lag: int) -> str:
+    return f"k-{lag}" if lag else "k"
 
 
 def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:

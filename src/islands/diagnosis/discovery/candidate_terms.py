@@ -85,6 +85,11 @@ class CandidateTerm:
         """Return the names of the coefficient, and of the scale if there is one, of a numbered term."""
         return (f"a{number}", f"s{number}")[: self.value_count]
 
+    def write(self, number: int) -> str:
+        """Return the term with its coefficient, as it is in its equation."""
+        coefficient, *scales = self.name_parameters(number)
+        return f"{coefficient}*({self.text.format(scale=''.join(scales))})"
+
     def add_to(self, system: OdeSystem, number: int, target_size: float) -> OdeSystem:
         """Return a system with this term.
 
@@ -104,8 +109,7 @@ class CandidateTerm:
         parameters += [
             OdeParameter(name, self.scale, self.scale_unit) for name in scales if self.scale is not None
         ]
-        text = self.text.format(scale="".join(scales))
-        return system.with_term(self.target, f"{coefficient}*({text})", parameters)
+        return system.with_term(self.target, self.write(number), parameters)
 
 
 def find_free_numbers(used: Set[str], count: int) -> list[int]:

@@ -23,7 +23,7 @@ from islands.diagnosis.inference.holdout import (
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.screening import bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome, analyse_residual
-from islands.diagnosis.inference.verdict import Verdict, explained_fraction
+from islands.diagnosis.inference.verdict import Verdict, explained_fraction, noise_fraction
 from islands.diagnosis.run import DiagnosisRun
 from islands.simulators.output_equation import OutputEquation
 
@@ -246,6 +246,13 @@ def describe_terms(
             value, half = float(fit.values[places[name]]), 1.96 * float(deviations[places[name]])
             unit = fit.simulation.parameters[places[name]].unit
             values[name] = Value(value, unit, (value - half, value + half))
-        share = explained_fraction(base, fit, floor)
-        findings.append(Finding(MISSING_TERM, FAMILY, confidence, (), values, each.gain, share))
+        findings.append(
+            Finding(
+                *(MISSING_TERM, FAMILY, confidence, (), values, each.gain),
+                explained_fraction(base, fit, floor),
+                error_fraction=explained_fraction(base, fit, 0.0),
+                noise_fraction=noise_fraction(base, floor),
+                term=each.describe(),
+            )
+        )
     return tuple(findings)

@@ -75,6 +75,10 @@ class DiscoveredTerm:
         """Names of its parameters in the equations: the coefficient, and the scale if there is one."""
         return self.term.name_parameters(self.number)
 
+    def describe(self) -> str:
+        """Return the term with its equation, as ``a1*(x*v) in dv/dt``."""
+        return f"{self.term.write(self.number)} in {_write_left_side(self.term.target)}"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TermSearchResult:
@@ -114,16 +118,18 @@ class TermSearchResult:
         system = get_system(self.fit)
         right_sides = {**dict(system.derivatives), OUTPUT: system.output}
         changed = dict.fromkeys(each.term.target for each in self.terms)
-        lines = [
-            f"{target if target == OUTPUT else f'd{target}/dt'} = {render(right_sides[target])}"
-            for target in changed
-        ]
+        lines = [f"{_write_left_side(target)} = {render(right_sides[target])}" for target in changed]
         values = {
             parameter.name: f"{parameter.name} = {value:.4g} {parameter.unit}".rstrip()
             for parameter, value in zip(self.fit.simulation.parameters, self.fit.values, strict=True)
         }
         new = [values[name] for each in self.terms for name in each.parameters]
         return "; ".join([*lines, ", ".join(new), *([SYMBOL_MEANINGS] if system.simulated else [])])
+
+
+def _write_left_side(target: str) -> str:
+    """Return the left side of the equation of a state, or of the output."""
+    return target if target == OUTPUT else f"d{target}/dt"
 
 
 def search_terms(

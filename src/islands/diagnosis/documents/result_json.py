@@ -15,6 +15,7 @@ from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.diagnosis.result import Candidate, Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
+from islands.effects.catalogue import find_entry
 from islands.io.result_folder import record_document
 
 SCHEMA = "islands.discrepancy/1"
@@ -60,6 +61,7 @@ def diagnosis_document(
         if diagnosis.is_noise_floor_measured
         else "an upper bound",
         "calibrated": _get_calibrated_values(diagnosis),
+        "equations": diagnosis.best.simulation.simulator.equations,
         **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None else "extended.json",
         "record_findings": [each.as_document() for each in diagnosis.record_findings],
@@ -124,9 +126,13 @@ def _describe_self_test(tested: SelfTest | None) -> dict[str, Any]:
 
 
 def _describe_finding(finding: Finding) -> dict[str, Any]:
+    entry = find_entry(finding.name)
     return {
         "name": finding.name,
         "family": finding.family,
+        "summary": "" if entry is None else entry.summary,
+        "distinguished_by": "" if entry is None else entry.distinguished_by,
+        "occurs_in": "" if entry is None else entry.occurs_in,
         "confidence": finding.confidence,
         "equivalents": list(finding.equivalents),
         "parameters": {
@@ -139,6 +145,9 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         },
         "score": finding.score,
         "eta": finding.explained_fraction,
+        "error_share": finding.error_fraction,
+        "noise_share": finding.noise_fraction,
+        "term": finding.term,
         "claimed": finding.is_claimed,
         "free_form": bool(list_free_forms([finding])),
     }

@@ -19,7 +19,12 @@ from islands.diagnosis.inference.confounders import Confounder, find_confounder
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, find_alternatives
 from islands.diagnosis.inference.screening import ScreenedEffect, bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome
-from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit, explained_fraction
+from islands.diagnosis.inference.verdict import (
+    Verdict,
+    choose_reference_fit,
+    explained_fraction,
+    noise_fraction,
+)
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Signal
@@ -65,6 +70,13 @@ class Finding:
         Score gain in minus twice the log-likelihood, less the BIC penalty.
     explained_fraction : float or None
         Fraction of the explainable misfit that the cause explains; None for a property of the noise.
+    error_fraction : float or None
+        Fraction of the mean squared error that the cause explains; None for a property of the
+        noise.
+    noise_fraction : float or None
+        Fraction of that error that is noise: the noise floor, which may be an upper bound.
+    term : str
+        Missing term with its equation, as ``a1*(x*v) in dv/dt``; empty for an effect.
     is_claimed : bool
         Whether it is claimed as a cause. If a remainder shows that the simulation is still wrong, only the
         first effect is: further ones may follow its wrong form. No cause is if others are much more probable.
@@ -78,6 +90,9 @@ class Finding:
     score: float
     explained_fraction: float | None
     is_claimed: bool = True
+    error_fraction: float | None = None
+    noise_fraction: float | None = None
+    term: str = ""
 
 
 def list_free_forms(findings: Sequence[Finding]) -> list[Finding]:
@@ -185,6 +200,8 @@ def _describe_effect(
         values,
         named.score,
         explained,
+        error_fraction=explained_fraction(reference, fit, 0.0),
+        noise_fraction=noise_fraction(reference, outcome.noise_floor),
     )
     return finding, [each for each, _ in screened if each.effect.cause in equal]
 

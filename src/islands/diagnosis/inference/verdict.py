@@ -151,6 +151,11 @@ def explained_fraction(before: CalibrationResult, after: CalibrationResult, floo
     return float(np.clip((before.mean_square - after.mean_square) / misfit, 0.0, 1.0))
 
 
+def noise_fraction(before: CalibrationResult, floor: float) -> float:
+    """Return the fraction of the mean squared error that is noise, of the mean square ``floor``."""
+    return min(floor / before.mean_square, 1.0) if before.mean_square > 0.0 else 1.0
+
+
 def classify(explained: float, has_effects: bool, has_remainder: bool, is_model_error: bool) -> Verdict:
     """Return the verdict on effects that explain a fraction of the misfit.
 

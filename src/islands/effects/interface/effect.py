@@ -81,7 +81,9 @@ class Effect:
     similar_to : str
         Names of effects with a similar response, for the reference.
     distinguished_by : str
-        Observation that distinguishes the effect from those, for the reference.
+        Observation that distinguishes the effect from those, for results and the reference.
+    occurs_in : str
+        Parts of machines that have the effect, for results and the reference; empty for a free form.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Effect:
     confounded_with: "tuple[Effect, float] | None" = None
     similar_to: str = ""
     distinguished_by: str = ""
+    occurs_in: str = ""
 
     @property
     def cause(self) -> str:
@@ -120,7 +123,7 @@ class EffectTemplate:
     name, summary : str
         As in `Effect`. The name of an effect is this name, usually with a colon and the name of a state or
         parameter.
-    similar_to, distinguished_by : str
+    similar_to, distinguished_by, occurs_in : str
         As in `Effect`.
     """
 
@@ -128,6 +131,7 @@ class EffectTemplate:
     summary: str
     similar_to: str = ""
     distinguished_by: str = ""
+    occurs_in: str = ""
 
 
 def apply_map(effect: Effect, signal: Signal, values: Signal, context: SimulationContext) -> Signal:

@@ -89,6 +89,11 @@ class DiagnosisFacts:
         return [each for each in self.causes if each.get("claimed", True)]
 
     @property
+    def terms(self) -> list[Document]:
+        """The discovered terms."""
+        return [each for each in self.causes if each["family"] == _TERM]
+
+    @property
     def has_others(self) -> bool:
         """Whether effects that are not claimed extend the simulation as well."""
         return len(self.claimed) < len(self.causes)
@@ -305,7 +310,19 @@ def _describe_cause(facts: DiagnosisFacts, cause: Document) -> str:
         parts.append(f"confounded with {', '.join(cause['equivalents'])}")
     if not cause.get("claimed", True):
         parts.append("improves the fit, but is not claimed as a cause")
-    return f"{_name_values(facts, cause)}; {'; '.join(parts)}"
+    return f"{_name_values(facts, cause)}; {'; '.join(parts)}{_explain_cause(cause)}"
+
+
+def _explain_cause(cause: Document) -> str:
+    """State what a claimed cause is, what distinguishes it, and which parts of machines have it."""
+    if not (cause.get("summary") and cause["claimed"]):
+        return ""
+    parts = ["", cause["summary"]]
+    if cause["distinguished_by"] and cause["family"] != _SCALE:
+        parts.append(f"Distinguished by: {cause['distinguished_by']}")
+    if cause["occurs_in"]:
+        parts.append(f"Occurs in: {cause['occurs_in']}")
+    return f"{'. '.join(parts)}."
 
 
 def _describe_confidence(effect: Document) -> str:
@@ -319,15 +336,25 @@ def _describe_share(facts: DiagnosisFacts, cause: Document) -> str:
     share = f", {floor(100 * cause['eta'])} %"
     if cause["family"] == _GROSS:
         return f"{share} of the mean squared error" if facts.removes_error else ""
-    together = " by all terms and effects" if cause["family"] == _TERM else ""
-    return f"{share} of the misfit above the noise floor{together}"
+    if cause.get("error_share") is None:  # a document of an earlier version
+        together = " by all terms and effects" if cause["family"] == _TERM else ""
+        return f"{share} of the misfit above the noise floor{together}"
+    return "" if cause["family"] == _TERM else f", {_write_shares(facts, cause)}"
+
+
+def _write_shares(facts: DiagnosisFacts, cause: Document) -> str:
+    """Write the explained share of the mean squared error, and the share of the noise in it."""
+    share = f"{floor(1000 * cause['error_share']) / 10:g} % of the mean squared error"
+    limit = "" if facts.is_measured else "at most "
+    return f"{share} ({limit}{100 * cause['noise_share']:.2g} % of it is noise)"
 
 
 def _name_values(facts: DiagnosisFacts, effect: Document) -> str:
     values = ", ".join(
         f"{name} = {write_value(each, facts.is_exact)}" for name, each in effect["parameters"].items()
     )
-    return f"{effect['name']}: {values}" if values else str(effect["name"])
+    name = f"{effect['name']} {effect['term']}" if effect.get("term") else str(effect["name"])
+    return f"{name}: {values}" if values else name
 
 
 def write_value(given: Document, is_exact: bool = False) -> str:
@@ -371,6 +398,13 @@ def _describe_equations(facts: DiagnosisFacts) -> str:
         return f"Equations: {equations}"
     names = " and ".join(facts.discovered["effects"])
     return f"Equations that explain the record as well{f', with {names}' if names else ''}: {equations}"
+
+
+def _describe_extended_simulation(facts: DiagnosisFacts) -> str:
+    names = " and ".join(dict.fromkeys(each["name"] for each in facts.causes))
+    values = facts.document["calibrated"]
+    calibrated = f"; {', '.join(f'{name} = {value:.4g}' for name, value in values.items())}" if values else ""
+    return f"Extended simulation: {facts.document['equations']}{calibrated}; with {names}."
 
 
 def _describe_nearest_to_terms(facts: DiagnosisFacts) -> str:
@@ -566,7 +600,17 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.is_gross,
         lambda _: "No effect was searched for: diagnose the corrected record.",
     ),
+    Statement(
+        "terms-share",
+        lambda facts: facts.terms and facts.terms[0].get("error_share") is not None,
+        lambda facts: f"All terms and effects together explain {_write_shares(facts, facts.terms[0])}.",
+    ),
     Statement("equations", lambda facts: facts.discovered is not None, _describe_equations),
+    Statement(
+        "extended-simulation",
+        lambda facts: facts.gain is not None and facts.discovered is None and facts.document.get("equations"),
+        _describe_extended_simulation,
+    ),
     Statement(
         "nearest-to-terms",
         lambda facts: (

@@ -82,6 +82,11 @@ class OdeSimulator(BatchSimulator):
         return self.system.name
 
     @property
+    def equations(self) -> str:
+        """Differential equations, and the equation of the output."""
+        return self.system.write_equations()
+
+    @property
     def sites(self) -> frozenset[Site]:
         """All sites, but that of forces only if the system tells where they act."""
         return frozenset(Site) if self.system.force else frozenset(Site) - {Site.FORCE}

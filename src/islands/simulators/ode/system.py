@@ -100,6 +100,12 @@ class OdeSystem:
             if not isinstance(right, Symbol) and name not in self.definitions
         )
 
+    def write_equations(self) -> str:
+        """Write the equations in one line, as ``dx/dt = v; dv/dt = (u - k*x)/m; output = x``."""
+        parts = [f"{name} = {render(each)}" for name, each in self.variables]
+        parts += [f"d{name}/dt = {render(each)}" for name, each in self.derivatives]
+        return "; ".join([*parts, f"output = {render(self.output)}"])
+
     @property
     def signals(self) -> tuple[str, ...]:
         """Names of the input and of the channels."""

@@ -62,6 +62,50 @@ def test_a_cause_that_others_exceed_is_uncertain():
     assert "0.36, 99 % of the misfit above the noise floor; confounded with sensor-lag" in said
 
 
+def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
+    explained = {
+        **CAUSE,
+        "error_share": 0.9876,
+        "noise_share": 0.0049,
+        "summary": "The input acts later: u(t - tau)",
+        "distinguished_by": "a phase that grows with the frequency",
+        "occurs_in": "sampling and communication",
+    }
+    bound = text("named", effects=[explained], gain=GAIN)
+    assert "98.7 % of the mean squared error (at most 0.49 % of it is noise). The input acts later" in bound
+    assert "Distinguished by: a phase that grows with the frequency. Occurs in: sampling" in bound
+    measured = text("named", effects=[explained], gain=GAIN, noise_floor_is="measured by repeated periods")
+    assert "98.7 % of the mean squared error (0.49 % of it is noise)" in measured
+    assert "Occurs in" not in text("named", effects=[{**explained, "claimed": False}], gain=GAIN)
+    # Gains and parameters look alike: nothing in the record distinguishes them.
+    assert "Distinguished by" not in text("named", effects=[{**explained, "family": "scale"}], gain=GAIN)
+
+
+def test_the_extended_simulation_is_stated_with_its_values():
+    said = text("named", effects=[CAUSE], gain=GAIN, equations="dx/dt = u - k*x", calibrated={"k": 2.0})
+    assert "Extended simulation: dx/dt = u - k*x; k = 2; with delay." in said
+    assert "Extended simulation" not in text("unknown", equations="dx/dt = u - k*x", calibrated={"k": 2.0})
+
+
+def test_terms_are_named_with_their_equations_and_share_one_part_of_the_error():
+    terms = [
+        {
+            **CAUSE,
+            "name": "missing-term",
+            "family": "discovered",
+            "term": f"a{number}*u in output",
+            "error_share": 0.98,
+            "noise_share": 0.02,
+            "parameters": {},
+        }
+        for number in (1, 2)
+    ]
+    said = text("discovered", effects=terms, gain=GAIN)
+    assert "missing-term a1*u in output; confidence 0.98\n" in said
+    assert said.count("of the mean squared error") == 1
+    assert "All terms and effects together explain 98 % of the mean squared error" in said
+
+
 def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
     assert "the RMSE is 0.011 um" in (near := text("nothing", calibrated_rmse=0.011))
     assert near.startswith("No significant discrepancy: the simulation agrees")
@@ -187,6 +231,10 @@ def test_contradictions_are_found():
     )
     assert find_contradictions(
         "The simulation lacks a known effect, confidence 0.31, 99 % of the misfit above the noise floor"
+    )
+    assert find_contradictions(
+        "The simulation lacks a known effect, confidence 0.31, 99 % of the mean squared error (1 % of it is "
+        "noise)"
     )
     assert find_contradictions("The noise floor is 0.2 um, noise floor (upper bound) 0.3")
 
