@@ -5,8 +5,8 @@ it.
 """
 
 import itertools
-from collections.abc import Iterator, Mapping, Set
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,8 +47,46 @@ SCALED_FORMS = {
 #: Further scales from which a fit starts, relative to the nominal one.
 STARTING_SCALES = (0.3, 3.0)
 
+#: Functions of one signal that may act in a part of the time only.
+GATED_FORMS = ("a", "a**3", "abs(a)*a", "sign(a)")
+
+#: Number of instants of a gate in time, and the part of the time at each end of the estimation part that has
+#: none, since too few samples would show the change.
+GATE_INSTANTS, _GATE_MARGIN = 7, 0.08
+
+#: Duration of the change of a gate relative to that of the estimation part.
+_GATE_CHANGE = 0.0005
+
 #: Nominal value and bound of a coefficient, relative to that of a term as large as the rest of its equation.
 NOMINAL, LIMIT = 1e-3, 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """Part of the time in which a term acts: from an instant on, or until then.
+
+    Attributes
+    ----------
+    is_onset : bool
+        Whether the term acts from the instant on.
+    earliest, latest : float
+        Bounds of the instant in seconds.
+    change : float
+        Duration of the change in seconds; it is not zero, so that the instant has a derivative.
+    """
+
+    is_onset: bool
+    earliest: float
+    latest: float
+    change: float
+
+    def write(self, instant: str) -> str:
+        """Write the factor of the term, 1 while it acts and otherwise 0, given the name of the instant."""
+        return f"(1 {'+' if self.is_onset else '-'} tanh(({TIME} - {instant})/{self.change:.4g}))/2"
+
+    def describe(self, instant: str) -> str:
+        """State when the term acts."""
+        return f"from {TIME} = {instant} on" if self.is_onset else f"until {TIME} = {instant}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +105,8 @@ class CandidateTerm:
         Nominal scale; None if the expression has none.
     unit, scale_unit : str
         Units of the coefficient and of the scale; empty if they are not known.
+    gate : Gate or None
+        Part of the time in which the term acts, whose instant is the scale; None if it always acts.
     """
 
     target: str
@@ -75,11 +115,17 @@ class CandidateTerm:
     scale: float | None = None
     unit: str = ""
     scale_unit: str = ""
+    gate: Gate | None = None
 
     @property
     def value_count(self) -> int:
         """Number of values that are fitted: the coefficient, and the scale if there is one."""
         return 1 if self.scale is None else 2
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of its values, and one more for an instant, which is selected among all samples."""
+        return self.value_count + (self.gate is not None)
 
     def name_parameters(self, number: int) -> tuple[str, ...]:
         """Return the names of the coefficient, and of the scale if there is one, of a numbered term."""
@@ -87,6 +133,15 @@ class CandidateTerm:
 
     def write(self, number: int) -> str:
         """Return the term with its coefficient, as it is in its equation."""
+        law = self._write_law(number)
+        return law if self.gate is None else f"{law}*{self.gate.write(self.name_parameters(number)[1])}"
+
+    def describe(self, number: int) -> str:
+        """Return the term with its equation, and the part of the time in which it acts."""
+        text = f"{self._write_law(number)} in {name_equation(self.target)}"
+        return text if self.gate is None else f"{text}, {self.gate.describe(self.name_parameters(number)[1])}"
+
+    def _write_law(self, number: int) -> str:
         coefficient, *scales = self.name_parameters(number)
         return f"{coefficient}*({self.text.format(scale=''.join(scales))})"
 
@@ -106,10 +161,65 @@ class CandidateTerm:
         parameters = [
             OdeParameter(coefficient, NOMINAL * size, self.unit, lower=-LIMIT * size, upper=LIMIT * size),
         ]
+        bounds = (None, None) if self.gate is None else (self.gate.earliest, self.gate.latest)
         parameters += [
-            OdeParameter(name, self.scale, self.scale_unit) for name in scales if self.scale is not None
+            OdeParameter(name, self.scale, self.scale_unit, None, *bounds)
+            for name in scales
+            if self.scale is not None
         ]
         return system.with_term(self.target, self.write(number), parameters)
+
+
+def name_equation(target: str) -> str:
+    """Return the left side of the equation of a state, or of the output."""
+    return target if target == OUTPUT else f"d{target}/dt"
+
+
+def list_gated_terms(candidates: Sequence[CandidateTerm], first: float, last: float) -> list[CandidateTerm]:
+    """Return the simple terms of one signal that act from an instant on only, for several instants.
+
+    Parameters
+    ----------
+    first, last : float
+        Times at the ends of the estimation part in seconds.
+    """
+    margin, change = _GATE_MARGIN * (last - first), _GATE_CHANGE * (last - first)
+    gate = Gate(True, first + margin, last - margin, change)
+    return [
+        replace(each, scale=instant, scale_unit="s", gate=gate)
+        for each in candidates
+        if each.scale is None and _is_gated(each.text)
+        for instant in np.linspace(gate.earliest, gate.latest, GATE_INSTANTS).tolist()
+    ]
+
+
+def _is_gated(text: str) -> bool:
+    """Return whether a term is a simple function of one signal or of its rate."""
+    symbols = set(find_symbols(parse_expression(text)))
+    if len(symbols) != 1 or TIME in symbols:
+        return False
+    (signal,) = symbols
+    return text in {_insert(form, each) for form in GATED_FORMS for each in (signal, f"rate({signal})")}
+
+
+def vary_gate(term: CandidateTerm, halvings: int) -> list[CandidateTerm]:
+    """Return a term with a gate, the same until the instant, and both for an earlier and a later instant.
+
+    Parameters
+    ----------
+    halvings : int
+        Number of times that the distance between instants is halved.
+    """
+    assert term.gate is not None
+    assert term.scale is not None
+    gate = term.gate
+    distance = (gate.latest - gate.earliest) / (GATE_INSTANTS - 1) / 2**halvings
+    moved = (
+        float(np.clip(term.scale + change, gate.earliest, gate.latest))
+        for change in (0.0, -distance, distance)
+    )
+    gates = [gate, replace(gate, is_onset=not gate.is_onset)] if halvings == 1 else [gate]
+    return [replace(term, scale=instant, gate=each) for instant in moved for each in gates]
 
 
 def find_free_numbers(used: Set[str], count: int) -> list[int]:

@@ -6,8 +6,9 @@ reduction ratio (Billings, Nonlinear System Identification, section 3), with res
 The most promising terms are then fitted with all parameters by the Levenberg-Marquardt method.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -20,20 +21,28 @@ from islands.diagnosis.discovery.candidate_terms import (
     CandidateTerm,
     find_free_numbers,
     list_candidate_terms,
+    list_gated_terms,
+    name_equation,
+    vary_gate,
 )
 from islands.diagnosis.discovery.equation_simulator import (
     add_terms,
     find_equations,
     find_used_names,
     get_system,
+    with_equations,
 )
+from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_ranking import RankedTerm, rank_terms
 from islands.diagnosis.inference.screening import bic_penalty
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
+from islands.expressions.primitives import DIV, EQUATION_FUNCTIONS
 from islands.expressions.printing import render
+from islands.expressions.tree import Apply, Constant, Expression, Symbol
+from islands.expressions.tree import replace as replace_parts
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.ode.output_system import SYMBOL_MEANINGS
@@ -44,6 +53,15 @@ MAX_TERMS = 3
 
 #: Number of terms of each step that are fitted with all parameters.
 FITTED_TERMS = 12
+
+#: Number of terms with a gate in time of each step that are fitted with all parameters.
+FITTED_GATES = 4
+
+#: Number of times that the distance between the instants of a gate is halved before it is fitted.
+_GATE_HALVINGS = 6
+
+#: Width of a smooth sign of a state, relative to its largest value.
+_SMOOTHING = 0.02
 
 #: Ratio of the gains of a term and of the one before that is expected at most. Of terms that act together,
 #: the second one may gain more than the first.
@@ -77,7 +95,7 @@ class DiscoveredTerm:
 
     def describe(self) -> str:
         """Return the term with its equation, as ``a1*(x*v) in dv/dt``."""
-        return f"{self.term.write(self.number)} in {_write_left_side(self.term.target)}"
+        return self.term.describe(self.number)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,18 +136,13 @@ class TermSearchResult:
         system = get_system(self.fit)
         right_sides = {**dict(system.derivatives), OUTPUT: system.output}
         changed = dict.fromkeys(each.term.target for each in self.terms)
-        lines = [f"{_write_left_side(target)} = {render(right_sides[target])}" for target in changed]
+        lines = [f"{name_equation(target)} = {render(right_sides[target])}" for target in changed]
         values = {
             parameter.name: f"{parameter.name} = {value:.4g} {parameter.unit}".rstrip()
             for parameter, value in zip(self.fit.simulation.parameters, self.fit.values, strict=True)
         }
         new = [values[name] for each in self.terms for name in each.parameters]
         return "; ".join([*lines, ", ".join(new), *([SYMBOL_MEANINGS] if system.simulated else [])])
-
-
-def _write_left_side(target: str) -> str:
-    """Return the left side of the equation of a state, or of the output."""
-    return target if target == OUTPUT else f"d{target}/dt"
 
 
 def search_terms(
@@ -184,6 +197,7 @@ def search_terms(
         before = found.cost
         best = _select_discretisation(best, target)
         found = _eliminate_terms(best, system, target, target_sizes, run)
+        found = _improve(found, _calibrate_smoothed(found.fit, target, equations.sizes))
         missing = max_terms - len(found.terms)
         if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
             break
@@ -193,6 +207,36 @@ def search_terms(
 def _improve(found: TermSearchResult, fit: CalibrationResult) -> TermSearchResult:
     """Return the equations with another fit, if that is better."""
     return replace(found, fit=fit) if fit.score < found.fit.score else found
+
+
+def _calibrate_smoothed(
+    fit: CalibrationResult, target: Target, sizes: Mapping[str, float]
+) -> CalibrationResult:
+    """Calibrate equations from the values of the same equations with smooth signs of states.
+
+    The output is no smooth function of the parameters if the sign of a state changes within a step, so that a
+    calibration may end too early.
+
+    Parameters
+    ----------
+    sizes : mapping
+        Largest absolute values of the states.
+    """
+    system = get_system(fit)
+
+    def smooth(part: Expression) -> Expression | None:
+        match part:
+            case Apply(primitive, (Symbol(name),)) if primitive.name == "sign" and name in sizes:
+                width = Constant(_SMOOTHING * sizes[name])
+                return Apply(EQUATION_FUNCTIONS["tanh"], (Apply(DIV, (Symbol(name), width)),))
+        return None
+
+    derivatives = tuple((name, replace_parts(right, smooth)) for name, right in system.derivatives)
+    if derivatives == system.derivatives:
+        return fit
+    simulator = with_equations(fit.simulation.simulator, replace(system, derivatives=derivatives))
+    smoothed = calibrate(replace(fit.simulation, simulator=simulator), target, fit.values)
+    return calibrate(fit.simulation, target, smoothed.values)
 
 
 def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:
@@ -239,15 +283,27 @@ def _find_best_term(
     """Return the equations with the term that is best after a calibration of all parameters."""
     fit, used = found.fit, {(each.term.target, each.term.text) for each in found.terms}
     (number,) = find_free_numbers(find_used_names(fit), 1)
-    free = [each for each in candidates if (each.target, each.text) not in used]
+    values = dict(zip((each.name for each in fit.simulation.parameters), fit.values.tolist(), strict=True))
+    equations = get_system(fit).with_values(values)
+    free = drop_redundant_terms(
+        [each for each in candidates if (each.target, each.text) not in used],
+        equations,
+        set(target.prior_std),
+    )
     log_n, log_choices = float(np.log(fit.noise.effective_samples)), 2.0 * float(np.log(len(candidates)))
-    ranked = rank_terms(fit, [target, unweighted], free, target_sizes, run.parallel_map)[:FITTED_TERMS]
+    rank = partial(
+        rank_terms, fit, [target, unweighted], target_sizes=target_sizes, parallel_map=run.parallel_map
+    )
+    ranked = rank(free)[:FITTED_TERMS]
+    if all(each.term.gate is None for each in found.terms):
+        # A step of the input's gain is an effect of the catalogue.
+        ranked += _rank_gates([each for each in free if each.text != equations.input], fit, rank)
     tasks = []
     for each in ranked:
         simulation, start = add_terms(fit, get_system(fit), [(each.term, number)], target_sizes)
         tasks.append((simulation, _list_starts(simulation, start, each, number)))
     # Any of the candidates could gain by chance.
-    penalties = [each.term.value_count * log_n + log_choices for each in ranked]
+    penalties = [each.term.degrees_of_freedom * log_n + log_choices for each in ranked]
     results = []
     fits = calibrate_all(StartsCalibrator(target), tasks, run.parallel_map)
     for each, penalty, fitted in zip(ranked, penalties, fits, strict=True):
@@ -257,13 +313,38 @@ def _find_best_term(
     return min(results, key=lambda each: each.cost, default=None)
 
 
+def _rank_gates(
+    candidates: Sequence[CandidateTerm],
+    fit: CalibrationResult,
+    rank: Callable[[Sequence[CandidateTerm]], list[RankedTerm]],
+) -> list[RankedTerm]:
+    """Return the best terms that act in a part of the time only, with their instants."""
+    context = fit.simulation.context
+    found = rank(list_gated_terms(candidates, context.start_time, context.fit_end_time))
+    for halvings in range(_GATE_HALVINGS + 1):
+        if halvings:
+            found = rank([moved for each in found for moved in vary_gate(each.term, halvings)])
+        best: dict[tuple[str, str, bool], RankedTerm] = {}
+        for each in found:
+            best.setdefault(_identify_gate(each.term), each)
+        found = list(best.values())[:FITTED_GATES]
+    return found
+
+
+def _identify_gate(term: CandidateTerm) -> tuple[str, str, bool]:
+    """Return what a term with a gate and the same one with another instant have in common."""
+    assert term.gate is not None
+    return term.target, term.text, term.gate.is_onset
+
+
 def _list_starts(
     simulation: ExtendedSimulator, start: Signal, ranked: RankedTerm, number: int
 ) -> list[Signal]:
     """Return starting points: coefficients of zero with several scales, and the estimated coefficients."""
     places = {parameter.name: index for index, parameter in enumerate(simulation.parameters)}
     coefficient, *scales = (places[name] for name in ranked.term.name_parameters(number))
-    changes = [(scale, factor * start[scale]) for scale in scales for factor in STARTING_SCALES]
+    factors = STARTING_SCALES if ranked.term.gate is None else ()
+    changes = [(scale, factor * start[scale]) for scale in scales for factor in factors]
     changes += [(coefficient, value) for value in ranked.coefficients]
     starts = np.tile(start, (len(changes) + 1, 1))
     for point, (place, value) in zip(starts[1:], changes, strict=True):

@@ -19,6 +19,7 @@ from islands.diagnosis.discovery.candidate_terms import (
     find_free_numbers,
     list_candidate_terms,
 )
+from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
 from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.documents.result_json import diagnosis_document
@@ -63,8 +64,11 @@ LAWS: dict[str, tuple[Law, str, float]] = {
 }
 
 
-def simulate(law: Law, samples: int = 1200, seed: int = 1) -> Dataset:
-    """Simulate an oscillator with an additional force by the midpoint rule, with noise of one per cent."""
+def simulate(law: Callable[..., float], samples: int = 1200, seed: int = 1, timed: bool = False) -> Dataset:
+    """Simulate an oscillator with an additional force by the midpoint rule, with noise of one per cent.
+
+    A timed law also reads the time.
+    """
     rng = np.random.default_rng(seed)
     time = DT * np.arange(samples)
     frequencies = rng.uniform(0.2, 3.0, 12)
@@ -77,19 +81,20 @@ def simulate(law: Law, samples: int = 1200, seed: int = 1) -> Dataset:
     h = DT / STEPS
     for k, force in enumerate(fine):
         y[k] = x
+        instant = (k * h,) if timed else ()
         middle_x = x + h / 2 * v
-        middle_v = v + h / 2 * (force - 2.0 * v - 100.0 * x - law(x, v, force))
+        middle_v = v + h / 2 * (force - 2.0 * v - 100.0 * x - law(x, v, force, *instant))
         x, v = (
             x + h * middle_v,
-            v + h * (force - 2.0 * middle_v - 100.0 * middle_x - law(middle_x, middle_v, force)),
+            v + h * (force - 2.0 * middle_v - 100.0 * middle_x - law(middle_x, middle_v, force, *instant)),
         )
     y = y[::STEPS]
     noise = 0.01 * np.std(y) * rng.standard_normal(samples)
     return Dataset(u, y + noise, DT, ("F_N",), output_name="x_m", input_units=("N",), output_unit="m")
 
 
-def search(law: Law) -> TermSearchResult | None:
-    record = simulate(law)
+def search(law: Callable[..., float], timed: bool = False) -> TermSearchResult | None:
+    record = simulate(law, timed=timed)
     simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), record)
     fitted = count_fitted_samples(record)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
@@ -133,6 +138,30 @@ def test_saturation_and_stribeck_curve_are_found_with_their_scale(
     assert [each.term.text for each in found.terms] == [text]
     scale = dict(zip((each.name for each in found.fit.simulation.parameters), found.fit.values, strict=True))
     assert scale["s1"] == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("is_onset", [True, False])
+def test_friction_in_a_part_of_the_time_is_found_with_its_instant(is_onset: bool) -> None:
+    found = search(lambda _x, v, _u, t: 6.0 * np.tanh(v / 0.01) * ((t >= 5.2) == is_onset), timed=True)
+    assert found is not None
+    assert [each.term.text for each in found.terms] == ["sign(v)"]
+    values = dict(zip((each.name for each in found.fit.simulation.parameters), found.fit.values, strict=True))
+    assert values["a1"] == pytest.approx(-6.0, rel=0.03)
+    assert values["s1"] == pytest.approx(5.2, abs=0.05)
+    expected = "from t = s1 on" if is_onset else "until t = s1"
+    assert found.terms[0].describe() == f"a1*(sign(v)) in dv/dt, {expected}"
+
+
+def test_terms_that_the_parameters_reproduce_are_no_candidates() -> None:
+    system = OdeSpec.model_validate({"kind": "ode", **DOCUMENT}).make_system()
+    candidates = list_candidate_terms(system, dict.fromkeys(("x", "v", "F", "rate(F)"), 1.0), 10.0, {})
+    kept = {(each.target, each.text) for each in drop_redundant_terms(candidates, system)}
+    every = {(each.target, each.text) for each in candidates}
+    # Mass, damping and stiffness are free, and no parameter is in the equation of the output.
+    assert every - kept == {("v", "x"), ("v", "v"), ("v", "F")}
+    fixed = {(each.target, each.text) for each in drop_redundant_terms(candidates, system, {"m"})}
+    assert every - fixed == {("v", "x"), ("v", "v")}
 
 
 def test_no_term_is_added_to_right_equations() -> None:
