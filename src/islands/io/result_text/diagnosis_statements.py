@@ -204,6 +204,11 @@ class DiagnosisFacts:
         return found
 
     @property
+    def is_one_record(self) -> bool:
+        """Whether the held-out data are the end of the recording that the causes were found on."""
+        return self.held_out_part == "the last quarter of the record"
+
+    @property
     def nearest(self) -> list[Document]:
         """The best screened effects that improve the fit."""
         return [each for each in self.document["candidates"][:_NEAREST] if each["score"] > _LEAST_SCORE]
@@ -633,6 +638,14 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda _: "A flexible model of the past of input and output predicts a part of the residual.",
     ),
     Statement("gain", lambda facts: facts.gain is not None, _describe_gain),
+    Statement(
+        "one-record",
+        lambda facts: facts.has_gain and facts.is_one_record,
+        lambda _: (
+            "Causes and gain rest on one record: diagnose it with a second one, with another input, as "
+            "validation data before the extended simulation is used elsewhere."
+        ),
+    ),
     Statement(
         "error",
         lambda facts: facts.gain is None and facts.error is not None and not facts.is_gross,

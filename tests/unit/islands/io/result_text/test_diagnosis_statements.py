@@ -87,6 +87,13 @@ def test_the_extended_simulation_is_stated_with_its_values():
     assert "Extended simulation" not in text("unknown", equations="dx/dt = u - k*x", calibrated={"k": 2.0})
 
 
+def test_a_gain_on_one_record_asks_for_another_one():
+    assert "Causes and gain rest on one record" in text("named", effects=[CAUSE], gain=GAIN)
+    second = text("named", effects=[CAUSE], gain=GAIN, held_out_part="the last recording")
+    assert "Causes and gain rest on one record" not in second
+    assert "rest on one record" not in text("unknown")
+
+
 def test_terms_are_named_with_their_equations_and_share_one_part_of_the_error():
     terms = [
         {
