@@ -52,7 +52,7 @@ GATED_FORMS = ("a", "a**3", "abs(a)*a", "sign(a)")
 
 #: Number of instants of a gate in time, and the part of the time at each end of the estimation part that has
 #: none, since too few samples would show the change.
-GATE_INSTANTS, _GATE_MARGIN = 7, 0.08
+GATE_INSTANTS, _GATE_MARGIN = 8, 0.08
 
 #: Duration of the change of a gate relative to that of the estimation part.
 _GATE_CHANGE = 0.0005
@@ -79,6 +79,11 @@ class Gate:
     earliest: float
     latest: float
     change: float
+
+    @property
+    def spacing(self) -> float:
+        """Distance between the instants from which a search starts, in seconds."""
+        return (self.latest - self.earliest) / (GATE_INSTANTS - 1)
 
     def write(self, instant: str) -> str:
         """Write the factor of the term, 1 while it acts and otherwise 0, given the name of the instant."""
@@ -213,7 +218,7 @@ def vary_gate(term: CandidateTerm, halvings: int) -> list[CandidateTerm]:
     assert term.gate is not None
     assert term.scale is not None
     gate = term.gate
-    distance = (gate.latest - gate.earliest) / (GATE_INSTANTS - 1) / 2**halvings
+    distance = gate.spacing / 2**halvings
     moved = (
         float(np.clip(term.scale + change, gate.earliest, gate.latest))
         for change in (0.0, -distance, distance)

@@ -58,15 +58,21 @@ def rank_terms(
     projections = [Projection(fit, target) for target in targets]
 
     def explain_group(group: Sequence[CandidateTerm]) -> NDArray[np.float64]:
-        numbers = find_free_numbers(find_used_names(fit), len(group))
-        numbered = list(zip(group, numbers, strict=True))
+        # Terms that differ in their scales alone, as in instants, are one term of the equations.
+        laws = {(each.target, each.text, each.gate): each for each in group}
+        numbers = dict(zip(laws, find_free_numbers(find_used_names(fit), len(laws)), strict=True))
+        numbered = [(law, numbers[key]) for key, law in laws.items()]
         simulation, start = add_terms(fit, get_system(fit), numbered, target_sizes)
         index = {parameter.name: place for place, parameter in enumerate(simulation.parameters)}
-        places = [index[term.name_parameters(number)[0]] for term, number in numbered]
+        starts, places = np.tile(start, (len(group), 1)), []
+        for row, each in zip(starts, group, strict=True):
+            coefficient, *scales = each.name_parameters(numbers[each.target, each.text, each.gate])
+            places.append(index[coefficient])
+            row[[index[name] for name in scales]] = each.scale
 
         def respond(coefficients: Signal) -> Signal:
             """Return the responses to one term at a time, shape (rows, terms, samples)."""
-            points = np.tile(start, (coefficients.size, 1))
+            points = np.tile(starts, (len(coefficients), 1))
             points[np.arange(len(points)), np.tile(places, len(coefficients))] = coefficients.ravel()
             responses = simulation.simulate_batch(points) - fit.output
             return responses.reshape(*coefficients.shape, -1)

@@ -13,7 +13,12 @@ from functools import partial
 import numpy as np
 
 from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+    whiten_target,
+)
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.candidate_terms import (
@@ -198,6 +203,7 @@ def search_terms(
         best = _select_discretisation(best, target)
         found = _eliminate_terms(best, system, target, target_sizes, run)
         found = _improve(found, _calibrate_smoothed(found.fit, target, equations.sizes))
+        found = _move_instants(found, target)
         missing = max_terms - len(found.terms)
         if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
             break
@@ -237,6 +243,30 @@ def _calibrate_smoothed(
     simulator = with_equations(fit.simulation.simulator, replace(system, derivatives=derivatives))
     smoothed = calibrate(replace(fit.simulation, simulator=simulator), target, fit.values)
     return calibrate(fit.simulation, target, smoothed.values)
+
+
+def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
+    """Return the equations with other instants of gates, as long as they fit better.
+
+    A calibration moves an instant by the duration of its change only.
+    """
+    places = {parameter.name: place for place, parameter in enumerate(found.fit.simulation.parameters)}
+    for each in found.terms:
+        if each.term.gate is None:
+            continue
+        place, distance = places[each.parameters[1]], each.term.gate.spacing
+        while distance > each.term.gate.change:
+            moved = found.fit.values + distance * np.array([[-1.0], [1.0]]) * (
+                np.arange(len(places)) == place
+            )
+            moved[:, place] = np.clip(moved[:, place], each.term.gate.earliest, each.term.gate.latest)
+            fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
+            best = min(fits, key=lambda fit: fit.score)
+            if best.score < found.fit.score:
+                found = _improve(found, calibrate(best.simulation, target, best.values))
+            else:
+                distance /= 2.0
+    return found
 
 
 def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:
