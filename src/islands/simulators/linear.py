@@ -41,6 +41,8 @@ class LinearSimulator(Simulator):
         Unit of the output.
     parameters : tuple of Parameter
         Coefficients, level, and state of the filter at the first sample.
+    has_direct_term : bool
+        Whether b0 is a parameter; otherwise it is zero, and the model is strictly proper.
     state_at_rest : ndarray, shape (order,)
         State of the filter at rest at an input of one; zero without such an equilibrium. It is that of the
         nominal coefficients, so that it remains finite while a pole passes through one.
@@ -52,6 +54,7 @@ class LinearSimulator(Simulator):
     reference_input: float
     delay: int
     unit: str
+    has_direct_term: bool = True
     parameters: tuple[Parameter, ...] = field(init=False)
     state_at_rest: Signal = field(init=False)
     sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
@@ -78,11 +81,24 @@ class LinearSimulator(Simulator):
         order = self.denominator.size
         gain = _SCALE * float(np.max(np.abs(self.numerator))) or _SCALE
         return (
-            *(Parameter(f"b{lag}", "", float(b), gain) for lag, b in enumerate(self.numerator)),
+            *(Parameter(f"b{lag}", "", float(self.numerator[lag]), gain) for lag in self._list_lags()),
             *(Parameter(f"a{lag + 1}", "", float(a), _SCALE) for lag, a in enumerate(self.denominator)),
             Parameter("level", self.unit, self.level, _SCALE * abs(self.level) + gain),
             *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
         )
+
+    def _list_lags(self) -> range:
+        """Return the lags of the coefficients of the input that are parameters."""
+        return range(0 if self.has_direct_term else 1, self.numerator.size)
+
+    def split_values(self, values: Signal) -> tuple[Signal, Signal, float, Signal]:
+        """Return numerator, denominator, level, and state at the first sample, given all parameters."""
+        order = self.denominator.size
+        numerator = np.zeros(order + 1)
+        lags = self._list_lags()
+        numerator[lags.start :] = values[: len(lags)]
+        own = values[len(lags) :]
+        return numerator, own[:order], float(own[order]), own[order + 1 :]
 
     def simulate(
         self,
@@ -102,13 +118,11 @@ class LinearSimulator(Simulator):
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
         """Simulate several runs; those with the same input share its delay, and equal forces."""
-        order = self.denominator.size
         inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
         deviations = {key: self._delay(x) - self.reference_input for key, x in inputs.items()}
         found = np.empty((len(runs), runs[0].x.size))
         for row, run in zip(found, runs, strict=True):
-            numerator, denominator = run.values[: order + 1], run.values[order + 1 : 2 * order + 1]
-            level, state = run.values[2 * order + 1], run.values[2 * order + 2 :]
+            numerator, denominator, level, state = self.split_values(run.values)
             # The input is constant before the first sample; the state is a deviation from that equilibrium.
             state = state + (inputs[run.input_key][0] - self.reference_input) * self.state_at_rest
             poles = np.concatenate([[1.0], -denominator])

@@ -81,15 +81,14 @@ def describe_extension(
         case RecordedOutput():
             return ColumnSpec(kind="column", column=simulator.column)
         case LinearSimulator():
-            order = simulator.denominator.size
-            coefficients = tuple(map(float, values))
+            numerator, denominator, level, _ = simulator.split_values(values)
             return LinearSpec(
                 kind="linear",
-                order=order,
+                order=denominator.size,
                 delay=simulator.delay,
-                numerator=coefficients[: order + 1],
-                denominator=coefficients[order + 1 : 2 * order + 1],
-                level=coefficients[2 * order + 1],
+                numerator=tuple(numerator.tolist()),
+                denominator=tuple(denominator.tolist()),
+                level=level,
                 reference_input=simulator.reference_input,
             )
         case PythonFunctionSimulator():
