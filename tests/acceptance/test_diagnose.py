@@ -19,6 +19,7 @@ from islands.parallel import ParallelMap
 from islands.simulators.interface import Simulator
 from islands_measurements.detection.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
+from support.noise_records import SENSOR, make_quantised_actuator
 from support.undrawn import undrawn_figures
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
@@ -141,6 +142,25 @@ def test_file_for_validation_is_held_out_as_a_whole(offset_record: Path) -> None
     assert "--validation is for a diagnosis" in planned
 
 
+@pytest.mark.ci
+def test_residual_far_above_the_stated_noise_is_unknown(tmp_path: Path) -> None:
+    write_record(make_quantised_actuator(20), tmp_path / "data.csv")
+    options = ("--input", "u_V", "--output", "y_V", "--simulation", "linear:2", "--workers", "1")
+    with undrawn_figures():
+        said = succeed(
+            *("diagnose", tmp_path / "data.csv", *options, "--noise-level", str(SENSOR)),
+            *("--out", tmp_path / "out"),
+        )
+    document = json.loads((tmp_path / "out/discrepancy.json").read_text())
+    assert document["verdict"] == "unknown"
+    assert document["noise_claim"]["noise_level"] == SENSOR
+    assert "fine map of the input" in document["remainder"]
+    assert [each["name"] for each in document["record_findings"]] == ["above-noise-level"]
+    assert "times the stated noise of" in " ".join(said.split())
+    planned = fail("diagnose", *options, "--plan", "--noise-level", "0.1", "--out", tmp_path / "plan")
+    assert "--noise-level is for a diagnosis" in planned
+
+
 def run_self_test(base: Path, out: str, *options: object) -> tuple[str, dict]:
     """Diagnose with a self-test; return the printed text and the document."""
     with undrawn_figures():
@@ -227,6 +247,10 @@ def test_existing_result_is_not_overwritten_without_force(folder: Path) -> None:
         (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
         (("--simulation", "bouc-wen-piezo", "--tolerance", "mass=0.1"), "has no parameter 'mass'"),
         (("--simulation", "bouc-wen-piezo", "--input", "T_K"), "is driven by one input"),
+        (
+            ("--simulation", "bouc-wen-piezo", "--noise-level", "0"),
+            "the noise level is the standard deviation",
+        ),
     ],
 )
 def test_invalid_option_is_rejected_with_a_one_line_message(

@@ -21,6 +21,14 @@ Tolerances = Annotated[
     typer.Option("--tolerance", help="PARAM=REL: relative standard deviation of a parameter, 0.02 for 2 %."),
 ]
 
+NoiseLevel = Annotated[
+    float | None,
+    typer.Option(
+        "--noise-level",
+        help="Standard deviation of the noise of the output, in its unit; a far larger residual is no noise.",
+    ),
+]
+
 
 def single_input(inputs: list[str]) -> str:
     """Return the single input that drives a simulation.

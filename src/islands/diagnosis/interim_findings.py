@@ -22,6 +22,7 @@ from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.inference.strategies import SearchOutcome, analyse_residual, make_outcome
 from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.noise_claim import judge_noise
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect
@@ -49,7 +50,9 @@ class InterimFindings:
     """
 
     def __init__(self) -> None:
-        self._begun: tuple[Dataset, CalibrationResult, Target, Sequence[RecordFinding]] | None = None
+        self._begun: (
+            tuple[Dataset, CalibrationResult, Target, Sequence[RecordFinding], float | None] | None
+        ) = None
         self._fits: _ScreeningFits | None = None
         self._screened: tuple[CalibrationResult, Sequence[ScreenedEffect]] | None = None
         self._assessed: tuple[CalibrationResult, SearchOutcome, Sequence[Effect]] | None = None
@@ -63,9 +66,10 @@ class InterimFindings:
         base: CalibrationResult,
         target: Target,
         record_findings: Sequence[RecordFinding],
+        noise_level: float | None = None,
     ) -> None:
-        """Keep the calibrated simulation, the first result of a diagnosis."""
-        self._begun = record, base, target, record_findings
+        """Keep the calibrated simulation, the first result of a diagnosis; arguments as of `diagnose`."""
+        self._begun = record, base, target, record_findings, noise_level
 
     def record_screening(self, base: CalibrationResult, parallel_map: ParallelMap) -> ParallelMap:
         """Return a map that keeps the fits of the first screening while it runs."""
@@ -129,7 +133,7 @@ class InterimFindings:
         """
         if self._step is None or self._begun is None:
             return self._found
-        record, base, target, record_findings = self._begun
+        record, base, target, record_findings, noise_level = self._begun
         rng = np.random.default_rng(seed)
         left_out = list(STEPS[STEPS.index(self._step) :])
         if self._found is not None:
@@ -148,8 +152,11 @@ class InterimFindings:
                     left_out[0] = f"{SCREENING} ({len(screened)} are screened)"
             outcome = _make_outcome(base, screened, target, rng)
             found = make_diagnosis(record, outcome, base, None, DiagnosisRun((), rng))
-        closed_loop = find_closed_loop(found.best, target, record.input_names[0])
-        return replace(found, record_findings=(*record_findings, *closed_loop), left_out=tuple(left_out))
+        best = base if target.has_feedback else found.best
+        closed_loop = find_closed_loop(best, target, record.input_names[0])
+        found = judge_noise(found, target, noise_level, rng)
+        findings = (*record_findings, *closed_loop, *found.record_findings)
+        return replace(found, record_findings=findings, left_out=tuple(left_out))
 
 
 class _ScreeningFits:

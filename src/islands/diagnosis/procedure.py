@@ -27,6 +27,7 @@ from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
 from islands.diagnosis.gross_errors.record_finding import describe_gaps
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
+from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_late_effects
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.inference.strategies import (
     WITH_MODEL_ERROR,
@@ -45,6 +46,7 @@ from islands.diagnosis.interim_findings import (
     MODEL_ERROR,
     InterimFindings,
 )
+from islands.diagnosis.noise_claim import judge_noise, validate_noise_level
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import EFFECTS
@@ -101,6 +103,7 @@ def diagnose(
     parallel_map: ParallelMap = map,
     catalogue: Sequence[Effect] = EFFECTS,
     interim: InterimFindings | None = None,
+    noise_level: float | None = None,
 ) -> Diagnosis:
     """Diagnose a simulation on a record.
 
@@ -125,6 +128,8 @@ def diagnose(
         The effects that are searched for, and the free forms that they are compared with.
     interim : InterimFindings, optional
         Receives what is found on the way.
+    noise_level : float, optional
+        Standard deviation of the noise of the output, in its unit. A residual far above it is no noise.
 
     Raises
     ------
@@ -132,10 +137,11 @@ def diagnose(
         The record or one of its recordings is too short, or has too few outputs or a constant one, or the
         simulation diverges on it.
     SettingsError
-        A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
-        same name, or an effect is invalid.
+        A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, the noise level is not
+        positive, two effects have the same name, or an effect is invalid.
     """
     interim = interim or InterimFindings()
+    validate_noise_level(noise_level)
     prior_std = validate_prior({**simulator.tolerances, **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted, simulator.read_channels)
@@ -151,7 +157,7 @@ def diagnose(
     simulation = ExtendedSimulator(simulator, (), context)
     run.progress("calibrating the simulation")
     base = calibrate(simulation, target, simulation.nominal)
-    interim.begin(record, base, target, record_findings)
+    interim.begin(record, base, target, record_findings, noise_level)
     run.progress("looking for gross errors of the record")
     if gross_errors := find_gross_errors(record, simulator, base, target):
         found = make_gross_diagnosis(record, base, gross_errors, target)
@@ -159,9 +165,32 @@ def diagnose(
     if is_rounding_error(record.y - base.output, record.y):
         found = make_diagnosis(record, make_exact_outcome(base, target), base, None, run)
         return interim.complete(replace(found, record_findings=tuple(record_findings)))
-    run = run.with_effects(select_effects(simulator, context, prior_std, catalogue))
+    held = hold_direct_term(base, target)
+    if held is not None:
+        base, target, simulator = held, replace(target, has_feedback=True), held.simulation.simulator
+        interim.begin(record, base, target, record_findings, noise_level)
+    effects, forms = (
+        list_late_effects(each, base) if target.has_feedback else each
+        for each in (select_effects(simulator, context, prior_std, catalogue, free) for free in (False, True))
+    )
+    found = _find_causes(record, base, target, run.with_effects(effects), forms, interim, seed)
+    closed_loop = find_closed_loop(held or found.best, target, record.input_names[0])
+    found = judge_noise(found, target, noise_level, run.rng)
+    findings = (*record_findings, *closed_loop, *found.record_findings)
+    return interim.complete(replace(found, record_findings=findings))
+
+
+def _find_causes(
+    record: Dataset,
+    base: CalibrationResult,
+    target: Target,
+    run: DiagnosisRun,
+    forms: Sequence[Effect],
+    interim: InterimFindings,
+    seed: int,
+) -> Diagnosis:
+    """Search for effects, and compare them with free forms and missing terms."""
     base, outcome = _search(base, target, run, interim)
-    simulator = base.simulation.simulator
     interim.reach(EVIDENCE)
     run.progress("analysing the residual")
     outcome = interim.keep_outcome(base, assess_evidence(outcome, run), run.effects, step=MODEL_ERROR)
@@ -175,7 +204,6 @@ def diagnose(
     is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
     if not is_clean:
         run.progress("comparing with free forms")
-        forms = select_effects(simulator, context, prior_std, catalogue, free=True)
         outcome = compare_with_free_forms(outcome, forms, run)
         found_forms = [form for form in forms if form in outcome.hypothesis.effects]
         run = run.with_effects([*run.effects, *found_forms])
@@ -186,8 +214,7 @@ def diagnose(
     found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
         found = extend_equations(found, terms, target, run)
-    closed_loop = find_closed_loop(found.best, target, record.input_names[0])
-    return interim.complete(replace(found, record_findings=(*record_findings, *closed_loop)))
+    return found
 
 
 def _start_run(seed: int, parallel_map: ParallelMap, progress: ProgressCallback) -> DiagnosisRun:

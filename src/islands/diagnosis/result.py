@@ -33,6 +33,25 @@ class Candidate:
     explained_fraction: float
 
 
+@dataclass(frozen=True, slots=True)
+class NoiseClaim:
+    """What would have to be noise if the best simulation were right.
+
+    Attributes
+    ----------
+    rms : float
+        RMS of the residual over the samples used for estimation.
+    correlation_time : float
+        Lag in seconds at which its autocorrelation has fallen to 1/e; 0 if it is white.
+    noise_level : float or None
+        Standard deviation of the noise of the output that the user has stated.
+    """
+
+    rms: float
+    correlation_time: float
+    noise_level: float | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
     """Result of a diagnosis.
@@ -41,8 +60,8 @@ class Diagnosis:
     ----------
     verdict : Verdict
     effects : tuple of Finding
-        The named causes, the most important first, then the properties of the noise. "nothing" has properties
-        of the noise only, and "unknown" and "stopped" have none.
+        The named causes, the most important first, then the properties of the noise. "nothing" and
+        "noise" have properties of the noise only, and "unknown" and "stopped" have none.
     candidates : tuple of Candidate
         All screened effects, the best first.
     gain : HoldoutGain or None
@@ -71,6 +90,8 @@ class Diagnosis:
         named cause otherwise. None if there are none.
     shape : EffectShape or None
         Curve of a single named effect next to the free curve in its place; None if it has none.
+    noise_claim : NoiseClaim or None
+        Size and correlation time of the residual; None if there is a gross error.
     left_out : tuple of str
         Steps that a stopped diagnosis has left out; empty for a complete one.
     """
@@ -91,6 +112,7 @@ class Diagnosis:
     record_findings: tuple[RecordFinding, ...] = ()
     discovery: Discovery | None = None
     shape: EffectShape | None = None
+    noise_claim: NoiseClaim | None = None
     left_out: tuple[str, ...] = ()
 
     @property
@@ -105,7 +127,7 @@ class Diagnosis:
 
     @property
     def noise(self) -> tuple[Finding, ...]:
-        """The properties of the noise. They are no discrepancy: alone they leave the verdict "nothing"."""
+        """The properties of the noise. They are no discrepancy, as the verdicts "nothing" and "noise" say."""
         return tuple(each for each in self.effects if each.explained_fraction is None)
 
     @property

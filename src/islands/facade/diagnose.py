@@ -46,6 +46,7 @@ def diagnose(
     dt: float | None = None,
     validation: "RecordLike | None" = None,
     tolerance: Mapping[str, float] | None = None,
+    noise_level: float | None = None,
     columns: Mapping[str, Signal] | None = None,
     effects: Sequence[Effect] = EFFECTS,
     seed: int = 0,
@@ -73,6 +74,9 @@ def diagnose(
     tolerance : mapping, optional
         Relative standard deviations of parameters about their nominal values. Other parameters are
         calibrated without a prior.
+    noise_level : float, optional
+        Standard deviation of the noise of the output, in its unit, as the data sheet of the sensor states it
+        or a resting output shows it. A residual of more than twice this is no noise.
     columns : mapping, optional
         Outputs of external simulations by name, each of shape (samples,), for ``column:NAME``; those of the
         validation data follow those of the record. By default, ``NAME`` is a column of the data frame.
@@ -100,8 +104,8 @@ def diagnose(
     RecordError
         The record cannot be used, or the simulation diverges on it.
     SettingsError, ModelError
-        There is no such simulation, a tolerance belongs to no parameter, two effects have the same name, or
-        an effect is invalid.
+        There is no such simulation, a tolerance belongs to no parameter, the noise level is not positive, two
+        effects have the same name, or an effect is invalid.
     """
     recorded = () if isinstance(record, Dataset) else _find_recorded(simulation, columns or {})
     options = take_reading(reading).changes()
@@ -122,7 +126,9 @@ def diagnose(
     simulator = _as_simulator(simulation, record, columns)
     # The matrices are small: several threads take twice the CPU time.
     with threadpool_limits(1, user_api="blas"):
-        found = diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
+        found = diagnose_simulator(
+            *(record, simulator, tolerance, seed, progress, parallel_map, effects), noise_level=noise_level
+        )
     return DiagnosisResult.from_diagnosis(found)
 
 

@@ -34,6 +34,7 @@ from islands.diagnosis.detectability import SelfTest, self_test
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import InterimFindings
+from islands.diagnosis.noise_claim import validate_noise_level
 from islands.diagnosis.planning.experiment_plan import plan_experiment
 from islands.diagnosis.procedure import LEAST_FRACTION
 from islands.diagnosis.procedure import diagnose as run_diagnosis
@@ -83,6 +84,7 @@ def diagnose(
     ] = None,
     channels: simulation_options.Channels = None,
     tolerance: simulation_options.Tolerances = None,
+    noise_level: simulation_options.NoiseLevel = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
@@ -101,8 +103,7 @@ def diagnose(
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
     if planning.plan:
-        if validation:
-            raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
+        _check_unused_by_plan(validation, noise_level)
         check_folder(out, force, PLAN)
         columns_of_input = [simulation_options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
@@ -113,6 +114,7 @@ def diagnose(
     planning.check_unused()
     if not records or output_column is None:
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
+    validate_noise_level(noise_level)
     check_folder(out, force, DIAGNOSIS_FILE)
     # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
     with progress("diagnose") as show:
@@ -132,7 +134,7 @@ def diagnose(
         tolerances = simulation_options.tolerances(tolerance or [])
         began = perf_counter()
         report = report_part(show, 0.0, BEFORE_FORMULA)
-        run = partial(run_diagnosis, data, simulator, tolerances, seed, report)
+        run = partial(run_diagnosis, data, simulator, tolerances, seed, report, noise_level=noise_level)
         diagnosis, fits, before = _diagnose_until_stopped(run, out, seed, workers)
         with stop_requests(before) as stop:
             steps = Steps(show, stop)
@@ -154,6 +156,14 @@ def diagnose(
         output.print("\n".join(wrap(paragraph, "    ")), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
     stop.end(out, (*diagnosis.left_out, *steps.left_out), explain_continuation(out))
+
+
+def _check_unused_by_plan(validation: Path | None, noise_level: float | None) -> None:
+    """Refuse options of a diagnosis that a plan does not have."""
+    if validation:
+        raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
+    if noise_level is not None:
+        raise SettingsError("--noise-level is for a diagnosis: a plan has --noise-std")
 
 
 def _plan(

@@ -1,13 +1,13 @@
 """Target of a calibration: the measured output, its weighting and the prior of the parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.segments import find_bounds
-from islands.effects.interface.effect import Signal
+from islands.data.segments import find_bounds, map_segments
+from islands.effects.interface.effect import Signal, SimulationContext
 from islands.estimation.noise_model import NoiseModel
 
 
@@ -31,6 +31,8 @@ class Target:
         white or coloured.
     segments : tuple of int
         Lengths in samples of the recordings, cut at the gaps of the output; empty for a single recording.
+    has_feedback : bool
+        Whether the input contains the noise that the output has in the same sample.
     fitted : int
         Number of samples before the hold-out part, missing ones included.
     """
@@ -41,6 +43,7 @@ class Target:
     prior_std: Mapping[str, float]
     effective_samples: float | None = None
     segments: tuple[int, ...] = ()
+    has_feedback: bool = False
     fitted: int = field(kw_only=True)
 
     @property
@@ -67,6 +70,20 @@ class Target:
         whitened = signal if self.noise is None else self.noise.whiten(signal, self.segments)
         return whitened[self.estimation_part]
 
+    def read_before_noise(self, context: SimulationContext) -> SimulationContext:
+        """Return a context in which each sample of the input is independent of the noise of its sample.
+
+        With feedback, the input is that of the sample before. A residual depends on the other by itself.
+        """
+        if not self.has_feedback:
+            return context
+        return replace(context, u=map_segments(_delay, context.u, context.segments))
+
     def residual(self, simulated: Signal) -> Signal:
         """Return the whitened residual over the estimation part."""
         return self.select(self.y - simulated)
+
+
+def _delay(u: Signal) -> Signal:
+    """Return a signal one sample late."""
+    return np.concatenate([u[:1], u[:-1]])

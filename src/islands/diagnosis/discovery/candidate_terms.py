@@ -227,6 +227,11 @@ def vary_gate(term: CandidateTerm, halvings: int) -> list[CandidateTerm]:
     return [replace(term, scale=instant, gate=each) for instant in moved for each in gates]
 
 
+def acts_on_output(term: CandidateTerm, name: str) -> bool:
+    """Return whether a term adds a function of a signal, or of its rate, to the output."""
+    return term.target == OUTPUT and name in find_symbols(parse_expression(term.text.format(scale=1.0)))
+
+
 def find_free_numbers(used: Set[str], count: int) -> list[int]:
     """Return the smallest numbers of terms whose parameters have names that are not used."""
     free = (number for number in itertools.count(1) if not {f"a{number}", f"s{number}"} & used)

@@ -24,6 +24,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.candidate_terms import (
     STARTING_SCALES,
     CandidateTerm,
+    acts_on_output,
     find_free_numbers,
     list_candidate_terms,
     list_gated_terms,
@@ -188,6 +189,8 @@ def search_terms(
     units |= {system.input: context.input_unit, OUTPUT: context.output_unit}
     units |= dict.fromkeys(system.simulated, context.output_unit)
     candidates = list_candidate_terms(system, sizes, context.duration, units)
+    if target.has_feedback:
+        candidates = tuple(each for each in candidates if not acts_on_output(each, system.input))
     target_sizes = {
         OUTPUT: context.output_peak,
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},

@@ -60,6 +60,7 @@ def diagnosis_document(
         "noise_floor_is": "measured by repeated periods"
         if diagnosis.is_noise_floor_measured
         else "an upper bound",
+        "noise_claim": None if diagnosis.noise_claim is None else asdict(diagnosis.noise_claim),
         "calibrated": _get_calibrated_values(diagnosis),
         "equations": diagnosis.best.simulation.simulator.equations,
         **_describe_self_test(tested),

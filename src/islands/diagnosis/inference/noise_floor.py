@@ -255,13 +255,13 @@ def contrast_periods(u: Signal, y: Signal) -> Signal | None:
     ndarray, shape (periods - 1, samples of a period)
         The periods are those after the first one.
     """
-    periods = _split_periods(u, y)
+    periods = split_periods(u, y)
     return None if periods is None else np.array(scipy.linalg.helmert(len(periods)) @ periods)
 
 
 def _subtract_periods(u: Signal, y: Signal) -> Signal | None:
     """Return the differences of successive periods of the output, or None if there are fewer than three."""
-    periods = _split_periods(u, y)
+    periods = split_periods(u, y)
     if periods is None:
         return None
     differences = np.diff(periods, axis=0)
@@ -272,7 +272,7 @@ def _subtract_periods(u: Signal, y: Signal) -> Signal | None:
     return np.array(differences - differences.mean(axis=1, keepdims=True))
 
 
-def _split_periods(u: Signal, y: Signal) -> Signal | None:
+def split_periods(u: Signal, y: Signal) -> Signal | None:
     """Return the periods of an output after the first one, or None if there are fewer than three."""
     period = detect_period(u)
     if period is None or y.size < 3 * period:

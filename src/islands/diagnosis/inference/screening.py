@@ -11,6 +11,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.starts_calibrator import calibrate_best
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.gross_errors.closed_loop import acts_at_once
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.effect import Effect, Signal, invalid_effect_error
@@ -36,6 +37,10 @@ MIN_CALIBRATED_EFFECTS = 5
 #: Fraction of the best promised gain below which a further effect is not calibrated. If the noise is small,
 #: every effect promises more than its penalty.
 MIN_PROMISE = 0.05
+
+#: Largest response at the sample of a pulse, relative to the largest one, of an effect on a record with
+#: feedback within a sample. A delay of less than a sample interpolates, and reads the sample that follows.
+MAX_LATE_RESPONSE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +94,8 @@ def screen_effects(base: CalibrationResult, target: Target, run: DiagnosisRun) -
     penalties = [bic_penalty(effect, base) for _, effect, _ in candidates]
     fits = calibrate_best(tasks, penalties, target, run.parallel_map)
     screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
+    if target.has_feedback:  # The input of the same sample contains the noise.
+        screened = [each for each in screened if not acts_at_once(each.fit, MAX_LATE_RESPONSE)]
     return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
 
 

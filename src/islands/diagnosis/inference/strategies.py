@@ -197,7 +197,7 @@ class ResidualAnalysis:
 
 def analyse_residual(fit: CalibrationResult, target: Target, rng: np.random.Generator) -> ResidualAnalysis:
     """Estimate the noise floor, and decide whether the residual of a fit has structure."""
-    fitted, context = target.fitted, fit.simulation.context
+    fitted, context = target.fitted, target.read_before_noise(fit.simulation.context)
     output = fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)

@@ -38,6 +38,7 @@ class Verdict(StrEnum):
     """Verdict of a diagnosis."""
 
     NOTHING = "nothing"
+    NOISE = "noise"
     NAMED = "named"
     REMAINDER = "named with remainder"
     UNKNOWN = "unknown"

@@ -176,7 +176,7 @@ class DiagnosisFacts:
     @property
     def has_large_noise(self) -> bool:
         """Whether an error that counts as noise is a large part of the output."""
-        if self.verdict not in ("nothing", "named", "family", "discovered") or self.is_far:
+        if self.verdict not in ("nothing", "noise", "named", "family", "discovered") or self.is_far:
             return False
         return (self.relative_error or 0.0) > (_LARGE_COLOURED_NOISE if self.is_coloured else _LARGE_NOISE)
 
@@ -184,6 +184,12 @@ class DiagnosisFacts:
     def is_measured(self) -> bool:
         """Whether the noise floor is measured from repeated periods."""
         return bool(self.document["noise_floor_is"] != "an upper bound")
+
+    @property
+    def noise_claim(self) -> Document | None:
+        """Size and correlation time of the residual; None in documents of earlier versions."""
+        found: Document | None = self.document.get("noise_claim")
+        return found
 
     @property
     def is_gross(self) -> bool:
@@ -266,6 +272,25 @@ def _describe_extent(facts: DiagnosisFacts, whole: str = "the discrepancy") -> s
     if not is_rest and (share is None or share >= _WHOLE or facts.is_noise):
         return whole
     return f"most of {whole}" if share is None or share >= _MOST else f"a part of {whole}"
+
+
+def _describe_agreement(facts: DiagnosisFacts) -> str:
+    level = facts.noise_claim["noise_level"] if facts.noise_claim else None
+    noise = f"{'coloured' if facts.is_coloured else 'the'} noise"
+    if level is not None:
+        noise = f"the stated noise of {facts.write_error(level)}"
+    return f"No significant discrepancy: the simulation agrees with the record within {noise}."
+
+
+def _describe_noise_claim(facts: DiagnosisFacts) -> str:
+    assert facts.noise_claim is not None
+    # A user judges the size of noise, not its third digit.
+    rms, seconds = (float(f"{facts.noise_claim[name]:.2g}") for name in ("rms", "correlation_time"))
+    return (
+        "No cause is found, and the residual is not white: the simulation is correct if noise of "
+        f"{facts.write_error(rms)} with a correlation time of {write_amount(seconds, 's')} is plausible for "
+        "your sensor."
+    )
 
 
 def _describe_named(facts: DiagnosisFacts) -> str:
@@ -542,14 +567,16 @@ VERDICTS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "nothing",
         lambda facts: facts.verdict == "nothing" and not facts.is_far,
-        lambda facts: (
-            "No significant discrepancy: the simulation agrees with the record within "
-            f"{'coloured' if facts.is_coloured else 'the'} noise."
-        ),
+        _describe_agreement,
+    ),
+    Statement(
+        "noise",
+        lambda facts: facts.verdict == "noise" and not facts.is_far,
+        _describe_noise_claim,
     ),
     Statement(
         "nothing-in-estimation-data",
-        lambda facts: facts.verdict == "nothing" and facts.is_far,
+        lambda facts: _has("nothing", "noise")(facts) and facts.is_far,
         lambda facts: (
             "No significant discrepancy in the samples used for estimation, but the error of "
             f"{facts.held_out_part} is far above the noise floor."

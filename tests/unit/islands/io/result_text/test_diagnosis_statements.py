@@ -26,9 +26,26 @@ def text(verdict, **changes):
 @pytest.mark.parametrize("verdict", Verdict)
 @pytest.mark.parametrize(("confidence", "error"), list(product((0.3, 0.9), (0.01, 0.4))))
 def test_one_statement_gives_the_verdict(verdict, confidence, error):
-    causes = [{**CAUSE, "confidence": confidence}] if verdict not in ("nothing", "unknown", "stopped") else []
+    causes = (
+        [{**CAUSE, "confidence": confidence}]
+        if verdict not in ("nothing", "noise", "unknown", "stopped")
+        else []
+    )
     document = make_document(str(verdict), effects=causes, calibrated_rmse=error)
     assert len(find_statements(VERDICTS, DiagnosisFacts(document))) == 1
+
+
+def test_noise_for_which_nothing_decides_is_left_to_the_user():
+    said = describe_verdict(make_document("noise"))
+    assert said == (
+        "No cause is found, and the residual is not white: the simulation is correct if noise of 0.012 um "
+        "with a correlation time of 0.32 s is plausible for your sensor."
+    )
+    claim = {"rms": 0.0123, "correlation_time": 0.318, "noise_level": 0.01}
+    assert "within the stated noise of 0.01 um" in describe_verdict(
+        make_document("nothing", noise_claim=claim)
+    )
+    assert "within the noise." in describe_verdict(make_document("nothing", noise_claim=None))
 
 
 @pytest.mark.parametrize(

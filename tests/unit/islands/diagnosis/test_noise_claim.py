@@ -1,0 +1,98 @@
+"""Claims that a residual is noise: a stated noise level, and what is said without one."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import islands
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.noise_claim import validate_noise_level
+from islands.errors import SettingsError
+from support.noise_records import (
+    SENSOR,
+    make_day_wave,
+    make_noisy_record,
+    make_quantised_actuator,
+    make_swept_force,
+    respond,
+)
+
+
+@pytest.mark.parametrize("level", [0.0, -1.0, np.inf, np.nan])
+def test_noise_level_is_positive_and_finite(level: float) -> None:
+    with pytest.raises(SettingsError, match="noise level is the standard deviation"):
+        validate_noise_level(level)
+
+
+def test_white_residual_is_nothing_unless_it_is_far_above_the_stated_noise() -> None:
+    record = make_noisy_record("white", 0)
+    found = islands.diagnose(record, "linear:2", effects=())
+    assert found.verdict == Verdict.NOTHING
+    assert found.noise_claim is not None
+    assert found.noise_claim.correlation_time == 0.0
+    rms = found.noise_claim.rms
+    near = islands.diagnose(record, "linear:2", effects=(), noise_level=rms / 1.5)
+    assert near.verdict == Verdict.NOTHING
+    assert near.summary.startswith(
+        "No significant discrepancy: the simulation agrees with the record within the"
+    )
+    assert "stated noise of" in near.summary
+    far = islands.diagnose(record, "linear:2", effects=(), noise_level=rms / 2.5)
+    assert far.verdict == Verdict.UNKNOWN
+    (finding,) = far.record_findings
+    assert finding.name == "above-noise-level"
+    assert "2.5 times the stated noise" in finding.description
+    assert "Half of its energy is below" in finding.description
+
+
+def test_rounding_is_nothing() -> None:
+    record = make_noisy_record("white", 0)
+    exact = replace(record, y=respond(record.u[:, 0]))
+    assert islands.diagnose(exact, "linear:2", effects=()).verdict == Verdict.NOTHING
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("noise", ["slow", "in band", "pink", "steps"])
+def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
+    found = islands.diagnose(make_noisy_record(noise, 7), "linear:2")
+    assert found.verdict == Verdict.NOISE
+    assert not found.causes
+    claim = found.noise_claim
+    assert claim is not None
+    words = (
+        f"noise of {claim.rms:.2g} V with a correlation time of {claim.correlation_time:.2g} s is plausible"
+    )
+    assert words in found.summary
+    assert json.loads(json.dumps(found.document))["noise_claim"]["rms"] == claim.rms
+    stated = islands.diagnose(make_noisy_record(noise, 7), "linear:2", noise_level=claim.rms)
+    assert stated.verdict == Verdict.NOTHING
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", range(3))
+def test_quantised_actuator_is_no_noise(seed: int) -> None:
+    found = islands.diagnose(make_quantised_actuator(seed), "linear:2")
+    assert found.verdict == Verdict.UNKNOWN
+    assert "fine map of the input" in found.residual_structure
+    assert "fine map of the input" in found.summary
+    stated = islands.diagnose(make_quantised_actuator(seed), "linear:2", noise_level=SENSOR)
+    assert stated.verdict == Verdict.UNKNOWN
+    assert "above-noise-level" in [each.name for each in stated.record_findings]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", range(3))
+def test_swept_force_is_unknown(seed: int) -> None:
+    found = islands.diagnose(make_swept_force(seed), "linear:2")
+    assert found.verdict == Verdict.UNKNOWN
+    assert "moving frequency" in found.residual_structure
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", range(3))
+def test_day_wave_is_never_within_the_noise(seed: int) -> None:
+    assert islands.diagnose(make_day_wave(seed), "linear:1").verdict not in (Verdict.NOTHING, Verdict.NAMED)
+    stated = islands.diagnose(make_day_wave(seed), "linear:1", noise_level=0.1)
+    assert stated.verdict not in (Verdict.NOTHING, Verdict.NOISE, Verdict.NAMED)
