@@ -74,6 +74,18 @@ def test_values_and_tolerances_of_a_built_in_simulation_are_those_of_the_job(
     assert spec == {name: value for name, value in request.items() if name != "name"}
 
 
+def test_the_noise_of_the_sensor_is_that_of_the_job(
+    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str
+) -> None:
+    page = open_form(quiet(desk.url), dataset)
+    page.get_by_text("Rows and noise").click()
+    page.get_by_label("Noise of the sensor").fill("0.02")
+    details = page.locator("details.card")
+    details.get_by_text("The same as a command").click()
+    assert "--noise-level 0.02" in (details.locator("pre").first.text_content() or "")
+    assert submit(page, desk)["noise_level"] == 0.02
+
+
 def test_a_wrong_equation_is_explained_and_the_corrected_one_started(
     screens: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:

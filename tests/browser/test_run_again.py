@@ -51,6 +51,7 @@ REQUESTS: Mapping[str, dict[str, Any]] = {
     "second-order": {
         "simulation": {"kind": "second-order", "parameters": {"m": 2.5}},
         "tolerance": {"m": 0.07},
+        "noise_level": 0.02,
         "seed": 3,
         "dt": 0.01,
     },

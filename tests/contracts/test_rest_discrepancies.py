@@ -189,6 +189,11 @@ REFUSED = {
         "invalid-request",
         "/tolerance/dp: Input should be less than 1",
     ),
+    "noise level": (
+        {"noise_level": 0.0},
+        "invalid-request",
+        "/noise_level: Input should be greater than 0",
+    ),
     "long text": (make_model_simulation(equation="y" * 60_000), "invalid-settings", "and 50000 is the most"),
     "long name": (
         {"simulation": {"kind": "bouc-wen-piezo", "parameters": {"d" * 60_000: 1.0}}},

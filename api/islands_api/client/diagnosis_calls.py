@@ -30,6 +30,7 @@ def diagnose(
     *,
     channels: str | Sequence[str] = (),
     tolerance: Mapping[str, float] | None = None,
+    noise_level: float | None = None,
     seed: int = 0,
     dt: float | None = None,
     rows: str | None = None,
@@ -53,6 +54,8 @@ def diagnose(
         Columns that may couple in, for example a temperature.
     tolerance : mapping, optional
         Relative standard deviations of the simulation's parameters, by name.
+    noise_level : float, optional
+        Standard deviation of the noise of the output, in its unit. A residual far above it is no noise.
     dt : float, optional
         Sampling time in seconds, if the record has no time column.
     rows : str, optional
@@ -74,6 +77,7 @@ def diagnose(
     """
     given = {
         **_describe_simulated(dataset, input, output, channels, simulation, tolerance),
+        "noise_level": noise_level,
         "seed": seed,
         "dt": dt,
         "rows": rows,

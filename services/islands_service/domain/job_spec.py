@@ -231,6 +231,12 @@ class Discrepancy(SimulatedRecord):
         default=None,
         description="A recording that is held out as a whole, instead of the last quarter of the record.",
     )
+    noise_level: Annotated[FiniteFloat, Field(gt=0.0)] | None = Field(
+        default=None,
+        description="Standard deviation of the noise of the output, in its unit. A residual far above it is "
+        "no noise.",
+        examples=[0.02],
+    )
     seed: Seed = 0
 
     @property

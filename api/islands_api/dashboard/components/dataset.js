@@ -164,9 +164,10 @@ export function formatSimulation({ kind, name, column, ...options }) {
 }
 
 /** List the settings that only a discrepancy job has. */
-const listDiagnosisFacts = ({ simulation, channels = [], tolerance = {} }) => [
+const listDiagnosisFacts = ({ simulation, channels = [], tolerance = {}, noise_level: noise }) => [
   ["Simulation", formatSimulation(simulation)],
   ["Channels", channels.join(", ")],
+  ["Noise of the sensor", noise === undefined || noise === null ? "" : formatShort(noise)],
   ...Object.entries(tolerance).map(([name, value]) => [
     `Tolerance of ${name}`,
     `${formatShort(100 * value)} %`,

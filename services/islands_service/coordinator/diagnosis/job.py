@@ -93,6 +93,7 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         diagnosed = diagnose(
             *(record, simulator, spec.tolerance, spec.seed, report_part(report, 0.0, BEFORE_FORMULA), fits),
             interim=interim,
+            noise_level=spec.noise_level,
         )
         report(FORMULA, BEFORE_FORMULA)
         start = state.begin_search(diagnosed)

@@ -192,6 +192,7 @@ def test_discrepancy_job_contains_all_submitted_values(client: Any, me: Any) -> 
         "y_um",
         simulation,
         tolerance={"dp": 0.01},
+        noise_level=0.02,
         seed=7,
         rows=None,
         name="piezo",
@@ -200,7 +201,8 @@ def test_discrepancy_job_contains_all_submitted_values(client: Any, me: Any) -> 
     )
     assert (job.kind, job.state, job.name, job.priority) == ("discrepancy", "queued", "piezo", 3)
     wanted = {"dataset": me.dataset, "input": "u_V", "output": "y_um", "seed": 7}
-    assert job.spec == {**wanted, "simulation": simulation, "tolerance": {"dp": 0.01}}
+    given = {"simulation": simulation, "tolerance": {"dp": 0.01}, "noise_level": 0.02}
+    assert job.spec == {**wanted, **given}
     assert client.job(job).spec == job.spec
     again = client.diagnose(me.dataset, "u_V", "y_um", "bouc-wen-piezo")
     assert again.spec["simulation"] == {"kind": "bouc-wen-piezo", "parameters": {}}

@@ -9,7 +9,7 @@ import { makeSimulationPreview } from "./simulation_preview.js";
 const ABSENT = "Choose the input of the simulation and the measured output in the table of columns.";
 
 /** Return the form of a request for other programs. */
-function describe({ input, output, channels = [], rows, tolerance = {} }, simulated) {
+function describe({ input, output, channels = [], rows, noise_level, tolerance = {} }, simulated) {
   const { simulation, argument, before } = simulated;
   // No file has the simulation of an earlier job.
   if (argument === null) return { call: "diagnose", command: "diagnose" };
@@ -18,6 +18,7 @@ function describe({ input, output, channels = [], rows, tolerance = {} }, simula
     ...channels.flatMap((each) => ["--channel", quote(each)]),
     ...["--simulation", quote([simulation.kind, argument].filter(Boolean).join(":"))],
     ...Object.entries(tolerance).flatMap(([name, value]) => ["--tolerance", quote(`${name}=${value}`)]),
+    ...(noise_level ? ["--noise-level", `${noise_level}`] : []),
     ...(rows ? ["--rows", rows] : []),
   ];
   return { call: "diagnose", command: "diagnose", options, before };
@@ -38,6 +39,16 @@ function makeRowsField(samples, initial, getVisibleRows, onChange) {
     nodes: [...makeField("diagnose", "Rows", rows, hint), el("span"), take, el("span")],
     get: () => rows.value,
   };
+}
+
+/** Make the field of the noise of the sensor. */
+function makeNoiseField(initial) {
+  const options = { type: "number", min: 0, step: "any", placeholder: "unknown" };
+  const level = el("input", { name: "noise_level", ...options });
+  level.value = initial ?? "";
+  const hint = "Standard deviation in the unit of the output, if you know it: a far larger residual is no noise.";
+  const nodes = makeField("diagnose", "Noise of the sensor", level, hint);
+  return { nodes, get: () => Number(level.value) };
 }
 
 /** Return the fields of a request that the form keeps as they are, and their description in words. */
@@ -70,6 +81,7 @@ export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows
     makeField("diagnose", "Driven by", driver, "The other inputs are channels, such as a temperature."),
   );
   const rows = makeRowsField(preview.samples, initial.rows, getVisibleRows, update);
+  const noise = makeNoiseField(initial.noise_level);
   const [kept, keptWords] = keepFields(initial);
   const host = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   const isAgain = Boolean(initial.simulation);
@@ -90,6 +102,7 @@ export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows
       ...(Object.keys(tolerance).length && { tolerance }),
       name: initial.name ?? name,
       ...(rows.get() && { rows: rows.get() }),
+      ...(noise.get() > 0 && { noise_level: noise.get() }),
       ...kept,
     };
   }
@@ -146,9 +159,9 @@ export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows
       keptWords,
       el(
         "details",
-        { open: Boolean(initial.rows) },
-        el("summary", {}, "Rows"),
-        el("div", { class: "fields" }, rows.nodes),
+        { open: Boolean(initial.rows || initial.noise_level) },
+        el("summary", {}, "Rows and noise"),
+        el("div", { class: "fields" }, rows.nodes, noise.nodes),
       ),
       row,
       calibrated.node,
