@@ -80,7 +80,9 @@ def extend_equations(
         return found
     residual, output = (record.y - fit.output)[:fitted], fit.output[:fitted]
     context = fit.simulation.context
-    structure = find_residual_structure(residual, output, target.read_before_noise(context), run.rng)
+    is_matched = target.is_matched(fit.output)
+    seen = target.read_before_noise(context)
+    structure = {} if is_matched else find_residual_structure(residual, output, seen, run.rng)
     if structure:  # The rest is no noise: only its innovations are.
         floor = min(floor, float(np.sqrt(fit.noise.variance)))
     explained = explained_fraction(found.base, fit, floor**2)

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.segments import count_runs
+from islands.diagnosis.calibration.resolution import is_unresolved, measure_resolution
 from islands.diagnosis.gross_errors.explanation import GrossError
 from islands.diagnosis.gross_errors.record_finding import FAMILY, RecordFinding
 from islands.diagnosis.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.diagnosis.inference.finding import Finding, Value
-from islands.diagnosis.inference.noise_detectors import DETECTORS
+from islands.diagnosis.inference.noise_detectors import DETECTORS, QUANTISATION
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.estimation.noise_model import is_rounding_error
@@ -58,7 +59,9 @@ def describe_noise(y: Signal, residual: Signal, context: SimulationContext) -> t
     findings: list[Finding] = []
     if is_rounding_error(residual, y):
         return ()
-    for detector in DETECTORS.values():
+    # Rounding errors are no noise, and have none of its other properties.
+    is_rounding = is_unresolved(residual, measure_resolution(y))
+    for detector in [QUANTISATION] if is_rounding else DETECTORS.values():
         if any(each.name in detector.excluded_by for each in findings):
             continue
         detection = detector.detect(y, residual, context)

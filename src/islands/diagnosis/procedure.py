@@ -52,7 +52,6 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect
 from islands.errors import RecordError
-from islands.estimation.noise_model import is_rounding_error
 from islands.parallel import ParallelMap
 from islands.progress import Phase, PhasedProgress, ProgressCallback, ignore_progress
 from islands.simulators.context import make_context
@@ -162,9 +161,6 @@ def diagnose(
     if gross_errors := find_gross_errors(record, simulator, base, target):
         found = make_gross_diagnosis(record, base, gross_errors, target)
         return interim.complete(replace(found, record_findings=(*found.record_findings, *record_findings)))
-    if is_rounding_error(record.y - base.output, record.y):
-        found = make_diagnosis(record, make_exact_outcome(base, target), base, None, run)
-        return interim.complete(replace(found, record_findings=tuple(record_findings)))
     held = hold_direct_term(base, target)
     if held is not None:
         base, target, simulator = held, replace(target, has_feedback=True), held.simulation.simulator
@@ -191,6 +187,8 @@ def _find_causes(
 ) -> Diagnosis:
     """Search for effects, and compare them with free forms and missing terms."""
     base, outcome = _search(base, target, run, interim)
+    if target.is_matched(base.output):
+        return make_diagnosis(record, outcome, base, None, run)
     interim.reach(EVIDENCE)
     run.progress("analysing the residual")
     outcome = interim.keep_outcome(base, assess_evidence(outcome, run), run.effects, step=MODEL_ERROR)
@@ -243,6 +241,8 @@ def _search(
         current = get_discretisation(simulator)
         tried.add(current)
         base = calibrate(replace(simulation, simulator=simulator), target, base.values)
+        if target.is_matched(base.output):
+            return base, make_exact_outcome(base, target)
         run.progress(f"screening each of {len(run.effects)} effects")
         recorded = replace(run, parallel_map=interim.record_screening(base, run.parallel_map))
         screened = screen_effects(base, target, recorded)

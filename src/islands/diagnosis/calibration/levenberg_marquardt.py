@@ -210,6 +210,8 @@ def compare_output(
         if target.effective_samples is None
         else white_noise(mean_square, target.effective_samples)
     )
+    # The innovations of a sum contain those of its white part, here the rounding errors of the output.
+    noise = replace(noise, variance=max(noise.variance, target.resolution**2 / 12.0))
     return CalibrationResult(simulation, values, output, mean_square, noise, penalty)
 
 

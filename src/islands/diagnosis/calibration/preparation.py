@@ -8,6 +8,7 @@ from islands.data.dataset import Dataset
 from islands.data.magnitudes import check_magnitudes
 from islands.data.segments import is_resting, split_at_gaps
 from islands.data.split import MIN_RECORDING_SAMPLES, estimation_part
+from islands.diagnosis.calibration.resolution import measure_resolution
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, SimulationContext, Site
@@ -172,4 +173,7 @@ def make_target(record: Dataset, fitted: int, prior_std: Mapping[str, float]) ->
     is_known = ~np.isnan(record.y)
     is_fitted = is_known & (np.arange(record.samples) < fitted)
     segments = split_at_gaps(is_known, record.segments)
-    return Target(record.y, is_fitted, None, prior_std, segments=segments, fitted=fitted)
+    resolution = measure_resolution(record.y[:fitted])
+    return Target(
+        *(record.y, is_fitted, None, prior_std), segments=segments, fitted=fitted, resolution=resolution
+    )

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.segments import find_bounds, map_segments
+from islands.diagnosis.calibration.resolution import is_unresolved
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.estimation.noise_model import NoiseModel
 
@@ -35,6 +36,8 @@ class Target:
         Whether the input contains the noise that the output has in the same sample.
     fitted : int
         Number of samples before the hold-out part, missing ones included.
+    resolution : float
+        Resolution of the output; 0 for none.
     """
 
     y: Signal
@@ -45,6 +48,7 @@ class Target:
     segments: tuple[int, ...] = ()
     has_feedback: bool = False
     fitted: int = field(kw_only=True)
+    resolution: float = 0.0
 
     @property
     def fitted_segments(self) -> tuple[int, ...]:
@@ -82,6 +86,10 @@ class Target:
     def residual(self, simulated: Signal) -> Signal:
         """Return the whitened residual over the estimation part."""
         return self.select(self.y - simulated)
+
+    def is_matched(self, simulated: Signal) -> bool:
+        """Return whether a signal is the output of the estimation part, as far as its resolution shows."""
+        return is_unresolved((self.y - simulated)[self.estimation_part], self.resolution)
 
 
 def _delay(u: Signal) -> Signal:

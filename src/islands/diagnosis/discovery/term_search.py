@@ -16,6 +16,7 @@ from islands.diagnosis.calibration.intersample_selection import get_discretisati
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
+    estimate_covariance,
     evaluate_fit,
     whiten_target,
 )
@@ -40,6 +41,7 @@ from islands.diagnosis.discovery.equation_simulator import (
 )
 from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_ranking import RankedTerm, rank_terms
+from islands.diagnosis.inference.resolved_effects import may_be_zero
 from islands.diagnosis.inference.screening import bic_penalty
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.run import DiagnosisRun
@@ -196,7 +198,7 @@ def search_terms(
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
     }
     found, unweighted = start or TermSearchResult(base, base, ()), target
-    while len(found.terms) < max_terms:
+    while len(found.terms) < max_terms and not target.is_matched(found.fit.output):
         target = whiten_target(target, found.fit)
         found = _improve(found, calibrate(found.fit.simulation, target, found.fit.values))
         best = _find_best_term(found, target, unweighted, candidates, target_sizes, run)
@@ -204,9 +206,12 @@ def search_terms(
             break
         before = found.cost
         best = _select_discretisation(best, target)
-        found = _eliminate_terms(best, system, target, target_sizes, run)
-        found = _improve(found, _calibrate_smoothed(found.fit, target, equations.sizes))
-        found = _move_instants(found, target)
+        best = _eliminate_terms(best, system, target, target_sizes, run)
+        best = _improve(best, _calibrate_smoothed(best.fit, target, equations.sizes))
+        best = _move_instants(best, target)
+        if _may_lack_a_term(best, target):
+            break
+        found = best
         missing = max_terms - len(found.terms)
         if found.cost - missing * MAX_GAIN_RATIO * (before - found.cost) > least:
             break
@@ -303,6 +308,14 @@ def _eliminate_terms(
             break
         found = best
     return found
+
+
+def _may_lack_a_term(found: TermSearchResult, target: Target) -> bool:
+    """Return whether the confidence interval of the coefficient of a term contains zero."""
+    names = [parameter.name for parameter in found.fit.simulation.parameters]
+    covariance = estimate_covariance(found.fit, target)
+    places = [[names.index(each.parameters[0])] for each in found.terms]
+    return any(may_be_zero(found.fit.values[place], covariance[np.ix_(place, place)]) for place in places)
 
 
 def _find_best_term(

@@ -26,6 +26,7 @@ from islands.diagnosis.inference.noise_floor import (
     noise_variance_from_periods,
 )
 from islands.diagnosis.inference.residual_structure import find_residual_structure
+from islands.diagnosis.inference.resolved_effects import remove_unresolved
 from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects
 from islands.diagnosis.inference.stepwise_search import MAX_EFFECTS, MIN_GAIN, stepwise_search
 from islands.diagnosis.inference.verdict import (
@@ -148,9 +149,9 @@ def search_with_model_error(base: CalibrationResult, target: Target, run: Diagno
 
 
 def make_exact_outcome(base: CalibrationResult, target: Target) -> SearchOutcome:
-    """Return the outcome for a residual that is rounding: there is nothing to be searched for."""
-    hypothesis = Hypothesis(base, base.score, ())
-    return replace(make_outcome(base, (), target, hypothesis), verdict=Verdict.NOTHING)
+    """Return the outcome for a residual below the resolution: there is nothing to be searched for."""
+    found = make_outcome(base, (), target, Hypothesis(base, base.score, ()))
+    return replace(found, noise_floor=base.mean_square, verdict=Verdict.NOTHING)
 
 
 def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
@@ -158,6 +159,7 @@ def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
     base, target, rng = outcome.base, outcome.target, run.rng
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, run.effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, rng)
+    hypothesis = remove_unresolved(hypothesis, target)
     rest = analyse_residual(hypothesis.fit, target, rng)
     if rest.is_structured or target.effective_samples is not None:
         confirmed = withdraw_effects(hypothesis, target, rng)
@@ -198,6 +200,8 @@ class ResidualAnalysis:
 def analyse_residual(fit: CalibrationResult, target: Target, rng: np.random.Generator) -> ResidualAnalysis:
     """Estimate the noise floor, and decide whether the residual of a fit has structure."""
     fitted, context = target.fitted, target.read_before_noise(fit.simulation.context)
+    if target.is_matched(fit.output):
+        return ResidualAnalysis(fit.mean_square, False, {}, False)
     output = fit.output[:fitted]
     residual = target.y[:fitted] - output
     explainable = explainable_variance(residual, context.u[:fitted], output, rng, context.segments)
