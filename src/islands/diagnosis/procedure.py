@@ -25,9 +25,13 @@ from islands.diagnosis.discovery.form_search import compare_with_free_forms
 from islands.diagnosis.discovery.missing_terms import explain_all, find_missing_terms, replaces_effects
 from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
-from islands.diagnosis.gross_errors.record_finding import describe_gaps
+from islands.diagnosis.gross_errors.record_finding import (
+    describe_extrapolation,
+    describe_gaps,
+)
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
 from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_late_effects
+from islands.diagnosis.inference.extension_trial import try_extension
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.inference.strategies import (
     WITH_MODEL_ERROR,
@@ -144,7 +148,7 @@ def diagnose(
     prior_std = validate_prior({**simulator.tolerances, **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted, simulator.read_channels)
-    record_findings += describe_gaps(record)
+    record_findings += (*describe_gaps(record), *describe_extrapolation(record, simulator))
     target = make_target(record, fitted, prior_std)
     try:
         context = make_context(record, simulator, fitted)
@@ -212,7 +216,9 @@ def _find_causes(
     found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
         found = extend_equations(found, terms, target, run)
-    return found
+    # An extension that diverges beyond its record is not offered.
+    trial = None if found.gain is None else try_extension(record, base, found.best, target)
+    return replace(found, trial=trial)
 
 
 def _start_run(seed: int, parallel_map: ParallelMap, progress: ProgressCallback) -> DiagnosisRun:

@@ -8,6 +8,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.discovery.missing_terms import Discovery
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.diagnosis.inference.extension_trial import ExtensionTrial
 from islands.diagnosis.inference.finding import Finding
 from islands.diagnosis.inference.holdout import HoldoutGain
 from islands.diagnosis.inference.verdict import Verdict
@@ -92,6 +93,8 @@ class Diagnosis:
         Curve of a single named effect next to the free curve in its place; None if it has none.
     noise_claim : NoiseClaim or None
         Size and correlation time of the residual; None if there is a gross error.
+    trial : ExtensionTrial or None
+        Trial of the extended simulation beyond the record; None if no effect was added to it.
     left_out : tuple of str
         Steps that a stopped diagnosis has left out; empty for a complete one.
     """
@@ -113,6 +116,7 @@ class Diagnosis:
     discovery: Discovery | None = None
     shape: EffectShape | None = None
     noise_claim: NoiseClaim | None = None
+    trial: ExtensionTrial | None = None
     left_out: tuple[str, ...] = ()
 
     @property
@@ -124,6 +128,11 @@ class Diagnosis:
     def claimed_names(self) -> tuple[str, ...]:
         """Names of the causes that are claimed; several missing terms have one."""
         return tuple(dict.fromkeys(each.name for each in self.causes if each.is_claimed))
+
+    @property
+    def refusal(self) -> str | None:
+        """Why the extended simulation is not offered, as a sentence; None if it is, or if there is none."""
+        return None if self.trial is None else self.trial.refusal
 
     @property
     def noise(self) -> tuple[Finding, ...]:

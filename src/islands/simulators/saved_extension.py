@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from islands.data.signal_ranges import RangeLike
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect
 from islands.simulators.extended import ExtendedSimulator
@@ -25,11 +26,14 @@ class SavedExtension(SimulatorWrapper):
     scales : SimulationContext
         Scales of the record in which the effects were found; some strengths are relative to its peaks or its
         duration.
+    tested : tuple of RangeLike
+        Ranges of the inputs and of the output in which the extension was tested; empty if they are not known.
     """
 
     added: tuple[Effect, ...]
     values: Signal
     scales: SimulationContext
+    tested: tuple[RangeLike, ...] = ()
 
     @property
     def name(self) -> str:

@@ -1,5 +1,6 @@
 """``islands simulate``: prediction of a record by whatever `islands.load` opens."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
 from islands.data.signal_map import map_signals, match_rate
 from islands.data.split import compare_input_ranges, measure_input_ranges
-from islands.errors import RecordError, SettingsError
+from islands.errors import ExtrapolationWarning, RecordError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
 from islands.facade.results.fitted_model import FittedModel
@@ -273,7 +274,11 @@ def _simulate_system(found: SavedSimulation, request: _Request) -> None:
     whole = request.read([*driving, *recorded], found.output_name, signals=recorded)
     data = whole.first_inputs(len(driving))
     compile_kernels()
-    y = found.simulate(data, dict.fromkeys(recorded, whole.u[:, -1])).y
+    with warnings.catch_warnings(record=True, category=ExtrapolationWarning) as caught:
+        warnings.simplefilter("always", ExtrapolationWarning)
+        y = found.simulate(data, dict.fromkeys(recorded, whole.u[:, -1])).y
+    for each in caught:
+        output.print(f"extrapolation: {each.message}", markup=False)
     _print_metrics(data, y, f"{request.mode}: with {', '.join(found.parts)}", request.out)
 
 

@@ -1,5 +1,6 @@
 """Simulation of a record by a specification, with initial states that are fitted to the measured output."""
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,10 +9,13 @@ from numpy.typing import NDArray
 
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
+from islands.data.signal_ranges import compare_ranges, measure_ranges
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import make_target
+from islands.errors import ExtrapolationWarning
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ExtendedSpec, LocalExtendedSpec, LocalSpec, SimulationSpec
 
@@ -29,6 +33,11 @@ def simulate_spec(
     -------
     ndarray, shape (samples,)
 
+    Warns
+    -----
+    ExtrapolationWarning
+        The record leaves the ranges in which the extended simulation was tested.
+
     Raises
     ------
     RecordError
@@ -38,7 +47,15 @@ def simulate_spec(
         spec = LocalExtendedSpec.model_validate(spec)
     if isinstance(spec, ExtendedSpec):
         record = match_record(ColumnReference(spec.inputs, spec.output), record, "the extended simulation")
+    tested = spec.tested if isinstance(spec, ExtendedSpec) else ()
     simulator = make_simulator(spec, record, columns)
+    y = _simulate(simulator, record)
+    for statement in compare_ranges(tested, measure_ranges(record, y)):
+        warnings.warn(statement, ExtrapolationWarning, stacklevel=2)
+    return y
+
+
+def _simulate(simulator: Simulator, record: Dataset) -> NDArray[np.float64]:
     alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
     is_state = np.array([parameter.initial for parameter in alone.parameters], dtype=bool)
     if not is_state.any():

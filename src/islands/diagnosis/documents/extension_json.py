@@ -1,11 +1,13 @@
 """Extended simulation of a diagnosis as JSON: ``extended.json``, which can be used as a simulation."""
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.data.signal_ranges import measure_ranges
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.effects import model_form
 from islands.effects.interface.effect import Effect, Site
@@ -43,9 +45,11 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
         if effect.site != Site.PARAMETER and effect.name != model_form.CORE_SHAPE
     ]
     signals = (record.input_names, record.output_name)
-    return make_extended_spec(
+    spec = make_extended_spec(
         simulation.simulator, values[: len(names)], found, simulation.context, *signals, shape
-    ).model_dump(mode="json", by_alias=True)
+    )
+    tested = [asdict(each) for each in measure_ranges(record, fit.output)]
+    return spec.model_dump(mode="json", by_alias=True) | {"tested": tested}
 
 
 def _get_own_slice(simulation: ExtendedSimulator, effect: Effect) -> slice:

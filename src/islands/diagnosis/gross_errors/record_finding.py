@@ -8,6 +8,9 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.segments import find_runs
+from islands.data.signal_ranges import compare_ranges, measure_ranges
+from islands.simulators.interface import Simulator
+from islands.simulators.saved_extension import SavedExtension
 
 #: Family of gross errors in the list of causes.
 FAMILY = "gross"
@@ -57,6 +60,22 @@ class RecordFinding:
             },
             "errors": None if self.errors is None else {"before": self.errors[0], "after": self.errors[1]},
         }
+
+
+def describe_extrapolation(record: Dataset, simulator: Simulator) -> tuple[RecordFinding, ...]:
+    """Return a finding if a record leaves the ranges in which an extended simulation was tested."""
+    if not isinstance(simulator, SavedExtension):
+        return ()
+    statements = compare_ranges(simulator.tested, measure_ranges(record, record.y)[:-1])
+    if not statements:
+        return ()
+    return (
+        RecordFinding(
+            "extrapolation",
+            f"{'; '.join(statements)}.",
+            "An error there may be that of the extension.",
+        ),
+    )
 
 
 def describe_gaps(record: Dataset) -> tuple[RecordFinding, ...]:

@@ -78,8 +78,10 @@ class DiagnosisResult(Diagnosis):
 
     @property
     def extended_document(self) -> str | None:
-        """Text of ``extended.json``, the extended simulation; None if no effect was added."""
-        return None if self.gain is None else extended_json(self.best, self.record)
+        """Text of ``extended.json``, the extended simulation; None if there is none, or it is refused."""
+        if self.gain is None or self.refusal:
+            return None
+        return extended_json(self.best, self.record)
 
     @property
     def next_input(self) -> str | None:
@@ -166,8 +168,11 @@ class DiagnosisResult(Diagnosis):
         Raises
         ------
         ModelError
-            The diagnosis added no effect to the simulation.
+            The diagnosis added no effect to the simulation, or the extended simulation may diverge.
         """
+        if self.refusal:
+            name = self.base.simulation.simulator.name
+            raise ModelError(f"{self.refusal} Simulate what was diagnosed, {name}")
         if self.gain is None:
             raise ModelError(
                 f"there is no extended simulation, because the verdict of the diagnosis is "

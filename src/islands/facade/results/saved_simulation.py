@@ -162,8 +162,10 @@ class SavedDiagnosis:
         Raises
         ------
         ModelError
-            The diagnosis added no effect to the simulation.
+            The diagnosis added no effect to the simulation, or the extended simulation may diverge.
         """
+        if self.extension is None and (refusal := (self.document.get("extension") or {}).get("refusal")):
+            raise ModelError(f"{refusal} Simulate what was diagnosed, {self.document.get('simulation')}")
         if self.extension is None:
             raise ModelError(
                 f"{self.folder} has no extended simulation, because the verdict of the diagnosis is "

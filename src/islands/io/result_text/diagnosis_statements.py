@@ -678,6 +678,11 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.gain is None and facts.error is not None and not facts.is_gross,
         _describe_error,
     ),
+    Statement(
+        "refusal",
+        lambda facts: (facts.document.get("extension") or {}).get("refusal"),
+        lambda facts: str(facts.document["extension"]["refusal"]),
+    ),
     Statement("noise-floor", lambda facts: not facts.is_gross, _describe_noise_floor),
     Statement("large-noise", lambda facts: facts.has_large_noise, _describe_large_noise),
     Statement(

@@ -57,6 +57,16 @@ class ScalesSpec(SpecModel):
     frame: FrameSpec
 
 
+class SignalRangeSpec(SpecModel):
+    """Range and largest rate per second of a signal, in which an extended simulation was tested."""
+
+    name: str
+    unit: str
+    low: FiniteFloat
+    high: FiniteFloat
+    rate: FiniteFloat
+
+
 class SimulatorSpec(SpecModel):
     """Base class of the specifications in the table of simulators."""
 

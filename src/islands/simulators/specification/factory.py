@@ -144,7 +144,7 @@ def _make_saved_extension(
             raise ModelError(f"effect {each.name} has no value for {', '.join(missing)}: diagnose again")
         added.append(effect)
         values += [each.parameters[name].value for name in names]
-    return SavedExtension(inner, tuple(added), np.array(values), scales)
+    return SavedExtension(inner, tuple(added), np.array(values), scales, document.tested)
 
 
 def make_built_in(spec: PhysicalSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:

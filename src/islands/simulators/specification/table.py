@@ -18,6 +18,7 @@ from islands.simulators.specification.base import (
     EffectSpec,
     ParameterRange,
     ScalesSpec,
+    SignalRangeSpec,
     SimulatorEntry,
     SimulatorSpec,
     SpecModel,
@@ -124,6 +125,7 @@ class ExtendedSpec(SpecModel):
     output_equation: OutputEquationSpec | None = None
     start: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=MAX_STATES)
     scales: ScalesSpec
+    tested: tuple[SignalRangeSpec, ...] = Field(default=(), max_length=32)
 
 
 class LocalExtendedSpec(ExtendedSpec):

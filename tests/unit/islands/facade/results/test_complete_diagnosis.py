@@ -66,6 +66,33 @@ def test_the_extended_simulation_is_that_of_the_folder(found, tmp_path):
     assert (tmp_path / "exported.json").read_bytes() == (folder / "extended.json").read_bytes()
 
 
+def test_a_record_outside_of_the_tested_ranges_is_stated(files, found, tmp_path):
+    ranges = found.document["extension"]["ranges"]
+    assert [each["name"] for each in ranges] == ["u_V", "y_um"]
+    folder, other = found.save(tmp_path / "saved"), made()
+    larger = replace(other, u=2.0 * other.u, y=2.0 * other.y)
+    for each in (found, islands.load(folder)):
+        with pytest.warns(islands.ExtrapolationWarning, match=r"^u_V is .* V in the record, and was"):
+            each.simulate(larger)
+    again = islands.diagnose(larger, f"model:{folder / 'extended.json'}")
+    assert [each.name for each in again.record_findings] == ["extrapolation"]
+    write_record(larger, tmp_path / "larger.csv")
+    printed = " ".join(succeed("simulate", folder, tmp_path / "larger.csv").split())
+    assert "extrapolation: u_V is " in printed
+    assert "extrapolation" not in succeed("simulate", folder, files / "r.csv")
+
+
+def test_an_extension_that_may_diverge_is_refused(found, tmp_path):
+    refused = replace(found, trial=replace(found.trial, refusal="It is not offered: it diverges."))
+    assert "It is not offered: it diverges." in refused.summary
+    folder = refused.save(tmp_path / "saved")
+    assert not (folder / "extended.json").exists()
+    assert refused.document["extended_model"] is None
+    for each in (refused, islands.load(folder)):
+        with pytest.raises(islands.ModelError, match=r"diverges\. Simulate what was diagnosed, linear"):
+            each.simulate(made())
+
+
 def test_a_notebook_shows_the_sentences_and_a_figure(found):
     html = found._repr_html_()
     assert "<p>The simulation lacks a known effect, which explains the discrepancy.</p>" in html

@@ -1,0 +1,105 @@
+"""Trial of an extended simulation over the intervals of its parameters, and with a larger input."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.inference.extension_trial import INPUT_FACTOR, ExtensionTrial, try_extension
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, Site
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import Simulator
+from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.recorded_output import RecordedOutput
+
+#: Input.
+SIGNAL = lfilter([0.3], [1.0, -0.7], np.random.default_rng(0).standard_normal(400))
+
+#: A gain that grows with the input without a limit: u exp(s |u| / peak).
+RUNAWAY = Effect(
+    name="runaway",
+    summary="a gain without a limit",
+    family="shape",
+    site=Site.INPUT,
+    parameters=lambda _: (Parameter("s", "", 0.0, 0.01),),
+    starting_points=lambda _context, _residual: ((0.1,),),
+    form=lambda u, values, _: u * np.exp(values[0] * np.abs(u) / np.abs(SIGNAL).max()),
+    source="none",
+)
+
+
+def copy_input(u: np.ndarray, dt: float) -> np.ndarray:
+    return u + 0.0 * dt
+
+
+def try_runaway(s: float, noise: float, simulator: Simulator | None = None) -> ExtensionTrial:
+    """Try an extension with an effect of known strength, which the noise of the record makes uncertain."""
+    rng, u = np.random.default_rng(1), SIGNAL
+    peak = float(np.abs(u).max())
+    y = u * np.exp(s * np.abs(u) / peak) + noise * rng.standard_normal(u.size)
+    record = Dataset(u, y, 0.1, ("u_V",), "y_um", ("V",), "um")
+    fitted = count_fitted_samples(record)
+    simulator = simulator or PythonFunctionSimulator(copy_input, "copy")
+    target = make_target(record, fitted, {})
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
+    base = calibrate(simulation, target, simulation.nominal)
+    best = evaluate_fit(simulation.with_effects([RUNAWAY]), target, np.array([s]))
+    return try_extension(record, base, best, target)
+
+
+def test_extension_within_its_record_is_offered_with_its_ranges() -> None:
+    trial = try_runaway(3.0, 1e-3)
+    assert (trial.refusal, trial.input_factor) == (None, INPUT_FACTOR)
+    u, y = trial.ranges
+    assert (u.name, u.unit, y.name, y.unit) == ("u_V", "V", "y_um", "um")
+    assert u.low < 0.0 < u.high
+    assert u.rate > (u.high - u.low) / 40.0
+    assert y.high - y.low > u.high - u.low
+
+
+def test_extension_that_diverges_with_a_larger_input_is_refused() -> None:
+    refusal = try_runaway(12.0, 1e-3).refusal
+    assert refusal is not None
+    assert "1.2 times the recorded input" in refusal
+
+
+def test_extension_that_diverges_at_an_end_of_an_interval_is_refused() -> None:
+    trial = try_runaway(0.5, 40.0)
+    assert trial.refusal is not None
+    assert "with runaway s = " in trial.refusal
+    assert "an end of its 95 % interval" in trial.refusal
+
+
+def test_recorded_output_is_tried_with_its_input_alone() -> None:
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(400)
+    record = Dataset(u, u + 0.5 + 0.01 * rng.standard_normal(400), 0.1)
+    simulator, target = RecordedOutput("theirs", u), make_target(record, 300, {})
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 300))
+    base = calibrate(simulation, target, simulation.nominal)
+    best = calibrate(simulation.with_effects([CATALOGUE["offset"]]), target, np.zeros(1))
+    trial = try_extension(record, base, best, target)
+    assert (trial.refusal, trial.input_factor) == (None, 1.0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 30.0])
+def test_excursion_of_the_simulation_without_the_extension_is_allowed(scale: float) -> None:
+    """An output that is small because two parts of it cancel: the simulation alone is larger."""
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(400)
+    record = Dataset(u, 0.01 * rng.standard_normal(400), 0.1)
+    simulator = PythonFunctionSimulator(lambda u, dt, k=scale: k * u + 0.0 * dt, "gain")
+    target = make_target(record, 300, {"k": 1e-3})
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 300))
+    base = evaluate_fit(simulation, target, simulation.nominal)
+    best = evaluate_fit(simulation.with_effects([CATALOGUE["offset"]]), target, np.array([scale, 0.0]))
+    assert try_extension(record, base, best, target).refusal is None
+    loud = replace(best, values=np.array([scale, 40.0 * scale * float(np.ptp(u))]))
+    assert try_extension(record, base, loud, target).refusal is not None
