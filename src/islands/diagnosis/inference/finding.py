@@ -192,6 +192,8 @@ def _describe_effect(
         others.append(make_unlisted_cause(named, 1.0 - explained))
     free = {each.effect.cause for each, _ in screened if each.effect.is_free}
     equal = list_equivalents(scored, named, free)
+    opposed = outcome.cancelled.get(effect.name, ())
+    equal += tuple(each for each in opposed if each not in (name, *equal))
     finding = Finding(
         name,
         family,

@@ -18,6 +18,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, make_task_key
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.cancellation import resolve_cancellation
 from islands.diagnosis.inference.chance_gain import ForwardSelection
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis
 from islands.diagnosis.inference.noise_floor import (
@@ -79,6 +80,8 @@ class SearchOutcome:
     verdict : Verdict
     form_alternatives : mapping of str to Alternatives
         Free forms that could take the place of each of several effects.
+    cancelled : mapping of str to tuple of str
+        Causes that opposed an effect, and were removed, by its name.
     """
 
     base: CalibrationResult
@@ -90,6 +93,7 @@ class SearchOutcome:
     residual_structure: Mapping[str, float]
     verdict: Verdict
     form_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
+    cancelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def search_with_ar_noise(
@@ -160,6 +164,7 @@ def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
     hypothesis = remove_chance_effects(outcome.hypothesis, base, target, run.effects)
     hypothesis = validate_out_of_sample(hypothesis, base, target, rng)
     hypothesis = remove_unresolved(hypothesis, target)
+    hypothesis, cancelled = resolve_cancellation(hypothesis, target, rng)
     rest = analyse_residual(hypothesis.fit, target, rng)
     if rest.is_structured or target.effective_samples is not None:
         confirmed = withdraw_effects(hypothesis, target, rng)
@@ -184,6 +189,7 @@ def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
         is_noise_floor_measured=rest.is_noise_floor_measured,
         residual_structure=rest.structure,
         verdict=verdict,
+        cancelled=cancelled,
     )
 
 
