@@ -36,6 +36,10 @@ MIN_DECREASE = 0.02
 #: states: that takes thirteen simulations, once for a point and its derivatives.
 MIN_BATCHED_SAMPLES = 800
 
+#: Least information on a combination of values, relative to that on each of them alone, with which it counts
+#: as determined: below it, intervals are hundreds of times as wide as with one of the values known.
+MIN_INFORMATION = 1e-5
+
 #: First and least damping, factor between the damping values of a step, and decrease after a step.
 FIRST_DAMPING, MIN_DAMPING, DAMPING_FACTOR, DAMPING_DECREASE = 1e-3, 1e-9, 8.0, 5.0
 
@@ -224,6 +228,9 @@ def whiten_target(target: Target, fit: CalibrationResult) -> Target:
 def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.float64]:
     """Estimate the covariance of the fitted values under the noise model of the fit.
 
+    If a change of several values together has almost no response, as a gain of the plant that a term at the
+    output makes up for, the first of these values is held: it has the variance 0.
+
     Returns
     -------
     ndarray, shape (parameters, parameters)
@@ -238,7 +245,23 @@ def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.fl
     inverse_std, _ = prior_precision(simulation, target.prior_std)
     weight = fit.noise.effective_samples / np.count_nonzero(target.estimation_part)
     information = weight * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((inverse_std * scales) ** 2)
-    inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
+    return _invert_information(information) * np.outer(scales, scales)
+
+
+def _invert_information(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Invert an information matrix without the values that others make up for."""
+    size = np.sqrt(np.diag(information))
+    free = list(np.flatnonzero(size > 0.0))
+    while free:
+        relative = information[np.ix_(free, free)] / np.outer(size[free], size[free])
+        lengths, directions = np.linalg.eigh(relative)
+        if lengths[0] >= MIN_INFORMATION:
+            break
+        parts = np.abs(directions[:, 0])
+        # Values of the simulation come before those of what extends it.
+        del free[int(np.argmax(parts >= 0.5 * parts.max()))]
+    inverse = np.zeros_like(information)
+    inverse[np.ix_(free, free)] = np.linalg.pinv(information[np.ix_(free, free)], hermitian=True)
     return inverse
 
 

@@ -32,10 +32,15 @@ def remove_unresolved(hypothesis: Hypothesis, target: Target) -> Hypothesis:
 
 
 def _may_be_zero(fit: CalibrationResult, effect: Effect, covariance: Signal) -> bool:
-    """Return whether the confidence region of the strengths of an effect contains that without the effect."""
+    """Return whether the confidence region of the strengths of an effect contains that without the effect.
+
+    A free form has no strength: a gain of the simulation may make up for the size of all of its values.
+    """
+    if effect.is_free:
+        return False
     part = fit.simulation.get_slice(effect)
     parameters = effect.parameters(fit.simulation.context)
-    count = len(parameters) if effect.is_free else max(effect.linear_parameters, 1)
+    count = max(effect.linear_parameters, 1)
     places = slice(part.start, part.start + count)
     return may_be_zero(
         fit.values[places] - [each.nominal for each in parameters[:count]], covariance[places, places]

@@ -20,6 +20,7 @@ from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, ma
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.cancellation import resolve_cancellation
 from islands.diagnosis.inference.chance_gain import ForwardSelection
+from islands.diagnosis.inference.curve_ends import flatten_ends
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis
 from islands.diagnosis.inference.noise_floor import (
     MIN_FRACTION,
@@ -170,6 +171,7 @@ def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
         confirmed = withdraw_effects(hypothesis, target, rng)
         if confirmed is not hypothesis:
             hypothesis, rest = confirmed, analyse_residual(confirmed.fit, target, rng)
+    hypothesis = flatten_ends(hypothesis, target)
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
         choose_reference_fit(hypothesis, base, target),
