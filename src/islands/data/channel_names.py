@@ -4,6 +4,9 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
+#: Units by which a channel is recognised as a temperature.
+TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
+
 #: Suffix of an input's name: read the column one sample early, for a system that responds within the sample.
 AT_ONCE = "+1"
 

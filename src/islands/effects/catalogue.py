@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from islands.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
 from islands.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
-from islands.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE
+from islands.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE, SECOND_INPUT
 from islands.effects.free_forms import FREE_FORMS
 from islands.effects.friction import (
     COULOMB_FRICTION,
@@ -47,6 +47,7 @@ EFFECTS: tuple[Effect, ...] = (
     DELAY,
     CLOCK_SKEW,
     INPUT_GAIN,
+    SECOND_INPUT,
     DEAD_ZONE,
     INPUT_SATURATION,
     RATE_LIMIT,

@@ -2,11 +2,9 @@
 
 import numpy as np
 
+from islands.data.channel_names import TEMPERATURES
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.errors import RecordError
-
-#: Units by which a channel is recognised as a temperature.
-TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
 
 
 def has_channel(context: SimulationContext, thermal: bool) -> bool:

@@ -1,4 +1,4 @@
-"""Disturbances: coupling of another channel, a periodic disturbance."""
+"""Disturbances: a second input, coupling of another channel, a periodic disturbance."""
 
 from functools import lru_cache
 from typing import Any
@@ -14,6 +14,38 @@ from islands.effects.interface.map_equation import MapEquation
 
 #: Error of the frequency of a line in the spectrum, relative to the resolution.
 LINE_ERROR = 0.1
+
+
+def _second_input_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return u + values[0] * channel(context, False)
+
+
+def _second_input_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    unit = f"{context.input_unit}/{channel_unit(context, False)}"
+    return (Parameter("k", unit, 0.0, 0.01 * context.input_peak / channel_range(context, False)),)
+
+
+def _second_input_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    size = context.input_peak / channel_range(context, False)
+    return ((0.02 * size,), (0.5 * size,))
+
+
+SECOND_INPUT = Effect(
+    name="second-input",
+    summary="A second input acts where the first one does: u + k w, where w is a given channel",
+    family="disturbance",
+    site=Site.INPUT,
+    parameters=_second_input_parameters,
+    starting_points=_second_input_starting_points,
+    form=_second_input_form,
+    equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
+    source="Ljung, System Identification, 2nd ed., section 4.2",
+    is_applicable=lambda context: has_channel(context, False),
+    similar_to="cross-coupling",
+    distinguished_by="the response to the channel has the dynamics of that to the input",
+)
 
 
 def _cross_coupling_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -48,7 +80,7 @@ CROSS_COUPLING = Effect(
     equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),
-    similar_to="thermal-drift",
+    similar_to="thermal-drift, second-input",
     distinguished_by="a residual that follows a channel that is not a temperature",
     occurs_in="cables without shield, a second axis, a common supply",
 )

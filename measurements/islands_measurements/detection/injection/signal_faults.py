@@ -194,6 +194,12 @@ def cross_coupling(rng: np.random.Generator, strength: float) -> Map:
     return lambda drive, y: y + c * drive.peak_output * drive.neighbour
 
 
+def second_input(rng: np.random.Generator, strength: float) -> Map:
+    """Second input: the neighbouring channel acts where the input does."""
+    c = random_sign(rng) * strength
+    return lambda drive, u: u + c * drive.peak_input * drive.neighbour
+
+
 def rate_limit(_rng: np.random.Generator, strength: float) -> Map:
     """Rate limiter; the strength is the RMS of the rate of the input relative to the limit."""
 

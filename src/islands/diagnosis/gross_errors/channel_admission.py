@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from islands.data.channel_names import TEMPERATURES
 from islands.data.dataset import Dataset
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
-from islands.effects.channels import TEMPERATURES
 from islands.effects.interface.effect import Signal
 
 #: Largest RMS difference between a channel and a scaled copy of another signal, relative to the standard

@@ -6,9 +6,8 @@ from math import isinf
 
 import numpy as np
 
-from islands.data.channel_names import parse_channel_name
+from islands.data.channel_names import TEMPERATURES, parse_channel_name
 from islands.effects.catalogue import CATALOGUE, get_summary
-from islands.effects.channels import TEMPERATURES
 from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site
 from islands.effects.time_variation import GAIN_EFFECTS
 from islands.errors import ModelError

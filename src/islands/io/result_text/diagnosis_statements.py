@@ -10,6 +10,7 @@ from functools import cached_property
 from math import ceil, floor, log10
 from typing import Final
 
+from islands.data.channel_names import TEMPERATURES
 from islands.io.result_text.statements import Document, Statement, round_ratio, write_amount, write_statements
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
@@ -47,6 +48,9 @@ _NEAREST = 3
 
 #: Families of causes: wrong gains and parameters, terms that were found, gross errors of the record.
 _SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
+
+#: Effect of a channel that acts where the input does.
+_SECOND_INPUT = "second-input"
 
 #: Effect of a wrong form of an identified model.
 _FORM = "core-shape"
@@ -92,6 +96,15 @@ class DiagnosisFacts:
     def terms(self) -> list[Document]:
         """The discovered terms."""
         return [each for each in self.causes if each["family"] == _TERM]
+
+    @property
+    def second_inputs(self) -> list[str]:
+        """Names of the channels that may be the second input, if that is claimed; the first one is."""
+        if not any(each["name"] == _SECOND_INPUT for each in self.claimed):
+            return []
+        record = self.document["record"]
+        channels = zip(record["names"]["inputs"][1:], record["units"]["inputs"][1:], strict=True)
+        return [name for name, unit in channels if unit not in TEMPERATURES]
 
     @property
     def has_others(self) -> bool:
@@ -411,6 +424,11 @@ def write_value(given: Document, is_exact: bool = False) -> str:
     return f"{value:.{digits}g}{unit} ({low:.{digits}g} to {high:.{digits}g})"
 
 
+def _describe_second_input(facts: DiagnosisFacts) -> str:
+    name, first = facts.second_inputs[0], facts.document["record"]["names"]["inputs"][0]
+    return f"The input {name} acts on the system where {first} does, and the simulation does not read it."
+
+
 def _describe_noise(facts: DiagnosisFacts) -> str:
     listed = (f"{_name_values(facts, each)}, {_describe_confidence(each)}" for each in facts.noise)
     return f"Sampling and noise: {'; '.join(listed)}."
@@ -620,6 +638,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
             "Each share is that of the misfit that is left without the effect, so that shares do not add up."
         ),
     ),
+    Statement("second-input", lambda facts: facts.second_inputs, _describe_second_input),
     Statement("noise", lambda facts: facts.noise, _describe_noise),
     Statement("record", lambda facts: facts.document.get("record_findings"), _describe_record),
     Statement(

@@ -94,11 +94,10 @@ def test_opposed_effects_have_to_gain_without_each_other(seed: int, monkeypatch:
     assert resolve_cancellation(hypothesis, with_model_error, np.random.default_rng(0))[0] is hypothesis
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", range(2))
-def test_causes_of_a_diagnosis_do_not_cancel(seed: int) -> None:
+@pytest.mark.nightly
+def test_causes_of_a_diagnosis_do_not_cancel() -> None:
     """An input between samples that no intersample behaviour has is made up for by creeps of both signs."""
-    rng = np.random.default_rng([seed, *map(ord, "osc_fine")])
+    rng = np.random.default_rng([0, *map(ord, "osc_fine")])
     time = np.arange(20000) * 0.001
     u = sum(
         rng.uniform(0.2, 1.0) * np.sin(2.0 * np.pi * f * time + rng.uniform(0.0, 6.28))

@@ -18,7 +18,7 @@ SAMPLES = 800
 
 
 def fit_curve(seed: int, narrow: bool) -> tuple[Hypothesis, Target]:
-    """Fit a curve of the output to |x|, with samples in all of its range or, but for two, in a third of it."""
+    """Fit a curve of the output to |x|, with samples in all of its range, or two outside of a third."""
     rng = np.random.default_rng(seed)
     x = rng.uniform(-1.0, 1.0, SAMPLES)
     x[0], x[1] = 1.0, -1.0
