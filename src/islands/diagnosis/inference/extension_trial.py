@@ -19,7 +19,7 @@ from islands.simulators.extended import ExtendedSimulator
 INPUT_FACTOR = 1.2
 
 #: Largest distance of the output from its recorded range, in widths of that range. That of the simulation
-#: without the extension counts if it is larger.
+#: without effects counts if it is larger.
 MAX_EXCURSION = 10.0
 
 #: Half width of a confidence interval of 95 % in standard deviations.
@@ -67,7 +67,7 @@ def try_extension(
     labels, points = _list_ends(base, best, target)
     refusal = None
     for factor in factors:
-        place = _find_excursion(base, best, points, factor, target)
+        place = _find_excursion(best, points, factor, target)
         if place is not None:
             refusal = _describe_refusal(labels[place], factor)
             break
@@ -104,33 +104,26 @@ def _find_added(base: CalibrationResult, best: CalibrationResult) -> dict[int, s
     }
 
 
-def _find_excursion(
-    base: CalibrationResult, best: CalibrationResult, points: Signal, factor: float, target: Target
-) -> int | None:
-    """Return the first point at which the extension diverges or leaves the recorded range by far, or None."""
+def _find_excursion(best: CalibrationResult, points: Signal, factor: float, target: Target) -> int | None:
+    """Return the first point at which the extension diverges or leaves the recorded range by far, or None.
+
+    The simulation with the same values, but without effects, may do so as well: that is not the extension.
+    """
+    simulation = _scale_input(best, factor)
+    alone = simulation.with_effects(()).simulate_batch(points[:, simulation.simulator_slice])
+    outputs = simulation.simulate_batch(points)
     low, high = float(np.nanmin(target.y)), float(np.nanmax(target.y))
-    without, outputs = (
-        _scale_input(each, factor).simulate_batch(values)
-        for each, values in ((base, base.values[None]), (best, points))
-    )
-    width = high - low
-    if np.isfinite(without).all():
-        width = max(width, float(np.ptp(without)))
-    limits = low - MAX_EXCURSION * width, high + MAX_EXCURSION * width
-    is_within = ((outputs >= limits[0]) & (outputs <= limits[1])).all(axis=1)
+    reach = MAX_EXCURSION * np.maximum(high - low, np.ptp(alone, axis=1))[:, None]
+    is_within = ((outputs >= low - reach) & (outputs <= high + reach)).all(axis=1)
+    is_within |= ~np.isfinite(alone).all(axis=1)
     return None if is_within.all() else int(np.argmin(is_within))
 
 
 def _scale_input(fit: CalibrationResult, factor: float) -> ExtendedSimulator:
     """Return the simulation of a fit with a multiple of its input."""
     context = fit.simulation.context
-    between = context.intersample_values
-    scaled = replace(
-        context,
-        u=factor * context.u,
-        intersample_values=None if between is None else factor * between,
-    )
-    return replace(fit.simulation, context=scaled)
+    between = None if context.intersample_values is None else factor * context.intersample_values
+    return replace(fit.simulation, context=replace(context, u=factor * context.u, intersample_values=between))
 
 
 def _describe_refusal(label: str, factor: float) -> str:
