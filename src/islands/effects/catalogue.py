@@ -41,13 +41,12 @@ from islands.effects.time_variation import AGEING, GAIN_STEP
 from islands.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
 
 #: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
-#: scale of an encoder, so that they act before its cyclic error. The order also breaks ties between scores:
-#: another order changes results.
+#: scale of an encoder, so that they act before its cyclic error. A second input acts behind the actuator of
+#: the first one. The order also breaks ties between scores: another order changes results.
 EFFECTS: tuple[Effect, ...] = (
     DELAY,
     CLOCK_SKEW,
     INPUT_GAIN,
-    SECOND_INPUT,
     DEAD_ZONE,
     INPUT_SATURATION,
     RATE_LIMIT,
@@ -77,6 +76,7 @@ EFFECTS: tuple[Effect, ...] = (
     JUMP,
     THERMAL_DRIFT,
     CROSS_COUPLING,
+    SECOND_INPUT,
     PERIODIC_DISTURBANCE,
     CYCLIC_ERROR,
     SENSOR_GAIN,
