@@ -45,6 +45,7 @@ SECOND_INPUT = Effect(
     is_applicable=lambda context: has_channel(context, False),
     similar_to="cross-coupling",
     distinguished_by="the response to the channel has the dynamics of that to the input",
+    occurs_in="a second actuator, a feedforward or a load that the simulation does not read",
 )
 
 
