@@ -18,9 +18,6 @@ from islands.errors import SettingsError
 #: Data sheets and estimates from a resting output are seldom wrong by a factor of two.
 MAX_NOISE_RATIO = 2.0
 
-#: Size of a residual, relative to the standard deviation of the output, that is no larger than rounding.
-MIN_RELATIVE_RMS = 1e-6
-
 #: Number of parts of a record whose residuals are compared.
 PARTS = 8
 
@@ -51,8 +48,8 @@ def judge_noise(
 ) -> Diagnosis:
     """Return a diagnosis without a cause whose verdict says what is known about the residual.
 
-    It remains "nothing" if the residual is white, if its correlation time is that of one sample, or if it is
-    as small as the noise that the user states. A residual far above that noise, and a coloured one that
+    It remains "nothing" if the residual is below the resolution of the output, if it is white, if its
+    correlation time is that of one sample, or if it is as small as the noise that the user states. A residual far above that noise, and a coloured one that
     depends on the input, are "unknown". A coloured residual for which nothing decides is "noise".
 
     Parameters
@@ -65,7 +62,7 @@ def judge_noise(
     residual = (target.y - found.best.output)[target.estimation_part]
     claim = _describe_residual(found, target, noise_level)
     found = replace(found, noise_claim=claim)
-    if found.verdict != Verdict.NOTHING or claim.rms < MIN_RELATIVE_RMS * float(np.nanstd(found.record.y)):
+    if found.verdict != Verdict.NOTHING or target.is_matched(found.best.output):
         return found
     is_far = noise_level is not None and claim.rms > MAX_NOISE_RATIO * noise_level
     if not (is_far or claim.correlation_time):
