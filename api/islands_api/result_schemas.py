@@ -65,6 +65,7 @@ class FindingView(ResponseModel):
     )
     noise_share: float | None = Field(default=None, description="Fraction of that error that is noise.")
     term: str = Field(default="", description="A missing term with its equation.")
+    depends_on_time: bool = Field(default=False, description="Whether it is a function of the time.")
     summary: str = Field(default="", description="What the cause is.")
     distinguished_by: str = Field(default="", description="What distinguishes it from similar causes.")
     occurs_in: str = Field(default="", description="Parts of machines that have it.")

@@ -49,8 +49,9 @@ def judge_noise(
     """Return a diagnosis without a cause whose verdict says what is known about the residual.
 
     It remains "nothing" if the residual is below the resolution of the output, if it is white, if its
-    correlation time is that of one sample, or if it is as small as the noise that the user states. A residual far above that noise, and a coloured one that
-    depends on the input, are "unknown". A coloured residual for which nothing decides is "noise".
+    correlation time is that of one sample, or if it is as small as the noise that the user states. A residual
+    far above that noise, and a coloured one that depends on the input, are "unknown". A coloured residual for
+    which nothing decides is "noise".
 
     Parameters
     ----------

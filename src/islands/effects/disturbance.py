@@ -153,6 +153,7 @@ PERIODIC_DISTURBANCE = Effect(
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
     linear_parameters=2,
     extra_degrees_of_freedom=2,
+    depends_on_time=True,
     similar_to="resonance",
     distinguished_by="a line in the spectrum that is no multiple of the frequency of the input",
     occurs_in="mains hum, fans, pumps, unbalance of a neighbouring machine",

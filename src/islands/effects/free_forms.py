@@ -65,6 +65,7 @@ def _make_free_form(
         linear_parameters=0,
         acts_between_samples=acts_between_samples,
         is_free=True,
+        depends_on_time=labels is free_maps.label_times,
         special_cases=special_cases,
         similar_to=similar_to,
         distinguished_by=distinguished_by,

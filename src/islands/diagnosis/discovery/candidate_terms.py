@@ -128,6 +128,11 @@ class CandidateTerm:
         return 1 if self.scale is None else 2
 
     @property
+    def depends_on_time(self) -> bool:
+        """Whether the term is a function of the time."""
+        return self.gate is not None or TIME in find_symbols(parse_expression(self.text.format(scale="a")))
+
+    @property
     def degrees_of_freedom(self) -> int:
         """Number of its values, and one more for an instant, which is selected among all samples."""
         return self.value_count + (self.gate is not None)

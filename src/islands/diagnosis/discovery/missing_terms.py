@@ -253,6 +253,7 @@ def describe_terms(
                 error_fraction=explained_fraction(base, fit, 0.0),
                 noise_fraction=noise_fraction(base, floor),
                 term=each.describe(),
+                depends_on_time=each.term.depends_on_time,
             )
         )
     return tuple(findings)

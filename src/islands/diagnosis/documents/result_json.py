@@ -150,6 +150,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "error_share": finding.error_fraction,
         "noise_share": finding.noise_fraction,
         "term": finding.term,
+        "depends_on_time": finding.depends_on_time,
         "claimed": finding.is_claimed,
         "free_form": bool(list_free_forms([finding])),
     }

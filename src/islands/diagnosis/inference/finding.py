@@ -77,6 +77,8 @@ class Finding:
         Fraction of that error that is noise: the noise floor, which may be an upper bound.
     term : str
         Missing term with its equation, as ``a1*(x*v) in dv/dt``; empty for an effect.
+    depends_on_time : bool
+        Whether it is a function of the time of the record.
     is_claimed : bool
         Whether it is claimed as a cause. If a remainder shows that the simulation is still wrong, only the
         first effect is: further ones may follow its wrong form. No cause is if others are much more probable.
@@ -93,6 +95,7 @@ class Finding:
     error_fraction: float | None = None
     noise_fraction: float | None = None
     term: str = ""
+    depends_on_time: bool = False
 
 
 def list_free_forms(findings: Sequence[Finding]) -> list[Finding]:
@@ -204,6 +207,7 @@ def _describe_effect(
         explained,
         error_fraction=explained_fraction(reference, fit, 0.0),
         noise_fraction=noise_fraction(reference, outcome.noise_floor),
+        depends_on_time=effect.depends_on_time,
     )
     return finding, [each for each, _ in screened if each.effect.cause in equal]
 

@@ -70,6 +70,8 @@ class Effect:
     is_free : bool
         Whether the effect is a free form, which has any shape of its family. It has one starting point for
         each coefficient, and its calibration starts from their best combination.
+    depends_on_time : bool
+        Whether it is a function of the time of the record, so that it says nothing about another record.
     special_cases : tuple of str
         Names of the effects with a shape that a free form has as well.
     extra_degrees_of_freedom : int
@@ -101,6 +103,7 @@ class Effect:
     acts_between_samples: bool = False
     is_gain: bool = False
     is_free: bool = False
+    depends_on_time: bool = False
     special_cases: tuple[str, ...] = ()
     extra_degrees_of_freedom: int = 0
     confounded_with: "tuple[Effect, float] | None" = None

@@ -223,6 +223,12 @@ class DiagnosisFacts:
         return found
 
     @property
+    def time_dependent(self) -> list[str]:
+        """Names of the causes that are functions of the time, or their terms."""
+        found = [each for each in self.causes if each.get("depends_on_time")]
+        return list(dict.fromkeys(each.get("term") or each["name"] for each in found))
+
+    @property
     def is_one_record(self) -> bool:
         """Whether the held-out data are the end of the recording that the causes were found on."""
         return self.held_out_part == "the last quarter of the record"
@@ -684,6 +690,14 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda _: "A flexible model of the past of input and output predicts a part of the residual.",
     ),
     Statement("gain", lambda facts: facts.gain is not None, _describe_gain),
+    Statement(
+        "time-dependent",
+        lambda facts: facts.gain is not None and facts.time_dependent,
+        lambda facts: (
+            f"{' and '.join(facts.time_dependent)}: a function of the time of this record, which the "
+            "extended simulation repeats on another one."
+        ),
+    ),
     Statement(
         "one-record",
         lambda facts: facts.has_gain and facts.is_one_record,

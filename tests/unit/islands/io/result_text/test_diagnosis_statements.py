@@ -104,6 +104,12 @@ def test_the_extended_simulation_is_stated_with_its_values():
     assert "Extended simulation" not in text("unknown", equations="dx/dt = u - k*x", calibrated={"k": 2.0})
 
 
+def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
+    cause = {**CAUSE, "name": "gain-step", "depends_on_time": True}
+    assert "gain-step: a function of the time of this record" in text("named", effects=[cause], gain=GAIN)
+    assert "function of the time" not in text("named", effects=[CAUSE], gain=GAIN)
+
+
 def test_a_gain_on_one_record_asks_for_another_one():
     assert "Causes and gain rest on one record" in text("named", effects=[CAUSE], gain=GAIN)
     second = text("named", effects=[CAUSE], gain=GAIN, held_out_part="the last recording")
