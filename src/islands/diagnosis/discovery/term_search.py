@@ -264,9 +264,8 @@ def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
             continue
         place, distance = places[each.parameters[1]], each.term.gate.spacing
         while distance > each.term.gate.change:
-            moved = found.fit.values + distance * np.array([[-1.0], [1.0]]) * (
-                np.arange(len(places)) == place
-            )
+            moved = np.tile(found.fit.values, (2, 1))
+            moved[:, place] += (-distance, distance)
             moved[:, place] = np.clip(moved[:, place], each.term.gate.earliest, each.term.gate.latest)
             fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
             best = min(fits, key=lambda fit: fit.score)
