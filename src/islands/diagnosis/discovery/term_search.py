@@ -269,7 +269,7 @@ def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
             moved[:, place] = np.clip(moved[:, place], each.term.gate.earliest, each.term.gate.latest)
             fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
             best = min(fits, key=lambda fit: fit.score)
-            if best.score < found.fit.score:
+            if best.score < found.fit.score - MIN_GAIN:
                 found = _improve(found, calibrate(best.simulation, target, best.values))
             else:
                 distance /= 2.0
