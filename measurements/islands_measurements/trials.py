@@ -1,17 +1,16 @@
 """``islands trials``: blind fault-injection trials of the discrepancy analysis."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from islands.cli.console import output
 from islands.cli.engines import check_engine, ray_pool
@@ -23,6 +22,8 @@ from islands.figures.style import save
 from islands.progress import Steps, StoppedError
 from islands_measurements.detection.cases import CASES, SimulatedCase
 from islands_measurements.detection.injection.noise import NOISES
+from islands_measurements.detection.injection.unusual.table import UNUSUAL_CAUSES
+from islands_measurements.detection.score_table import make_score_table
 from islands_measurements.detection.scoring import (
     Proportion,
     ReliabilityBin,
@@ -32,6 +33,11 @@ from islands_measurements.detection.scoring import (
     score,
 )
 from islands_measurements.detection.trial import Trial, TrialOutcome, run_trial
+from islands_measurements.detection.unusual_report import plan_unusual, report_unusual
+from islands_measurements.detection.unusual_trial import run_unusual_trial
+
+Planned = TypeVar("Planned")
+Outcome = TypeVar("Outcome")
 
 #: Bands of the misfit of an effect, in standard deviations of the noise; used in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
@@ -60,7 +66,8 @@ def trials(
         list[str] | None,
         typer.Option(
             "--effects",
-            help="Effects to inject; repeatable; by default, or by 'all', all that the analysis can name.",
+            help="Effects to inject, or unusual causes; repeatable; by default, or by 'all', all that the "
+            "analysis can name, or all unusual causes.",
         ),
     ] = None,
     count: Annotated[int, typer.Option("--count", min=1, help="Trials of each effect.")] = 3,
@@ -78,6 +85,15 @@ def trials(
         int,
         typer.Option(
             "--mixed", min=0, help="Records with an effect and a cause that is not in the catalogue."
+        ),
+    ] = 0,
+    unusual: Annotated[
+        int,
+        typer.Option(
+            "--unusual",
+            min=0,
+            help="Plants with each unusual cause, instead of all other trials: causes that are mostly not in "
+            "the catalogue, and clean records of unusual noise. What is found is tested on another record.",
         ),
     ] = 0,
     variant: Annotated[
@@ -101,6 +117,13 @@ def trials(
 ) -> None:
     """Inject effects into simulated records, diagnose them, and count how often they are found and named."""
     cases = {name: lookup(CASES, name, "core") for name in cores or [next(iter(CASES))]}
+    run_all = partial(_run_all, workers=workers, address=address, out=out)
+    if unusual:
+        chosen = [
+            lookup(UNUSUAL_CAUSES, name, "unusual cause").name for name in effects or () if name != "all"
+        ]
+        run_all(run_unusual_trial, plan_unusual(cores or (), chosen, unusual, seed), report=report_unusual)
+        return
     lookup(NOISES, noise, "noise")
     counts = _Counts(count, clean, open_set, pairs, triples, mixed)
     planned = [
@@ -110,26 +133,43 @@ def trials(
             simulated, _select_effects(effects, simulated), counts, np.random.default_rng(seed)
         )
     ]
+
+    def report(found: Sequence[TrialOutcome]) -> dict[str, Any]:
+        document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
+        for core, simulated in cases.items():
+            outcomes = [each for each in found if each.trial.core == core]
+            document["cores"][core] = _report_case(core, simulated, outcomes)
+            if figure is not None:
+                path = figure if len(cases) == 1 else figure.with_stem(f"{figure.stem}-{core}")
+                title = f"{core}, {noise} noise: injected and named effects"
+                save(draw_confusion(confusion(outcomes), simulated.nameable, title), path)
+        return document
+
+    run_all(run_trial, planned, report=report)
+
+
+def _run_all(
+    run: Callable[[Planned], Outcome],
+    planned: Sequence[Planned],
+    report: Callable[[Sequence[Outcome]], dict[str, Any]],
+    workers: int | None,
+    address: str | None,
+    out: Path | None,
+) -> None:
+    """Run trials in parallel and report their outcomes; a stop request leaves out those not begun."""
     check_engine("ray")
     compile_kernels()
-    found: list[TrialOutcome] = []
+    found: list[Outcome] = []
     with progress("trials") as show, stop_requests() as stop:
         steps = Steps(show, stop)
         check = partial(steps.check, "the first trial")
         with suppress(StoppedError), ray_pool(workers, address, check) as parallel_map:
-            for outcome in parallel_map(run_trial, planned):
+            for outcome in parallel_map(run, planned):
                 found.append(outcome)
                 show(f"{len(found)} of {len(planned)}", len(found) / len(planned))
         if not found:
             check()
-    document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
-    for core, simulated in cases.items():
-        outcomes = [each for each in found if each.trial.core == core]
-        document["cores"][core] = _report_case(core, simulated, outcomes)
-        if figure is not None:
-            path = figure if len(cases) == 1 else figure.with_stem(f"{figure.stem}-{core}")
-            title = f"{core}, {noise} noise: injected and named effects"
-            save(draw_confusion(confusion(outcomes), simulated.nameable, title), path)
+    document = report(found)
     if out is not None:
         out.write_text(json.dumps(document, indent=1))
     left_out = [f"{len(planned) - len(found)} of {len(planned)} trials"] * (len(found) < len(planned))
@@ -161,7 +201,7 @@ def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOu
     """Print the scores of one simulation and return them as a document."""
     rows = score(outcomes, simulated.nameless, simulated.goals)
     bins = reliability(outcomes)
-    output.print(_make_table(core, rows))
+    output.print(make_score_table(core, rows))
     for each in bins:
         output.print(_format_bin(each), markup=False)
     wrong = {key: times for key, times in sorted(confusion(outcomes).items()) if key[0] != key[1]}
@@ -178,23 +218,6 @@ def _select_effects(effects: list[str] | None, simulated: SimulatedCase) -> list
     for name in effects:
         lookup(dict.fromkeys(simulated.system.known), name, "effect")
     return effects
-
-
-def _make_table(title: str, rows: Sequence[Proportion | Statistic]) -> Table:
-    table = Table("", "trials", "", "95 %", "goal", "", title=title, title_justify="left")
-    for row in rows:
-        if row.of:
-            goal = "" if row.goal is None else f"{'<=' if row.most else '>='} {row.goal:g}"
-            kept = {True: "kept", False: "MISSED", None: ""}[row.kept]
-            table.add_row(row.name, f"{row.of}", *_format_value(row), goal, kept)
-    return table
-
-
-def _format_value(row: Proportion | Statistic) -> tuple[str, str]:
-    if isinstance(row, Statistic):
-        return f"{row.value:.3f}", ""
-    low, high = row.bounds
-    return f"{row.percent:.1f} %", f"{low:.1f} to {high:.1f}"
 
 
 def _format_bin(each: ReliabilityBin) -> str:
