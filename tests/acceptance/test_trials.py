@@ -10,6 +10,7 @@ import pytest
 from islands.effects.catalogue import CATALOGUE
 from islands_measurements.detection.cases import CASES
 from islands_measurements.detection.injection.noise import NOISES
+from islands_measurements.detection.injection.unusual.table import UNUSUAL_CAUSES
 from islands_measurements.detection.trial import Trial, run_trial
 from support.command_line import fail, succeed
 from support.undrawn import undrawn_figures
@@ -26,6 +27,9 @@ def test_invalid_trials_are_rejected() -> None:
     assert "unknown noise 'purple'" in fail("trials", "--noise", "purple")
     assert "unknown core 'gravity'" in fail("trials", "--core", "gravity")
     assert "2 effects at once" in fail("trials", "--effects", "offset", "--pairs", 1)
+    unusual = ("trials", "--unusual", 1)
+    assert "Did you mean 'quantised-valve'" in fail(*unusual, "--effects", "quantized-valve")
+    assert "no unusual cause has the core column" in fail(*unusual, "--core", "column")
 
 
 @pytest.mark.ci
@@ -54,6 +58,43 @@ def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.Mo
     measures = {measure["name"] for measure in document["cores"]["column"]["measures"]}
     assert "share of the oracle's gain, median" in measures
     assert (tmp_path / "confusion.svg").exists()
+
+
+@pytest.mark.ci
+def test_unusual_causes_are_scored_on_fresh_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The trials run in this process, one after the other."""
+    pool = "islands_service.runtime.parallel_map.ray_pool"
+    monkeypatch.setattr(pool, lambda _workers, _address, _check: nullcontext(map))
+    causes = ("amplitude-damping", "asymmetric-gain", "clean-steps")
+    chosen = [each for name in causes for each in ("--effects", name)]
+    limits = ("--unusual", 1, "--seed", 8_100_000, "--json", tmp_path / "trials.json")
+    printed = succeed("trials", *chosen, *limits)
+    assert "unusual causes" in printed
+    document = json.loads((tmp_path / "trials.json").read_text())
+    assert document["answers"] == {name: {"right": 1} for name in causes}
+    counted = percentages(document)
+    assert counted["right or family"] == 100.0
+    assert counted["clean records with a name"] == 0.0
+    assert counted["claims with a confidence of 0.9 or more that fail on a fresh record"] == 0.0
+    (ratio,) = document["measures"]
+    assert ratio["of"] == 2
+    assert ratio["value"] < 0.1
+    assert not any(each["failing"] for each in document["outcomes"])
+
+
+# Limits below the goals, which detect a degraded analysis.
+@pytest.mark.nightly
+@pytest.mark.timeout(3600)
+def test_most_unusual_causes_are_recognised(tmp_path: Path) -> None:
+    succeed("trials", "--unusual", 1, "--seed", 8_100_000, "--json", tmp_path / "trials.json")
+    document = json.loads((tmp_path / "trials.json").read_text())
+    counted = percentages(document)
+    assert len(document["outcomes"]) == len(UNUSUAL_CAUSES)
+    assert counted["right or family"] >= 70.0
+    assert counted["clean records with a name"] <= 15.0
+    assert counted["the same below 0.2"] >= 55.0
+    (ratio,) = document["measures"]
+    assert ratio["value"] < 0.1
 
 
 @pytest.mark.nightly
