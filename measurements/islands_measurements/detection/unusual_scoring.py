@@ -109,8 +109,8 @@ def list_sure_claims(outcome: UnusualOutcome) -> tuple[SureClaim, ...]:
 def score_unusual(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statistic]:
     """Score trials against the goals.
 
-    Ratios of the errors on fresh records are those of causes whose extension can hold there; extensions that
-    make a record worse are counted among all.
+    Ratios of the errors on fresh records are those of causes whose extension can hold there. Extensions of
+    disturbances that have another phase there are counted apart.
     """
     causes = [UNUSUAL_CAUSES[each.trial.cause] for each in outcomes]
     caused, clean = (
@@ -118,7 +118,14 @@ def score_unusual(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Stati
         for is_clean in (False, True)
     )
     sure = [claim for each in outcomes for claim in list_sure_claims(each)]
-    extended = [each.fresh for each in outcomes if each.fresh is not None]
+    extended, disturbed = (
+        [
+            each.fresh
+            for each, cause in zip(outcomes, causes, strict=True)
+            if each.fresh is not None and cause.carries == carries
+        ]
+        for carries in (True, False)
+    )
     ratios = [
         each.fresh.ratio
         for each, cause in zip(outcomes, causes, strict=True)
@@ -167,6 +174,11 @@ def score_unusual(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Stati
             len(extended),
             _WORSE,
             True,
+        ),
+        Proportion(
+            "the same, of disturbances that have another phase there",
+            sum(each.is_worse for each in disturbed),
+            len(disturbed),
         ),
         count("clean records with a name", clean, (Answer.WRONG,), _NAMED, True),
         count("clean records with 'unknown'", clean, (Answer.UNKNOWN,), _UNKNOWN, True),

@@ -262,5 +262,6 @@ def _measure(fit: CalibrationResult, diagnosed: Dataset, record: Dataset, fresh:
     except IslandsError:  # It diverges with every initial state.
         return float("inf")
     error = float(np.sqrt(np.mean((y - fresh.clean) ** 2))) / fresh.sigma
-    floor = max(_NO_ERROR, _RESOLUTION * float(np.ptp(fresh.clean)) / fresh.sigma)
+    has_noise = not np.array_equal(fresh.record.y, fresh.clean)
+    floor = max(_NO_ERROR * has_noise, _RESOLUTION * float(np.ptp(fresh.clean)) / fresh.sigma)
     return max(error, floor) if np.isfinite(error) else float("inf")

@@ -13,7 +13,7 @@ from islands_measurements.detection.injection.unusual.integration import (
     PROCESS_DT,
     PROCESS_SAMPLES,
 )
-from islands_measurements.detection.injection.unusual.machine_causes import respond_cleanly as move_mass
+from islands_measurements.detection.injection.unusual.machine_causes import respond_cleanly, respond_exactly
 from islands_measurements.detection.injection.unusual.process_causes import (
     GAIN,
     TIME,
@@ -97,7 +97,7 @@ CLEAN_RECORDS = (
         "clean-in-band",
         "ARMA noise with a resonance near that of the machine",
         "second-order",
-        _with_noise(move_mass, _in_band),
+        _with_noise(respond_cleanly, _in_band),
     ),
     _clean(
         "clean-heteroscedastic",
@@ -105,14 +105,19 @@ CLEAN_RECORDS = (
         "linear:2",
         _with_noise(respond_second_order, _heteroscedastic),
     ),
-    _clean("clean-pink", "pink noise of a machine", "second-order", _with_noise(move_mass, _pink)),
+    _clean("clean-pink", "pink noise of a machine", "second-order", _with_noise(respond_cleanly, _pink)),
     _clean(
         "clean-steps",
         "1/f noise, with steps of the input",
         "linear:1",
         _with_noise(respond_first_order, _pink),
     ),
-    _clean("clean-noise-free-machine", "no noise", "second-order", _noise_free(move_mass)),
+    _clean(
+        "clean-noise-free-machine",
+        "no noise, and a force that is linear between samples",
+        "second-order",
+        _noise_free(respond_exactly),
+    ),
     _clean("clean-noise-free-process", "no noise", "linear:1", _noise_free(respond_first_order)),
     _clean("clean-loop", "closed loop without a delay", "linear:1", _closed_loop),
 )

@@ -18,8 +18,8 @@ from islands_measurements.detection.injection.unusual.integration import (
 #: Mass in kg, damping in N s/m and stiffness in N/m: 8 Hz, damping ratio 0.1.
 MASS, DAMPING, STIFFNESS = 0.8, 8.0, 2000.0
 
-#: Typical largest displacement in m and speed in m/s.
-REACH, SPEED = 0.02, 0.5
+#: Typical largest displacement in m.
+REACH = 0.02
 
 #: Speed in m/s above which dry friction is full, so that the equations have one solution.
 _CREEP = 2e-3
@@ -54,6 +54,14 @@ def _respond(u: Signal, x: Signal) -> Response:
 def respond_cleanly(record: Rng) -> Response:
     """Draw a record of the mass without a cause."""
     u = draw_force(record)
+    return _respond(u, _move(_no_force, u)[:, 0])
+
+
+def respond_exactly(record: Rng) -> Response:
+    """Draw a record of the mass without a cause, whose force is linear between its samples."""
+    u = draw_force(record)
+    steps = np.arange(u.size)
+    u = np.interp(steps, steps[::MACHINE_STEPS], u[::MACHINE_STEPS])
     return _respond(u, _move(_no_force, u)[:, 0])
 
 
@@ -219,9 +227,6 @@ def _cause(
     )
 
 
-#: Text of a power of the speed, with or without a factor of time.
-_DAMPING_TERM = r"\bv\b"
-
 #: Causes in a machine. The equations of the simulation have the states x and v.
 MACHINE_CAUSES = (
     _cause(
@@ -265,9 +270,9 @@ MACHINE_CAUSES = (
         "the damper loses 50 to 90 % of its damping",
         _under_force(_fading_damper),
         "",
-        r"(?=.*\bt\b)(?=.*\bv\b)(?!.*(sign|abs|\*\*))",
+        r"\((t\*v|v\*t)\)",
         "damping-curve viscous",
-        _DAMPING_TERM,
+        r"(?=.*\bt\b)(?=.*\bv\b)",
     ),
     _cause(
         "fifth-power",
@@ -285,7 +290,7 @@ MACHINE_CAUSES = (
         "cubic-stiffness",
         r"sin\(|x\*\*3",
         "stiffness-curve cogging",
-        r"\bx\b",
+        r"x\*\*[25]|abs\(x\)|tanh\(x",
     ),
     _cause(
         "dahl-friction",

@@ -284,7 +284,7 @@ PROCESS_CAUSES = (
         "output-curve even-nonlinearity",
         r"y_sim\*\*[234]",
         "shape",
-        r"y_sim",
+        r"y_sim\*\*|(abs|max)\(y_sim",
     ),
     _cause(
         "day-wave",
