@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
 from islands.cli.console import output
@@ -60,7 +61,7 @@ def report_unusual(outcomes: Sequence[UnusualOutcome]) -> dict[str, Any]:
     for each in outcomes:
         if (line := describe_failure(each)) is not None:
             output.print(line, markup=False)
-    return {
+    document = {
         "shares": [{**asdict(row), "bounds": row.bounds} for row in rows if isinstance(row, Proportion)],
         "measures": [asdict(row) for row in rows if isinstance(row, Statistic) and row.of],
         "answers": {
@@ -78,6 +79,17 @@ def report_unusual(outcomes: Sequence[UnusualOutcome]) -> dict[str, Any]:
             for each in outcomes
         ],
     }
+    finite: dict[str, Any] = _replace_infinite(document)
+    return finite
+
+
+def _replace_infinite(value: Any) -> Any:
+    """Return a document with null for infinite errors, for which JSON has no number."""
+    if isinstance(value, dict):
+        return {key: _replace_infinite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_replace_infinite(each) for each in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _make_cause_table(outcomes: Sequence[UnusualOutcome]) -> Table:
