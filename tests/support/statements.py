@@ -46,9 +46,9 @@ EXCLUSIVE = (
 
 #: A claimed cause that others together exceed in probability.
 _UNLIKELY = (
-    r"confidence (below )?0\.[0-4]\d, [\d.]+ % of the "
-    r"(misfit above the noise floor|mean squared error \([^)]*\))"
-    r"(?!; improves|; confounded with [^;]*; improves)"
+    r"confidence (below )?0\.[0-4]\d, (explains )?[\d.]+ % of the "
+    r"(misfit above the noise floor|mean squared error without it \([^)]*\))"
+    r"(?!; improves|; this record does not distinguish [^;]*; improves)"
 )
 
 #: An error far above the noise.
@@ -67,7 +67,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"No significant discrepancy", r"(The remaining residual depends|none of which is confirmed)"),
     (
         r"No significant discrepancy",
-        r"confidence (above |below )?\d\.\d\d, [\d.]+ % of the (misfit|mean squared error)",
+        r"confidence (above |below )?\d\.\d\d, (explains )?[\d.]+ % of the (misfit|mean squared error)",
     ),
     (r"No significant discrepancy: ", _FAR),
     (_WHOLE, _FAR),

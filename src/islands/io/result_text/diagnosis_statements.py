@@ -107,6 +107,12 @@ class DiagnosisFacts:
         return [name for name, unit in channels if unit not in TEMPERATURES]
 
     @property
+    def has_several_shares(self) -> bool:
+        """Whether several shares are stated, each of another error. The terms have one in common."""
+        shares = sum(each["family"] not in (_TERM, _GROSS) for each in self.causes)
+        return shares + bool(shares and self.terms) > 1
+
+    @property
     def has_others(self) -> bool:
         """Whether effects that are not claimed extend the simulation as well."""
         return len(self.claimed) < len(self.causes)
@@ -356,7 +362,7 @@ def _describe_discovered(facts: DiagnosisFacts) -> str:
 def _describe_cause(facts: DiagnosisFacts, cause: Document) -> str:
     parts = [f"{_describe_confidence(cause)}{_describe_share(facts, cause)}"]
     if cause["equivalents"]:
-        parts.append(f"confounded with {', '.join(cause['equivalents'])}")
+        parts.append(f"this record does not distinguish it from {', '.join(cause['equivalents'])}")
     if not cause.get("claimed", True):
         parts.append("improves the fit, but is not claimed as a cause")
     return f"{_name_values(facts, cause)}; {'; '.join(parts)}{_explain_cause(cause)}"
@@ -388,14 +394,17 @@ def _describe_share(facts: DiagnosisFacts, cause: Document) -> str:
     if cause.get("error_share") is None:  # a document of an earlier version
         together = " by all terms and effects" if cause["family"] == _TERM else ""
         return f"{share} of the misfit above the noise floor{together}"
-    return "" if cause["family"] == _TERM else f", {_write_shares(facts, cause)}"
+    return "" if cause["family"] == _TERM else f", explains {_write_shares(facts, cause, 'it')}"
 
 
-def _write_shares(facts: DiagnosisFacts, cause: Document) -> str:
-    """Write the explained share of the mean squared error, and the share of the noise in it."""
-    share = f"{floor(1000 * cause['error_share']) / 10:g} % of the mean squared error"
+def _write_shares(facts: DiagnosisFacts, cause: Document, left_out: str) -> str:
+    """Write the explained share of the mean squared error, and the share of the noise in it.
+
+    Each share has an error of its own as its reference, that without the named causes.
+    """
+    share = f"{floor(1000 * cause['error_share']) / 10:g} % of the mean squared error without {left_out}"
     limit = "" if facts.is_measured else "at most "
-    return f"{share} ({limit}{100 * cause['noise_share']:.2g} % of it is noise)"
+    return f"{share} (noise: {limit}{100 * cause['noise_share']:.2g} %)"
 
 
 def _name_values(facts: DiagnosisFacts, effect: Document) -> str:
@@ -639,9 +648,9 @@ VERDICTS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
 DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "shares",
-        lambda facts: sum(each["family"] not in (_TERM, _GROSS) for each in facts.causes) > 1,
+        lambda facts: facts.has_several_shares,
         lambda _: (
-            "Each share is that of the misfit that is left without the effect, so that shares do not add up."
+            "Each share is that of the error with all effects but this one, so that the shares do not add up."
         ),
     ),
     Statement("second-input", lambda facts: facts.second_inputs, _describe_second_input),
@@ -660,7 +669,9 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "terms-share",
         lambda facts: facts.terms and facts.terms[0].get("error_share") is not None,
-        lambda facts: f"All terms and effects together explain {_write_shares(facts, facts.terms[0])}.",
+        lambda facts: (
+            f"All terms and effects together explain {_write_shares(facts, facts.terms[0], 'them')}."
+        ),
     ),
     Statement("equations", lambda facts: facts.discovered is not None, _describe_equations),
     Statement(

@@ -76,7 +76,7 @@ def test_a_cause_that_others_exceed_is_uncertain():
         "There is a discrepancy, whose cause is uncertain: the most probable one explains it."
     )
     assert "The simulation lacks" not in said
-    assert "0.36, 99 % of the misfit above the noise floor; confounded with sensor-lag" in said
+    assert "0.36, 99 % of the misfit above the noise floor; this record does not distinguish it from sensor-lag" in said
 
 
 def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
@@ -89,10 +89,11 @@ def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
         "occurs_in": "sampling and communication",
     }
     bound = text("named", effects=[explained], gain=GAIN)
-    assert "98.7 % of the mean squared error (at most 0.49 % of it is noise). The input acts later" in bound
+    share = "explains 98.7 % of the mean squared error without it"
+    assert f"{share} (noise: at most 0.49 %). The input acts later" in bound
     assert "Distinguished by: a phase that grows with the frequency. Occurs in: sampling" in bound
     measured = text("named", effects=[explained], gain=GAIN, noise_floor_is="measured by repeated periods")
-    assert "98.7 % of the mean squared error (0.49 % of it is noise)" in measured
+    assert f"{share} (noise: 0.49 %)" in measured
     assert "Occurs in" not in text("named", effects=[{**explained, "claimed": False}], gain=GAIN)
     # Gains and parameters look alike: nothing in the record distinguishes them.
     assert "Distinguished by" not in text("named", effects=[{**explained, "family": "scale"}], gain=GAIN)
@@ -133,7 +134,13 @@ def test_terms_are_named_with_their_equations_and_share_one_part_of_the_error():
     said = text("discovered", effects=terms, gain=GAIN)
     assert "missing-term a1*u in output; confidence 0.98\n" in said
     assert said.count("of the mean squared error") == 1
-    assert "All terms and effects together explain 98 % of the mean squared error" in said
+    assert "All terms and effects together explain 98 % of the mean squared error without them" in said
+    # The share of an effect is that of another error, and may exceed the share of all causes together.
+    effect = {**CAUSE, "error_share": 0.99, "noise_share": 0.01}
+    both = text("discovered", effects=[*terms, effect], gain=GAIN)
+    assert "explains 99 % of the mean squared error without it" in both
+    assert "so that the shares do not add up." in both
+    assert "do not add up" not in said
 
 
 def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
@@ -263,8 +270,8 @@ def test_contradictions_are_found():
         "The simulation lacks a known effect, confidence 0.31, 99 % of the misfit above the noise floor"
     )
     assert find_contradictions(
-        "The simulation lacks a known effect, confidence 0.31, 99 % of the mean squared error (1 % of it is "
-        "noise)"
+        "The simulation lacks a known effect, confidence 0.31, explains 99 % of the mean squared error "
+        "without it (noise: 1 %)"
     )
     assert find_contradictions("The noise floor is 0.2 um, noise floor (upper bound) 0.3")
 
