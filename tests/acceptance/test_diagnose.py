@@ -137,7 +137,10 @@ def test_file_for_validation_is_held_out_as_a_whole(offset_record: Path) -> None
         )
     document = json.loads((offset_record / "held/discrepancy.json").read_text())
     assert document["record"]["segments"] == [300, 100]
-    assert "On the last recording, excluded from fitting" in (offset_record / "held/report.html").read_text()
+    assert (
+        "On the validation recording, excluded from fitting"
+        in (offset_record / "held/report.html").read_text()
+    )
     planned = fail("diagnose", other, *options, "--plan", "--validation", other, "--out", offset_record / "p")
     assert "--validation is for a diagnosis" in planned
 

@@ -61,7 +61,7 @@ _WHOLE = r"explains? (the discrepancy|it)[.;]"
 EXCLUSIVE_OF_DIAGNOSES = (
     (
         r"No significant discrepancy",
-        r"(There is a (significant )?discrepancy|The simulation lacks|is wrong, which)",
+        r"(There is a (significant )?discrepancy|simulation (probably )?lacks|is (probably )?wrong, which)",
     ),
     (r"No significant discrepancy", r"the RMSE (falls|does not fall)"),
     (r"No significant discrepancy", r"(The remaining residual depends|none of which is confirmed)"),
@@ -77,8 +77,8 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"the RMSE falls from", r"by -[\d.]+ %"),
     (r"the RMSE falls from [^%]*%", r"\((-[\d.]+ to|[\d.]+ to -)[^()]* with 95 % confidence\)"),
     (r"does not fall significantly", r"a reduction of [\d.]+ % \([\d.]*[1-9][\d.]* to"),
-    (r"The simulation lacks (a )?known effects?", _UNLIKELY),
-    (r"is wrong, which explains", _UNLIKELY),
+    (r"The simulation (probably )?lacks (a )?known effects?", _UNLIKELY),
+    (r"is (probably )?wrong, which explains", _UNLIKELY),
     (r"(causes are|cause is) uncertain: (?!.*confidence (below )?0\.[0-4])", r""),
     (
         r"no known effect is confirmed",
@@ -89,12 +89,16 @@ EXCLUSIVE_OF_DIAGNOSES = (
         r"(No significant discrepancy|explains? (most of |a part of |)(it|the discrepancy)|the RMSE falls)",
     ),
     (r"significant structure remains(?!.*(The remaining residual depends|A flexible model of))", r""),
-    (r"Record and simulation do not match", r"(The simulation lacks|No significant|the RMSE (falls|is))"),
+    (
+        r"Record and simulation do not match",
+        r"(The simulation (probably )?lacks|No significant|the RMSE (falls|is))",
+    ),
+    (r"No significant discrepancy: .*the stated noise", r"The stated noise is"),
     (r"Known effects alone explain less", r"(the score is worse by -|that explain the record as well)"),
     (r"the RMSE is (below it|at the floor)", _FAR),
     (r"(is|,) a rounding error", r"the RMSE is [\d.e+]+ times the floor"),
     (_FAR, r"(What remains counts as coloured noise|The noise is large)"),
-    (r"measured from repeated periods", r"because the record has no repeated periods"),
+    (r"measured from repeated periods", r"(an upper bound|that repeats three times would)"),
     (r"no effect alone improves the fit", r"none of which is confirmed"),
 )
 

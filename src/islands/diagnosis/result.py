@@ -154,4 +154,4 @@ class Diagnosis:
         if not self.record.held_out:
             return "the last quarter of the record"
         count = len(self.record[self.estimation_samples :].rows_by_recording)
-        return "the last recording" if count == 1 else f"the last {count} recordings"
+        return "the validation recording" if count == 1 else f"the {count} validation recordings"

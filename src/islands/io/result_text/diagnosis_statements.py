@@ -19,6 +19,9 @@ _WHOLE, _MOST = 0.9, 0.5
 #: Confidence below which other causes together are more probable.
 _CERTAIN = 0.5
 
+#: Confidence below which a cause is called probable.
+_SURE = 0.9
+
 #: Ratio of an error and the noise floor up to which the error is that of the noise.
 _NOISE_RATIO = 1.2
 
@@ -51,6 +54,13 @@ _SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
 
 #: Effect of a channel that acts where the input does.
 _SECOND_INPUT = "second-input"
+
+#: Names of the coefficients of coloured noise in a sentence.
+_COEFFICIENTS: Final = {
+    "pole": "largest pole",
+    "order": "order of the autoregression",
+    "difference order": "order of the long memory",
+}
 
 #: Effect of a wrong form of an identified model.
 _FORM = "core-shape"
@@ -133,6 +143,11 @@ class DiagnosisFacts:
         return all(round(each["confidence"], 2) >= _CERTAIN for each in self.claimed)
 
     @property
+    def is_sure(self) -> bool:
+        """Whether all other causes together are improbable next to each claimed one, as it is written."""
+        return all(round(each["confidence"], 2) >= _SURE for each in self.claimed)
+
+    @property
     def has_gain(self) -> bool:
         """Whether the effects reduce the error of the held-out data, with 95 % confidence."""
         return self.gain is not None and self.gain["ci95"][0] > 0.0
@@ -158,6 +173,19 @@ class DiagnosisFacts:
         """Error of the calibrated simulation without effects on the held-out data; None if it is unknown."""
         found: float | None = self.document.get("calibrated_rmse")
         return found
+
+    @property
+    def calibrated(self) -> str:
+        """Values of the parameters of the extended simulation.
+
+        The initial states are those of the record, and the coefficients of terms are stated with them.
+        """
+        coefficients = {name for term in self.terms for name in term["parameters"]}
+        return ", ".join(
+            f"{name} = {value:.4g}"
+            for name, value in (self.document.get("calibrated") or {}).items()
+            if name not in coefficients and not name.startswith("initial ")
+        )
 
     @property
     def error(self) -> float | None:
@@ -209,6 +237,17 @@ class DiagnosisFacts:
         """Size and correlation time of the residual; None in documents of earlier versions."""
         found: Document | None = self.document.get("noise_claim")
         return found
+
+    @property
+    def stated_noise(self) -> float:
+        """Standard deviation of the noise that the user stated; zero if it is unknown."""
+        return (self.noise_claim or {}).get("noise_level") or 0.0
+
+    @property
+    def is_above_stated_noise(self) -> bool:
+        """Whether a finding compares the residual with the stated noise."""
+        findings = self.document.get("record_findings", ())
+        return any(each["name"] == "above-noise-level" for each in findings)
 
     @property
     def is_gross(self) -> bool:
@@ -320,14 +359,16 @@ def _describe_noise_claim(facts: DiagnosisFacts) -> str:
 
 def _describe_named(facts: DiagnosisFacts) -> str:
     extent = f"{_describe_extent(facts)}{_describe_rest(facts)}"
+    probably = "" if facts.is_sure else "probably "
     if all(each["name"] == _FORM for each in facts.claimed):
-        return f"The form of the model is wrong, which explains {extent}."
+        return f"The form of the model is {probably}wrong, which explains {extent}."
     if all(each["family"] == _SCALE for each in facts.claimed):
-        return f"A gain or a parameter of the simulation is wrong, which explains {extent}."
+        return f"A gain or a parameter of the simulation is {probably}wrong, which explains {extent}."
     if len(facts.claimed) == 1:
         others = ", with those that are not claimed," if facts.has_others else ""
-        return f"The simulation lacks a known effect, which{others} explains {extent}."
-    return f"The simulation lacks {'' if facts.free_forms else 'known '}effects, which explain {extent}."
+        return f"The simulation {probably}lacks a known effect, which{others} explains {extent}."
+    known = "" if facts.free_forms else "known "
+    return f"The simulation {probably}lacks {known}effects, which explain {extent}."
 
 
 def _describe_rest(facts: DiagnosisFacts) -> str:
@@ -445,8 +486,19 @@ def _describe_second_input(facts: DiagnosisFacts) -> str:
 
 
 def _describe_noise(facts: DiagnosisFacts) -> str:
-    listed = (f"{_name_values(facts, each)}, {_describe_confidence(each)}" for each in facts.noise)
+    named = map(_name_coefficients, facts.noise)
+    listed = (f"{_name_values(facts, each)}, {_describe_confidence(each)}" for each in named)
     return f"Sampling and noise: {'; '.join(listed)}."
+
+
+def _name_coefficients(effect: Document) -> Document:
+    """Return an effect with names for the coefficients of coloured noise, without an order of zero."""
+    parameters = {
+        _COEFFICIENTS.get(name, name): each
+        for name, each in effect["parameters"].items()
+        if name != "difference order" or each["value"]
+    }
+    return {**effect, "parameters": parameters}
 
 
 def _describe_record(facts: DiagnosisFacts) -> str:
@@ -465,20 +517,20 @@ def _describe_equations(facts: DiagnosisFacts) -> str:
 
 def _describe_extended_simulation(facts: DiagnosisFacts) -> str:
     names = " and ".join(dict.fromkeys(each["name"] for each in facts.causes))
-    values = facts.document["calibrated"]
-    calibrated = f"; {', '.join(f'{name} = {value:.4g}' for name, value in values.items())}" if values else ""
+    calibrated = f"; {facts.calibrated}" if facts.calibrated else ""
     return f"Extended simulation: {facts.document['equations']}{calibrated}; with {names}."
 
 
 def _describe_nearest_to_terms(facts: DiagnosisFacts) -> str:
     assert facts.discovered is not None
     others = " and ".join(facts.discovered["nearest"])
-    return f"With {others} instead of the terms, the score is worse by {facts.discovered['worse_by']:.0f}."
+    worse = f"{facts.discovered['worse_by']:.0f}"
+    return f"With {others} instead of the terms, the score is worse by {worse} (BIC; 10 is decisive)."
 
 
 def _describe_nearest(facts: DiagnosisFacts) -> str:
     listed = ", ".join(f"{each['name']} (score {each['score']:.1f})" for each in facts.nearest)
-    return f"Nearest effects, none of which is confirmed: {listed}."
+    return f"Nearest effects, none of which is confirmed (score: decrease of the BIC): {listed}."
 
 
 def _describe_remainder(facts: DiagnosisFacts) -> str:
@@ -537,12 +589,16 @@ def compare_with_output(facts: DiagnosisFacts) -> str | None:
 
 
 def _describe_noise_floor(facts: DiagnosisFacts) -> str:
+    bound = "" if facts.is_measured else "an upper bound of "
     origin = (
-        "measured from repeated periods"
+        ", measured from repeated periods"
         if facts.is_measured
-        else "an upper bound, because the record has no repeated periods"
+        else " (an input that repeats three times would measure it)"
     )
-    return f"The noise floor is {facts.write_error(facts.floor)}, {origin}{_compare_with_floor(facts)}."
+    return (
+        f"The noise floor is {facts.write_error(facts.floor)}, {bound}the RMSE that no simulation is "
+        f"expected to undercut{origin}{_compare_with_floor(facts)}."
+    )
 
 
 def _compare_with_floor(facts: DiagnosisFacts) -> str:
@@ -553,6 +609,12 @@ def _compare_with_floor(facts: DiagnosisFacts) -> str:
         return "; the RMSE is below it"
     times = "at" if ratio <= _NOISE_RATIO else f"{ratio:.3g} times"
     return f"; the RMSE is {times} the floor"
+
+
+def _describe_stated_noise(facts: DiagnosisFacts) -> str:
+    assert facts.error is not None
+    level = facts.stated_noise
+    return f"The stated noise is {facts.write_error(level)}; the RMSE is {facts.error / level:.3g} times it."
 
 
 def _describe_large_noise(facts: DiagnosisFacts) -> str:
@@ -676,8 +738,15 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement("equations", lambda facts: facts.discovered is not None, _describe_equations),
     Statement(
         "extended-simulation",
-        lambda facts: facts.gain is not None and facts.discovered is None and facts.document.get("equations"),
+        lambda facts: (
+            facts.gain is not None and facts.verdict != "discovered" and facts.document.get("equations")
+        ),
         _describe_extended_simulation,
+    ),
+    Statement(
+        "calibrated",
+        lambda facts: facts.verdict == "discovered" and facts.calibrated,
+        lambda facts: f"Calibrated with them: {facts.calibrated}.",
     ),
     Statement(
         "nearest-to-terms",
@@ -713,8 +782,8 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         "one-record",
         lambda facts: facts.has_gain and facts.is_one_record,
         lambda _: (
-            "Causes and gain rest on one record: diagnose it with a second one, with another input, as "
-            "validation data before the extended simulation is used elsewhere."
+            "Causes and gain rest on one record. Before you use the extended simulation elsewhere, record "
+            "another input and diagnose again with the second record as validation data (--validation)."
         ),
     ),
     Statement(
@@ -728,6 +797,16 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: str(facts.document["extension"]["refusal"]),
     ),
     Statement("noise-floor", lambda facts: not facts.is_gross, _describe_noise_floor),
+    Statement(
+        "stated-noise",
+        # The findings and the verdict compare them already, the findings on the samples used for estimation.
+        lambda facts: (
+            facts.stated_noise
+            and facts.error is not None
+            and not (facts.is_gross or facts.is_above_stated_noise or facts.verdict == "nothing")
+        ),
+        _describe_stated_noise,
+    ),
     Statement("large-noise", lambda facts: facts.has_large_noise, _describe_large_noise),
     Statement(
         "experiment",

@@ -107,7 +107,7 @@ def test_recording_that_is_held_out_as_a_whole_is_no_part_of_an_estimate() -> No
     )
     assert [each.name for each in one.effects] == ["cubic-stiffness"]
     assert one.estimation_samples == 400
-    assert one.held_out_part == "the last recording"
+    assert one.held_out_part == "the validation recording"
     np.testing.assert_array_equal(one.best.values[:4], two.best.values[:4])
     assert one.gain is not None
     assert one.gain.after.rmse == pytest.approx(SIGMA, rel=0.2)

@@ -76,7 +76,17 @@ def test_a_cause_that_others_exceed_is_uncertain():
         "There is a discrepancy, whose cause is uncertain: the most probable one explains it."
     )
     assert "The simulation lacks" not in said
-    assert "0.36, 99 % of the misfit above the noise floor; this record does not distinguish it from sensor-lag" in said
+    share = "0.36, 99 % of the misfit above the noise floor"
+    assert f"{share}; this record does not distinguish it from sensor-lag" in said
+
+
+@pytest.mark.parametrize(("confidence", "said"), [(0.5, "probably lacks"), (0.9, "lacks")])
+def test_a_cause_next_to_other_probable_ones_is_called_probable(confidence, said):
+    causes = [CAUSE, {**CAUSE, "name": "jump", "confidence": confidence}]
+    assert text("named", effects=causes, gain=GAIN).startswith(f"The simulation {said} known effects, which")
+    assert text("named", effects=causes[1:], gain=GAIN).startswith(
+        f"The simulation {said} a known effect, which"
+    )
 
 
 def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
@@ -102,6 +112,14 @@ def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
 def test_the_extended_simulation_is_stated_with_its_values():
     said = text("named", effects=[CAUSE], gain=GAIN, equations="dx/dt = u - k*x", calibrated={"k": 2.0})
     assert "Extended simulation: dx/dt = u - k*x; k = 2; with delay." in said
+    states = {"k": 2.0, "initial x": 0.3}
+    assert "k = 2; with delay." in text(
+        "named", effects=[CAUSE], gain=GAIN, equations="dx/dt = u - k*x", calibrated=states
+    )
+    term = {**CAUSE, "name": "missing-term", "family": "discovered", "term": "a1*u in output"}
+    term["parameters"] = {"a1": _value(4.0, "N")}
+    found = text("discovered", effects=[term], gain=GAIN, calibrated={**states, "a1": 4.0})
+    assert "Calibrated with them: k = 2." in found
     assert "Extended simulation" not in text("unknown", equations="dx/dt = u - k*x", calibrated={"k": 2.0})
 
 
@@ -113,7 +131,7 @@ def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
 
 def test_a_gain_on_one_record_asks_for_another_one():
     assert "Causes and gain rest on one record" in text("named", effects=[CAUSE], gain=GAIN)
-    second = text("named", effects=[CAUSE], gain=GAIN, held_out_part="the last recording")
+    second = text("named", effects=[CAUSE], gain=GAIN, held_out_part="the validation recording")
     assert "Causes and gain rest on one record" not in second
     assert "rest on one record" not in text("unknown")
 
@@ -149,6 +167,35 @@ def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
     assert "; the RMSE is at the floor" in near
     far = text("nothing", calibrated_rmse=0.2)
     assert far.startswith("No significant discrepancy in the samples used for estimation, but the error of")
+
+
+def test_the_noise_floor_is_defined_and_says_how_it_is_measured():
+    bound = text("nothing")
+    assert (
+        "The noise floor is 0.01 um, an upper bound of the RMSE that no simulation is expected to undercut "
+        "(an input that repeats three times would measure it); the RMSE is" in bound
+    )
+    measured = text("nothing", noise_floor_is="measured by repeated periods")
+    assert "expected to undercut, measured from repeated periods; the RMSE is" in measured
+
+
+def test_the_stated_noise_is_compared_with_the_error_once():
+    claim = {"rms": 0.0123, "correlation_time": 0.0, "noise_level": 0.01}
+    said = "The stated noise is 0.01 um; the RMSE is 1.1 times it."
+    assert said in text("named", effects=[CAUSE], gain=GAIN, noise_claim=claim)
+    assert "The stated noise is" not in text("nothing", noise_claim=claim)
+    finding = {"name": "above-noise-level", "description": "Loud.", "advice": "Measure.", "errors": None}
+    assert "The stated noise is" not in text("unknown", noise_claim=claim, record_findings=[finding])
+    assert "The stated noise is" not in text("named", effects=[CAUSE], gain=GAIN)
+
+
+def test_coefficients_of_coloured_noise_have_names():
+    values = {"pole": _value(0.83, ""), "order": _value(7.0, ""), "difference order": _value(0.0, "")}
+    noise = {**CAUSE, "name": "coloured-noise", "eta": None, "parameters": values}
+    said = text("nothing", effects=[noise])
+    assert "coloured-noise: largest pole = 0.83, order of the autoregression = 7, confidence" in said
+    values["difference order"] = _value(0.3, "")
+    assert "order of the long memory = 0.3" in text("nothing", effects=[noise])
 
 
 def test_large_noise_may_hide_a_discrepancy():
@@ -188,7 +235,8 @@ def test_the_nearest_effects_of_an_unknown_cause_improve_the_fit():
         {"name": name, "score": score, "eta": 1.0} for name, score in (("delay", 3.0), ("jump", -1.0))
     )
     said = text("unknown", candidates=[near, far], remainder={"output": 5.3})
-    assert "Nearest effects, none of which is confirmed: delay (score 3.0)." in said
+    nearest = "Nearest effects, none of which is confirmed (score: decrease of the BIC):"
+    assert f"{nearest} delay (score 3.0)." in said
     assert "The remaining residual depends on (standard deviations beyond chance): output (5.3)." in said
     assert "No effect alone improves the fit" in text("unknown", candidates=[far])
 
