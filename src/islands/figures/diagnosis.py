@@ -1,6 +1,7 @@
 """Figures of a diagnosis: simulation and residual before and after extension, and screened effects."""
 
 from collections.abc import Callable, Mapping
+from math import floor
 from types import MappingProxyType
 
 import numpy as np
@@ -76,7 +77,7 @@ def draw_over_time(diagnosis: Diagnosis) -> Figure:
         )
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
     axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
-    axes[-1].set_xlabel("time (s); shaded: hold-out data")
+    axes[-1].set_xlabel("time (s); shaded: excluded from fitting")
     figure.align_ylabels()
     return finish(figure)
 
@@ -151,7 +152,7 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     axes.axvline(0.0, color=FRAME, lw=0.6)
     for place, candidate in zip(places, shown, strict=True):
         axes.annotate(
-            f"{100 * candidate.explained_fraction:.0f} %",
+            f"{floor(100 * candidate.explained_fraction)} %",
             (max(candidate.score, 0.0), float(place)),
             xytext=(4, 0),
             textcoords="offset points",
@@ -161,7 +162,9 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     axes.margins(x=0.12)
     axes.set_xlim(left=1.05 * min(0.0, *gains))
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("decrease of -2 log-likelihood after penalty; percent: explained misfit; coloured: named")
+    axes.set_xlabel(
+        "score (decrease of the BIC); per cent: share of the misfit above the floor; coloured: named"
+    )
     return finish(figure)
 
 

@@ -24,12 +24,12 @@ from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {
-    "over-time": "Measured and simulated output, and the residual",
+    "over-time": "Measured and simulated output, and the residual (measured minus simulated)",
     "shape": "Shape of the effect, and of a free curve in its place",
     "free-forms": "Values of the free forms",
     "loops": "Output over input, and the residual over the input",
     "residual": "Structure of the residual",
-    "ladder": "Gain of each effect alone",
+    "ladder": "Score of each effect alone",
 }
 
 #: Screened effects in the table of the report.
@@ -96,7 +96,7 @@ def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[st
     columns = ("error", f"RMSE ({unit})" if unit else "RMSE")
     rows = [("as given", f"{document['as_given_rmse']:.4g}")]
     if gain:
-        columns += ("MAPE, % of the range",)
+        columns += ("mean absolute error, % of the output range",)
         rows[0] += ("",)
         rows += [
             (name, f"{errors['rmse']:.4g}", f"{errors['mape']:.3g}")
