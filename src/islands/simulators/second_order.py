@@ -17,6 +17,10 @@ FREQUENCY_COUNT = 40
 #: Damping ratios on the grid of starting points.
 DAMPING_RATIOS = (0.003, 0.02, 0.1, 0.4, 1.0)
 
+#: Largest natural frequency, and damping relative to the mass, of an estimate, relative to the sampling rate.
+#: The samples do not determine faster ones, which diverge in one Runge-Kutta step per sample.
+FASTEST = 2.5
+
 #: Number of the best starting points that are refined.
 REFINED_STARTS = 3
 
@@ -60,7 +64,7 @@ def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, f
     scale_known = any(given.values())
 
     def solve_linear(point: Signal) -> tuple[Signal, Signal]:
-        system = _make_parameters(point, given)
+        system = _make_parameters(point, given, FASTEST / dt)
         columns = _make_responses(u, dt, *system)
         if scale_known:
             fixed = columns[:, 0] / system[0]
@@ -87,7 +91,7 @@ def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, f
     ]
     best = min(found, key=lambda each: float(each.cost)).x
     _, weights = solve_linear(best)
-    mass, damping, stiffness = _make_parameters(best, given)
+    mass, damping, stiffness = _make_parameters(best, given, FASTEST / dt)
     if not scale_known:
         if weights[0] == 0.0:
             raise RecordError(
@@ -97,9 +101,14 @@ def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, f
     return SecondOrder(mass, damping, stiffness, float(weights[1]), float(weights[2]))
 
 
-def _make_parameters(point: Signal, given: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return mass, damping and stiffness from the logarithms of natural frequency and damping ratio."""
+def _make_parameters(point: Signal, given: Mapping[str, float], fastest: float) -> tuple[float, float, float]:
+    """Return mass, damping and stiffness from the logarithms of natural frequency and damping ratio.
+
+    The natural frequency and the damping relative to the mass are at most ``fastest``, in 1/s.
+    """
     frequency, damping = np.exp(np.clip(point, -40.0, 40.0))
+    frequency = min(frequency, fastest)
+    damping = min(damping, fastest / (2.0 * frequency))
     if "m" in given:
         mass = given["m"]
     elif given.get("k"):

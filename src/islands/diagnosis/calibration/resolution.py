@@ -49,4 +49,5 @@ def measure_resolution(y: Signal) -> float:
 
 def is_unresolved(change: Signal, resolution: float) -> bool:
     """Return whether a signal, such as a residual, is below the resolution; missing samples do not count."""
-    return float(np.sqrt(np.nanmean(change**2))) <= UNRESOLVED_RMS * resolution
+    known = change[~np.isnan(change)]
+    return known.size > 0 and float(np.sqrt(np.mean(known**2))) <= UNRESOLVED_RMS * resolution

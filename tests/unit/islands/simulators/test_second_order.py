@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError
-from islands.simulators.second_order import SecondOrder, estimate_second_order
+from islands.simulators.second_order import FASTEST, SecondOrder, estimate_second_order
 from support.strategies import part_of_the_examples
 
 Array = NDArray[np.float64]
@@ -105,6 +105,16 @@ def test_given_zero_does_not_determine_the_scale(name: str) -> None:
     assert (found.mass, found.damping, found.stiffness) == pytest.approx(
         (truth.mass, truth.damping, truth.stiffness), rel=1e-4
     )
+
+
+def test_estimate_is_not_faster_than_the_samples() -> None:
+    rng = np.random.default_rng(3)
+    u = np.cumsum(rng.standard_normal(800))
+    # A static response: any fast system explains it.
+    found = estimate_second_order(u, 0.5 * u + 0.01 * rng.standard_normal(800), 0.01, {})
+    assert found.stiffness == pytest.approx(2.0, rel=0.05)
+    assert found.damping / found.mass <= FASTEST / 0.01 * (1.0 + 1e-9)
+    assert (found.stiffness / found.mass) ** 0.5 <= FASTEST / 0.01 * (1.0 + 1e-9)
 
 
 def test_zero_mass_is_refused() -> None:
