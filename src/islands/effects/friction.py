@@ -42,7 +42,7 @@ COULOMB_FRICTION = Effect(
     ),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="backlash, second-hysteresis",
-    distinguished_by="a step of the residual at rate zero",
+    distinguished_by="a step of the residual where the rate x' changes its sign",
     occurs_in="guides, bearings, seals, brushes and their preload",
 )
 

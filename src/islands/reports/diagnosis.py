@@ -94,7 +94,9 @@ def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[st
         return columns, rows, "Both are errors over the samples used for estimation."
     unit, gain = document["record"]["units"]["output"], document["gain"]
     columns = ("error", f"RMSE ({unit})" if unit else "RMSE")
-    rows = [("as given", f"{document['as_given_rmse']:.4g}")]
+    # A recorded column has nothing to calibrate.
+    given = "as given" if document.get("calibrated") == {} else "before the calibration"
+    rows = [(given, f"{document['as_given_rmse']:.4g}")]
     if gain:
         columns += ("mean absolute error, % of the output range",)
         rows[0] += ("",)

@@ -67,11 +67,11 @@ class LinearSimulator(Simulator):
 
     @property
     def equations(self) -> str:
-        """Difference equation of deviations from the level and the reference input."""
+        """Difference equation, and where output and input are counted from."""
         inputs = [f"b{lag} u({_write_time(self.delay + lag)})" for lag in range(self.numerator.size)]
         outputs = [f"a{lag} y({_write_time(lag)})" for lag in range(1, self.denominator.size + 1)]
         terms = " + ".join([*outputs, *inputs])
-        return f"y(k) = {terms}, as deviations from the level and {self.reference_input:g}"
+        return f"y(k) = {terms}, where y is counted from the level and u from {self.reference_input:g}"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", self._list_parameters())

@@ -5,6 +5,7 @@ folder, the REST service, the page, the report and a notebook state the same. St
 those of the held-out data, which may disagree with the samples used for estimation.
 """
 
+import re
 from collections.abc import Callable
 from functools import cached_property
 from math import ceil, floor, log10
@@ -54,6 +55,12 @@ _SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
 
 #: Effect of a channel that acts where the input does.
 _SECOND_INPUT = "second-input"
+
+#: Pattern of the names of initial states.
+_INITIAL: Final = r"initial |state \d"
+
+#: Simulations in which forces act on the output, and those to whose output forces of the input are added.
+_ON_OUTPUT, _ON_INPUT = ("second-order", "rigid-axis"), ("bouc-wen-piezo", "linear", "column")
 
 #: Names of the coefficients of coloured noise in a sentence.
 _COEFFICIENTS: Final = {
@@ -175,6 +182,17 @@ class DiagnosisFacts:
         return found
 
     @property
+    def coordinate(self) -> str:
+        """What x is in the formulas of the claimed effects; empty if they have none, or if it is unknown."""
+        kind = re.split("[: ]", self.document.get("simulation", ""))[0]
+        if not any(re.search(r"\bx('|\b)", each.get("summary", "")) for each in self.claimed):
+            return ""
+        names = self.document["record"]["names"]
+        if kind in _ON_OUTPUT:
+            return f"x is the output, {names['output']}, and x' its rate"
+        return f"x is the input, {names['inputs'][0]}, and x' its rate" if kind in _ON_INPUT else ""
+
+    @property
     def calibrated(self) -> str:
         """Values of the parameters of the extended simulation.
 
@@ -184,7 +202,7 @@ class DiagnosisFacts:
         return ", ".join(
             f"{name} = {value:.4g}"
             for name, value in (self.document.get("calibrated") or {}).items()
-            if name not in coefficients and not name.startswith("initial ")
+            if name not in coefficients and not re.match(_INITIAL, name)
         )
 
     @property
@@ -715,6 +733,9 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
             "Each share is that of the error with all effects but this one, so that the shares do not add up."
         ),
     ),
+    Statement(
+        "coordinate", lambda facts: facts.coordinate, lambda facts: f"In the formulas, {facts.coordinate}."
+    ),
     Statement("second-input", lambda facts: facts.second_inputs, _describe_second_input),
     Statement("noise", lambda facts: facts.noise, _describe_noise),
     Statement("record", lambda facts: facts.document.get("record_findings"), _describe_record),
@@ -745,8 +766,8 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     ),
     Statement(
         "calibrated",
-        lambda facts: facts.verdict == "discovered" and facts.calibrated,
-        lambda facts: f"Calibrated with them: {facts.calibrated}.",
+        lambda facts: _has("discovered", "nothing", "noise")(facts) and facts.calibrated,
+        lambda facts: f"Calibrated{'' if facts.gain is None else ' with them'}: {facts.calibrated}.",
     ),
     Statement(
         "nearest-to-terms",
@@ -806,6 +827,14 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
             and not (facts.is_gross or facts.is_above_stated_noise or facts.verdict == "nothing")
         ),
         _describe_stated_noise,
+    ),
+    Statement(
+        "noise-record",
+        lambda facts: facts.verdict == "noise" and not facts.is_far,
+        lambda _: (
+            "To decide it, record the output at rest and diagnose again with its standard deviation as the "
+            "noise level (--noise-level)."
+        ),
     ),
     Statement("large-noise", lambda facts: facts.has_large_noise, _describe_large_noise),
     Statement(

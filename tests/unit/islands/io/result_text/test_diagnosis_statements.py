@@ -41,6 +41,8 @@ def test_noise_for_which_nothing_decides_is_left_to_the_user():
         "No cause is found, and the residual is not white: the simulation is correct if noise of 0.012 um "
         "with a correlation time of 0.32 s is plausible for your sensor."
     )
+    assert "record the output at rest" in text("noise")
+    assert "record the output at rest" not in text("nothing")
     claim = {"rms": 0.0123, "correlation_time": 0.318, "noise_level": 0.01}
     assert "within the stated noise of 0.01 um" in describe_verdict(
         make_document("nothing", noise_claim=claim)
@@ -127,6 +129,26 @@ def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
     cause = {**CAUSE, "name": "gain-step", "depends_on_time": True}
     assert "gain-step: a function of the time of this record" in text("named", effects=[cause], gain=GAIN)
     assert "function of the time" not in text("named", effects=[CAUSE], gain=GAIN)
+
+
+def test_agreement_is_stated_with_the_calibrated_values():
+    values = {"k": 2.0, "initial x": 0.3, "state 1 (recording 2)": 0.1}
+    assert "Calibrated: k = 2." in text("nothing", calibrated=values)
+    assert "Calibrated" not in text("unknown", calibrated=values)
+
+
+@pytest.mark.parametrize(
+    ("simulation", "said"),
+    [
+        ("second-order", "In the formulas, x is the output, travel_um, and x' its rate."),
+        ("linear:2", "In the formulas, x is the input, force_N, and x' its rate."),
+    ],
+)
+def test_the_coordinate_of_a_force_is_named(simulation, said):
+    friction = {**CAUSE, "summary": "Dry friction: - F sign(x')", "distinguished_by": "", "occurs_in": ""}
+    assert said in text("named", effects=[friction], gain=GAIN, simulation=simulation)
+    assert "In the formulas" not in text("named", effects=[friction], gain=GAIN, simulation="fmu")
+    assert "In the formulas" not in text("named", effects=[CAUSE], gain=GAIN, simulation=simulation)
 
 
 def test_a_gain_on_one_record_asks_for_another_one():
