@@ -53,6 +53,12 @@ _NEAREST = 3
 #: Families of causes: wrong gains and parameters, terms that were found, gross errors of the record.
 _SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
 
+#: Effects that limit the input and its rate.
+_SATURATION, _RATE_LIMIT = "input-saturation", "rate-limit"
+
+#: Ratio of the errors on the held-out data and in the samples used for estimation that noise does not have.
+_GROWTH = 1.5
+
 #: Effect of a channel that acts where the input does.
 _SECOND_INPUT = "second-input"
 
@@ -128,6 +134,28 @@ class DiagnosisFacts:
         """Whether several shares are stated, each of another error. The terms have one in common."""
         shares = sum(each["family"] not in (_TERM, _GROSS) for each in self.causes)
         return shares + bool(shares and self.terms) > 1
+
+    @property
+    def input_limits(self) -> list[tuple[str, float]]:
+        """Name of each claimed cause that limits the first input or its rate, and the limit."""
+        ranges = (self.document.get("extension") or {}).get("ranges")
+        found = []
+        for each in self.claimed:
+            values = each["parameters"]
+            if each["name"] == _SATURATION and ranges:
+                peak = max(abs(ranges[0]["low"]), abs(ranges[0]["high"]))
+                found.append((_SATURATION, peak * (1.0 - values["cut"]["value"])))
+            if each["name"] == _RATE_LIMIT and values["inverse_rate"]["value"] > 0.0:
+                found.append((_RATE_LIMIT, 1.0 / values["inverse_rate"]["value"]))
+        return found
+
+    @property
+    def grows(self) -> bool:
+        """Whether an error that may be noise is larger on the held-out data than in the samples before."""
+        if self.noise_claim is None or self.error is None:
+            return False
+        is_larger = self.error > _GROWTH * float(self.noise_claim["rms"])
+        return self.verdict == "noise" and not self.is_far and is_larger
 
     @property
     def has_others(self) -> bool:
@@ -459,7 +487,7 @@ def _describe_share(facts: DiagnosisFacts, cause: Document) -> str:
 def _write_shares(facts: DiagnosisFacts, cause: Document, left_out: str) -> str:
     """Write the explained share of the mean squared error, and the share of the noise in it.
 
-    Each share has an error of its own as its reference, that without the named causes.
+    The reference of a share is the error without the causes that it belongs to.
     """
     share = f"{floor(1000 * cause['error_share']) / 10:g} % of the mean squared error without {left_out}"
     limit = "" if facts.is_measured else "at most "
@@ -496,6 +524,27 @@ def write_value(given: Document, is_exact: bool = False) -> str:
         width = f"+/- {(high - low) / 2:.1g}" if is_exact else "not determined by the record"
         return f"{value:.4g}{unit} ({width})"
     return f"{value:.{digits}g}{unit} ({low:.{digits}g} to {high:.{digits}g})"
+
+
+def _describe_input_limits(facts: DiagnosisFacts) -> str:
+    """State the limits of the first input in its unit: `cut` is relative to a peak, and a rate is inverse."""
+    name, unit = (facts.document["record"][key]["inputs"][0] for key in ("names", "units"))
+    texts = []
+    for cause, value in facts.input_limits:
+        of, per = ("", unit) if cause == _SATURATION else ("the rate of ", f"{unit or '1'}/s")
+        texts.append(f"{cause} limits {of}{name} to {write_amount(float(f'{value:.4g}'), per)}")
+    return f"{'; '.join(texts)}."
+
+
+def _describe_growth(facts: DiagnosisFacts) -> str:
+    assert facts.noise_claim is not None
+    assert facts.error is not None
+    rms = facts.noise_claim["rms"]
+    return (
+        f"The RMSE there is {facts.error / rms:.2g} times the residual in the samples used for estimation, "
+        f"{facts.write_error(float(f'{rms:.2g}'))}. Noise of constant size does not explain this: look for "
+        "an input that is not recorded, such as a disturbance or a temperature, or for steps of the actuator."
+    )
 
 
 def _describe_second_input(facts: DiagnosisFacts) -> str:
@@ -736,6 +785,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "coordinate", lambda facts: facts.coordinate, lambda facts: f"In the formulas, {facts.coordinate}."
     ),
+    Statement("input-limits", lambda facts: facts.input_limits, _describe_input_limits),
     Statement("second-input", lambda facts: facts.second_inputs, _describe_second_input),
     Statement("noise", lambda facts: facts.noise, _describe_noise),
     Statement("record", lambda facts: facts.document.get("record_findings"), _describe_record),
@@ -812,6 +862,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.gain is None and facts.error is not None and not facts.is_gross,
         _describe_error,
     ),
+    Statement("growth", lambda facts: facts.grows, _describe_growth),
     Statement(
         "refusal",
         lambda facts: (facts.document.get("extension") or {}).get("refusal"),

@@ -131,6 +131,21 @@ def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
     assert "function of the time" not in text("named", effects=[CAUSE], gain=GAIN)
 
 
+def test_limits_of_the_input_have_its_unit():
+    ranges = [{"name": "force_N", "unit": "N", "low": -10.0, "high": 4.0, "rate": 3.0}]
+    saturation = {**CAUSE, "name": "input-saturation", "parameters": {"cut": _value(0.3, "")}}
+    rate = {**CAUSE, "name": "rate-limit", "parameters": {"inverse_rate": _value(0.25, "s/N")}}
+    said = text("named", effects=[saturation, rate], gain=GAIN, extension={"ranges": ranges, "refusal": None})
+    assert "input-saturation limits force_N to 7 N; rate-limit limits the rate of force_N to 4 N/s." in said
+    assert " limits " not in text("named", effects=[saturation], gain=GAIN)
+
+
+@pytest.mark.parametrize(("error", "stated"), [(0.0184, False), (0.0186, True)])
+def test_an_error_that_grows_is_no_noise_of_constant_size(error, stated):
+    said = text("noise", calibrated_rmse=error, noise_floor_rmse=0.0123)
+    assert ("times the residual in the samples used for estimation, 0.012 um. Noise of" in said) == stated
+
+
 def test_agreement_is_stated_with_the_calibrated_values():
     values = {"k": 2.0, "initial x": 0.3, "state 1 (recording 2)": 0.1}
     assert "Calibrated: k = 2." in text("nothing", calibrated=values)
