@@ -107,30 +107,11 @@ def list_sure_claims(outcome: UnusualOutcome) -> tuple[SureClaim, ...]:
 
 
 def score_unusual(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statistic]:
-    """Score trials against the goals.
-
-    Ratios of the errors on fresh records are those of causes whose extension can hold there. Extensions of
-    disturbances that have another phase there are counted apart.
-    """
-    causes = [UNUSUAL_CAUSES[each.trial.cause] for each in outcomes]
+    """Score trials against the goals."""
     caused, clean = (
-        [each for each, cause in zip(outcomes, causes, strict=True) if cause.is_clean == is_clean]
+        [each for each in outcomes if UNUSUAL_CAUSES[each.trial.cause].is_clean == is_clean]
         for is_clean in (False, True)
     )
-    sure = [claim for each in outcomes for claim in list_sure_claims(each)]
-    extended, disturbed = (
-        [
-            each.fresh
-            for each, cause in zip(outcomes, causes, strict=True)
-            if each.fresh is not None and cause.carries == carries
-        ]
-        for carries in (True, False)
-    )
-    ratios = [
-        each.fresh.ratio
-        for each, cause in zip(outcomes, causes, strict=True)
-        if each.fresh is not None and cause.carries and not cause.is_clean
-    ]
 
     def count(
         name: str, of: Sequence[UnusualOutcome], which: tuple[Answer, ...], goal: float | None, most: bool
@@ -148,6 +129,25 @@ def score_unusual(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Stati
             _WRONG,
             True,
         ),
+        *_score_fresh(outcomes),
+        count("clean records with a name", clean, (Answer.WRONG,), _NAMED, True),
+        count("clean records with 'unknown'", clean, (Answer.UNKNOWN,), _UNKNOWN, True),
+    ]
+
+
+def _score_fresh(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statistic]:
+    """Score claims and extensions on fresh records.
+
+    Ratios of the errors are those of causes whose extension can hold there. Extensions of disturbances that
+    have another phase there are counted apart.
+    """
+    sure = [claim for each in outcomes for claim in list_sure_claims(each)]
+    extended = [(UNUSUAL_CAUSES[each.trial.cause], each.fresh) for each in outcomes if each.fresh is not None]
+    carried = [fresh for cause, fresh in extended if cause.carries]
+    disturbed = [fresh for cause, fresh in extended if not cause.carries]
+    ratios = [fresh.ratio for cause, fresh in extended if cause.carries and not cause.is_clean]
+    worse = "extensions that make a fresh record worse or diverge"
+    return [
         Proportion(
             f"claims with a confidence of {SURE:g} or more that fail on a fresh record",
             sum(each.fails for each in sure),
@@ -168,20 +168,12 @@ def score_unusual(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Stati
             len(ratios),
             _EXPLAINED,
         ),
-        Proportion(
-            "extensions that make a fresh record worse or diverge",
-            sum(each.is_worse for each in extended),
-            len(extended),
-            _WORSE,
-            True,
-        ),
+        Proportion(worse, sum(each.is_worse for each in carried), len(carried), _WORSE, True),
         Proportion(
             "the same, of disturbances that have another phase there",
             sum(each.is_worse for each in disturbed),
             len(disturbed),
         ),
-        count("clean records with a name", clean, (Answer.WRONG,), _NAMED, True),
-        count("clean records with 'unknown'", clean, (Answer.UNKNOWN,), _UNKNOWN, True),
     ]
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from islands.diagnosis.procedure import diagnose
-from islands.simulators.specification.factory import make_simulator
 from islands_measurements.detection import unusual_trial
 from islands_measurements.detection.injection.unusual.misfit import compute_misfit
 from islands_measurements.detection.injection.unusual.table import UNUSUAL_CAUSES
@@ -95,6 +93,3 @@ def test_an_extension_is_measured_on_a_fresh_record() -> None:
     assert not outcome.fresh.is_worse
     assert outcome.claims[0].loss is not None
     assert outcome.claims[0].loss > 3.0
-    drawn, _ = draw_record(UNUSUAL_CAUSES["asymmetric-gain"], 8_100_000)
-    found = diagnose(drawn.record, make_simulator("linear:1", drawn.record), None, 8_100_000)
-    assert str(found.verdict) == outcome.verdict
