@@ -264,8 +264,9 @@ def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
             continue
         place, distance = places[each.parameters[1]], each.term.gate.spacing
         while distance > each.term.gate.change:
+            # An effect may have a parameter of the same name as the equations: values are counted, not names.
             moved = np.tile(found.fit.values, (2, 1))
-            moved[:, place] += (-distance, distance)
+            moved[:, place] += [-distance, distance]
             moved[:, place] = np.clip(moved[:, place], each.term.gate.earliest, each.term.gate.latest)
             fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
             best = min(fits, key=lambda fit: fit.score)

@@ -27,6 +27,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
+from islands.effects.interface.effect import Effect
 from islands.export.fmu.compiler import find_compiler
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.reports.diagnosis import diagnosis_report
@@ -93,11 +94,13 @@ def simulate(law: Callable[..., float], samples: int = 1200, seed: int = 1, time
     return Dataset(u, y + noise, DT, ("F_N",), output_name="x_m", input_units=("N",), output_unit="m")
 
 
-def search(law: Callable[..., float], timed: bool = False) -> TermSearchResult | None:
+def search(
+    law: Callable[..., float], timed: bool = False, effects: tuple[Effect, ...] = ()
+) -> TermSearchResult | None:
     record = simulate(law, timed=timed)
     simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), record)
     fitted = count_fitted_samples(record)
-    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
+    simulation = ExtendedSimulator(simulator, effects, make_context(record, simulator, fitted))
     target = make_target(record, fitted, {})
     return search_terms(calibrate(simulation, target, simulation.nominal), target, DiagnosisRun())
 
@@ -151,6 +154,19 @@ def test_friction_in_a_part_of_the_time_is_found_with_its_instant(is_onset: bool
     assert values["s1"] == pytest.approx(5.2, abs=0.05)
     expected = "from t = s1 on" if is_onset else "until t = s1"
     assert found.terms[0].describe() == f"a1*(sign(v)) in dv/dt, {expected}"
+
+
+@pytest.mark.ci
+def test_instant_is_found_next_to_an_effect_whose_parameter_has_the_name_of_one_of_the_equations() -> None:
+    def force(x: float, v: float, _u: float, t: float) -> float:
+        return 400.0 * x**3 + 6.0 * np.tanh(v / 0.01) * (t >= 5.2)
+
+    found = search(force, timed=True, effects=(CATALOGUE["cubic-stiffness"],))
+    assert found is not None
+    names = [each.name for each in found.fit.simulation.parameters]
+    assert names.count("k") == 2
+    assert [each.term.text for each in found.terms] == ["sign(v)"]
+    assert found.fit.values[names.index("s1")] == pytest.approx(5.2, abs=0.05)
 
 
 def test_terms_that_the_parameters_reproduce_are_no_candidates() -> None:
