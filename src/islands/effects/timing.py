@@ -11,6 +11,9 @@ from islands.kernels.lagrange import interpolate_at
 from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import limit_rate
 
+#: Largest negative delay in samples. An output that is sampled after the step of the input is a sample early.
+_LONGEST_LEAD = 1.2
+
 
 def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
     return interpolate_at(u, np.arange(u.size) - values[0] / context.dt)
@@ -19,7 +22,12 @@ def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal
 def _delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
-            "tau", "s", 0.0, context.dt, -0.2 * context.dt, min(30 * context.dt, context.fit_end_time / 4)
+            "tau",
+            "s",
+            0.0,
+            context.dt,
+            -_LONGEST_LEAD * context.dt,
+            min(30 * context.dt, context.fit_end_time / 4),
         ),
     )
 

@@ -237,6 +237,18 @@ def acts_on_output(term: CandidateTerm, name: str) -> bool:
     return term.target == OUTPUT and name in find_symbols(parse_expression(term.text.format(scale=1.0)))
 
 
+def shifts_in_time(term: CandidateTerm, system: OdeSystem) -> bool:
+    """Return whether a term is what a small delay adds: the rate of the input, or that of the output.
+
+    For a small tau, ``u(t - tau)`` is ``u - tau*rate(u)``, and an output ``x(t - tau)`` is ``x - tau*dx/dt``.
+    """
+    rates = {f"rate({system.input})"}
+    derivatives = dict(system.derivatives)
+    if term.target == OUTPUT and isinstance(system.output, Symbol) and system.output.name in derivatives:
+        rates.add(render(derivatives[system.output.name]))
+    return term.gate is None and term.text in rates
+
+
 def find_free_numbers(used: Set[str], count: int) -> list[int]:
     """Return the smallest numbers of terms whose parameters have names that are not used."""
     free = (number for number in itertools.count(1) if not {f"a{number}", f"s{number}"} & used)

@@ -74,7 +74,7 @@ def search_jointly(
     if best is None:
         return None
     terms = search_terms(best.base, target, run, least, best)
-    return _assess_effects(terms or best, target, run)
+    return assess_effects(terms or best, target, run)
 
 
 def _list_starts(alone: SearchOutcome) -> list[Hypothesis]:
@@ -119,7 +119,7 @@ def _search_one_term(
     return replace(terms, fit=again) if again.score < terms.fit.score else terms
 
 
-def _assess_effects(terms: TermSearchResult, target: Target, run: DiagnosisRun) -> JointResult | None:
+def assess_effects(terms: TermSearchResult, target: Target, run: DiagnosisRun) -> JointResult | None:
     """Return the terms with those of their effects that pass the tests of effects; None if no effect does."""
     fit, whitened = terms.fit, whiten_target(target, terms.fit)
     without = _calibrate_with(fit, (), whitened)

@@ -11,7 +11,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.discovery.joint_search import JointResult, search_jointly
+from islands.diagnosis.discovery.joint_search import JointResult, assess_effects, search_jointly
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
 from islands.diagnosis.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
@@ -129,7 +129,11 @@ def find_missing_terms(
     """
     effects_alone = _score_effects(alone, base, target)
     found = search_terms(base, target, run, effects_alone.cost)
-    terms = None if found is None else _compare(JointResult(found), effects_alone)
+    tested = None
+    if found is not None:
+        # A delay instead of a term has to pass the tests of effects.
+        tested = assess_effects(found, target, run) if found.effects else JointResult(found)
+    terms = None if tested is None else _compare(tested, effects_alone)
     if alone.target.effective_samples is not None:
         return terms  # A search with model error has no noise model that further effects could whiten.
     is_better = terms is not None and terms.is_better(alone)

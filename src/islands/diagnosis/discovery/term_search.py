@@ -9,6 +9,7 @@ The most promising terms are then fitted with all parameters by the Levenberg-Ma
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from islands.diagnosis.discovery.candidate_terms import (
     list_candidate_terms,
     list_gated_terms,
     name_equation,
+    shifts_in_time,
     vary_gate,
 )
 from islands.diagnosis.discovery.equation_simulator import (
@@ -41,12 +43,15 @@ from islands.diagnosis.discovery.equation_simulator import (
 )
 from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_ranking import RankedTerm, rank_terms
+from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
 from islands.diagnosis.inference.resolved_effects import may_be_zero
-from islands.diagnosis.inference.screening import bic_penalty
+from islands.diagnosis.inference.screening import bic_penalty, transfer_parameters
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
+from islands.effects.timing import DELAY
 from islands.expressions.primitives import DIV, EQUATION_FUNCTIONS
 from islands.expressions.printing import render
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
@@ -209,7 +214,8 @@ def search_terms(
         best = _eliminate_terms(best, system, target, target_sizes, run)
         best = _improve(best, _calibrate_smoothed(best.fit, target, equations.sizes))
         best = _move_instants(best, target)
-        if _may_lack_a_term(best, target):
+        best = _correct_timing(best, system, target, target_sizes, run)
+        if best.cost > before - MIN_GAIN or _may_lack_a_term(best, target):
             break
         found = best
         missing = max_terms - len(found.terms)
@@ -308,6 +314,44 @@ def _eliminate_terms(
             break
         found = best
     return found
+
+
+def _correct_timing(
+    found: TermSearchResult,
+    system: OdeSystem,
+    target: Target,
+    target_sizes: Mapping[str, float],
+    run: DiagnosisRun,
+) -> TermSearchResult:
+    """Replace terms that shift a signal in time by another input between samples, or a delay, if they can be.
+
+    A term is claimed only if it explains more than these by the margin of equivalents.
+    """
+    delays = [each for each in run.effects if each.name == DELAY.name and each not in found.effects]
+    for each in found.terms:
+        if shifts_in_time(each.term, system):
+            kept = tuple(other for other in found.terms if other is not each)
+            numbered = [(other.term, other.number) for other in kept]
+            simulation, start = add_terms(found.fit, system, numbered, target_sizes)
+            without = replace(found, fit=calibrate(simulation, target, start), terms=kept)
+            others = [without, *(_with_effect(without, delay, target) for delay in delays)]
+            best = min((_select_discretisation(other, target) for other in others), key=attrgetter("cost"))
+            if best.cost < found.cost + EQUIVALENCE_MARGIN:
+                found = best
+    return found
+
+
+def _with_effect(found: TermSearchResult, effect: Effect, target: Target) -> TermSearchResult:
+    """Return the equations with one more effect, calibrated with the terms and without them."""
+    fits = []
+    for fit in (found.base, found.fit):
+        simulation = fit.simulation.with_effects(catalogue_order((*fit.simulation.effects, effect)))
+        start = transfer_parameters(fit.values, fit.simulation, simulation)
+        points = effect.starting_points(fit.simulation.context, target.y - fit.output)
+        starts = np.tile(start, (len(points), 1))
+        starts[:, simulation.get_slice(effect)] = points
+        fits += calibrate_all(StartsCalibrator(target), [(simulation, list(starts))], map)
+    return replace(found, base=fits[0], fit=fits[1])
 
 
 def _may_lack_a_term(found: TermSearchResult, target: Target) -> bool:

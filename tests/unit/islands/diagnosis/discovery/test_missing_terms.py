@@ -11,6 +11,7 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.record_simulation import simulate_spec
@@ -18,6 +19,7 @@ from islands.diagnosis.discovery.candidate_terms import (
     MAX_MULTIPLIED_SIGNALS,
     find_free_numbers,
     list_candidate_terms,
+    shifts_in_time,
 )
 from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
@@ -30,10 +32,12 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.export.fmu.compiler import find_compiler
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.kernels.lagrange import interpolate_at
 from islands.reports.diagnosis import diagnosis_report
 from islands.reports.origin import Origin
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.intersample import InterSample
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LocalExtendedSpec
@@ -95,14 +99,22 @@ def simulate(law: Callable[..., float], samples: int = 1200, seed: int = 1, time
 
 
 def search(
-    law: Callable[..., float], timed: bool = False, effects: tuple[Effect, ...] = ()
+    law: Callable[..., float],
+    timed: bool = False,
+    effects: tuple[Effect, ...] = (),
+    delay: float = 0.0,
+    sought: tuple[Effect, ...] = (),
 ) -> TermSearchResult | None:
+    """Search for terms in a record whose input acts later than it is recorded, by a part of a sample."""
     record = simulate(law, timed=timed)
+    u = interpolate_at(record.u[:, 0], np.arange(record.samples) + delay)
+    record = replace(record, u=u[:, None])
     simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), record)
     fitted = count_fitted_samples(record)
     simulation = ExtendedSimulator(simulator, effects, make_context(record, simulator, fitted))
     target = make_target(record, fitted, {})
-    return search_terms(calibrate(simulation, target, simulation.nominal), target, DiagnosisRun())
+    run = DiagnosisRun().with_effects(sought)
+    return search_terms(calibrate(simulation, target, simulation.nominal), target, run)
 
 
 @pytest.mark.ci
@@ -167,6 +179,57 @@ def test_instant_is_found_next_to_an_effect_whose_parameter_has_the_name_of_one_
     assert names.count("k") == 2
     assert [each.term.text for each in found.terms] == ["sign(v)"]
     assert found.fit.values[names.index("s1")] == pytest.approx(5.2, abs=0.05)
+
+
+@pytest.mark.ci
+def test_rate_of_the_input_next_to_another_term_is_a_delay() -> None:
+    law, text, coefficient = LAWS["van der Pol"]
+    found = search(law, delay=0.4, sought=(CATALOGUE["delay"],))
+    assert found is not None
+    assert [each.term.text for each in found.terms] == [text]
+    assert [each.name for each in found.effects] == ["delay"]
+    names = [each.name for each in found.fit.simulation.parameters]
+    values = dict(zip(names, found.fit.values, strict=True))
+    # An input that is held acts half a sample later as well.
+    intersample, _ = get_discretisation(found.fit.simulation.simulator)
+    held = 0.5 * DT if intersample == InterSample.ZOH else 0.0
+    assert values["tau"] + held == pytest.approx(0.4 * DT, rel=0.1)
+    assert values[found.terms[0].parameters[0]] == pytest.approx(coefficient, rel=0.05)
+
+
+@pytest.mark.ci
+def test_rate_of_the_input_that_no_delay_explains_is_a_term() -> None:
+    """It is a lead of five samples, and no delay is negative by more than one."""
+    found = search(lambda _x, _v, _u: 0.0, delay=-5.0, sought=(CATALOGUE["delay"],))
+    assert found is not None
+    assert "rate(F)" in [each.term.text for each in found.terms]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", range(2))
+def test_output_of_semi_implicit_euler_is_a_negative_delay(seed: int) -> None:
+    """The output is recorded after the step, which begins with the input of the same row."""
+    rng = np.random.default_rng([seed, 57])
+    time = DT * np.arange(1500)
+    waves = np.outer(rng.uniform(0.2, 4.0, 8), time) + rng.uniform(0.0, 1.0, (8, 1))
+    u = np.sin(2.0 * np.pi * waves).sum(axis=0)
+    x, v, y = 0.0, 0.0, np.empty(u.size)
+    for k, force in enumerate(u):
+        v += DT * (force - 4.0 * v - 400.0 * x)
+        x += DT * v
+        y[k] = x
+    y += 0.01 * np.std(y) * rng.standard_normal(u.size)
+    sought = [CATALOGUE[name] for name in ("delay", "sensor-lag", "resonance")]
+    found = islands.diagnose(Dataset(u, y, DT), "second-order", effects=sought)
+    assert [each.name for each in found.causes] == ["delay"]
+    assert found.causes[0].parameters["tau"].value == pytest.approx(-DT, rel=0.1)
+
+
+def test_only_rates_of_the_input_and_of_the_output_shift_in_time() -> None:
+    system = OdeSpec.model_validate({"kind": "ode", **DOCUMENT}).make_system()
+    candidates = list_candidate_terms(system, dict.fromkeys(("x", "v", "F", "rate(F)"), 1.0), 10.0, {})
+    shifts = {(each.target, each.text) for each in candidates if shifts_in_time(each, system)}
+    assert shifts == {("v", "rate(F)"), ("output", "rate(F)"), ("output", "v")}
 
 
 def test_terms_that_the_parameters_reproduce_are_no_candidates() -> None:
