@@ -854,7 +854,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.has_gain and facts.is_one_record,
         lambda _: (
             "Causes and gain rest on one record. Before you use the extended simulation elsewhere, record "
-            "another input and diagnose again with the second record as validation data (--validation)."
+            "another input and diagnose again with the second record as validation data."
         ),
     ),
     Statement(
@@ -884,7 +884,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.verdict == "noise" and not facts.is_far,
         lambda _: (
             "To decide it, record the output at rest and diagnose again with its standard deviation as the "
-            "noise level (--noise-level)."
+            "noise level."
         ),
     ),
     Statement("large-noise", lambda facts: facts.has_large_noise, _describe_large_noise),

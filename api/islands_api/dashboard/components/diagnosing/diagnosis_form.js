@@ -46,7 +46,7 @@ function makeNoiseField(initial) {
   const options = { type: "number", min: 0, step: "any", placeholder: "unknown" };
   const level = el("input", { name: "noise_level", ...options });
   level.value = initial ?? "";
-  const hint = "Standard deviation in the unit of the output, if you know it: a far larger residual is no noise.";
+  const hint = "Standard deviation in the unit of the output, if known: a far larger residual is no noise.";
   const nodes = makeField("diagnose", "Noise of the sensor", level, hint);
   return { nodes, get: () => Number(level.value) };
 }

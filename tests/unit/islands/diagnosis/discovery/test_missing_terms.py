@@ -169,7 +169,7 @@ def test_friction_in_a_part_of_the_time_is_found_with_its_instant(is_onset: bool
 
 
 @pytest.mark.ci
-def test_instant_is_found_next_to_an_effect_whose_parameter_has_the_name_of_one_of_the_equations() -> None:
+def test_instant_is_found_next_to_an_effect_with_a_parameter_of_the_same_name() -> None:
     def force(x: float, v: float, _u: float, t: float) -> float:
         return 400.0 * x**3 + 6.0 * np.tanh(v / 0.01) * (t >= 5.2)
 
