@@ -69,6 +69,9 @@ class FindingView(ResponseModel):
     summary: str = Field(default="", description="What the cause is.")
     distinguished_by: str = Field(default="", description="What distinguishes it from similar causes.")
     occurs_in: str = Field(default="", description="Parts of machines that have it.")
+    resembles: dict[str, Any] | None = Field(
+        default=None, description="Simple law with the shape of a free curve, its parameter and formula."
+    )
 
 
 class DiscrepancyResult(ResponseModel):

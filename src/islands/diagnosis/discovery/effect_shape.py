@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.diagnosis.calibration.levenberg_marquardt import estimate_deviations
+from islands.diagnosis.inference.resemblance import describe_curve_signal
 from islands.diagnosis.inference.strategies import SearchOutcome
-from islands.effects.free_forms import RATE_RANGE
 from islands.effects.interface.context import Signal, SimulationContext
 from islands.effects.interface.effect import Effect
 from islands.effects.interface.force import ForceLaw
@@ -63,13 +63,13 @@ def compare_shapes(outcome: SearchOutcome) -> EffectShape | None:
     (effect,), fit = outcome.hypothesis.effects, outcome.hypothesis.fit
     context = fit.simulation.context
     for each in outcome.screened:
-        signal = _describe_signal(each.effect.name, context)
+        signal = describe_curve_signal(each.effect.name, context)
         if signal is None or effect.site != each.effect.site or effect.cause not in each.effect.special_cases:
             continue
         before = outcome.base.mean_square
         if before - each.fit.mean_square < MIN_SHARE * (before - fit.mean_square):
             return None
-        name, unit, peak = signal
+        name, unit, peak = signal.name, signal.unit, signal.peak
         curve = _compute_curve(
             effect, fit.values[fit.simulation.get_slice(effect)], context, name, peak * GRID
         )
@@ -82,17 +82,6 @@ def compare_shapes(outcome: SearchOutcome) -> EffectShape | None:
             *(peak * GRID, curve, peak * PLACES, free, half_widths),
         )
     return None
-
-
-def _describe_signal(form: str, context: SimulationContext) -> tuple[str, str, float] | None:
-    """Return the name, the unit and the range of the signal of a free curve; None for another free form."""
-    coordinate = context.force_coordinate
-    return {
-        "input-curve": ("input", context.input_unit, context.input_peak),
-        "output-curve": ("output", context.output_unit, context.output_peak),
-        "stiffness-curve": ("coordinate", coordinate.unit, coordinate.peak),
-        "damping-curve": ("rate", f"{coordinate.unit}/s", RATE_RANGE * coordinate.rate),
-    }.get(form)
 
 
 def _compute_curve(

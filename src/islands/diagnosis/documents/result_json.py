@@ -153,6 +153,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "depends_on_time": finding.depends_on_time,
         "claimed": finding.is_claimed,
         "free_form": bool(list_free_forms([finding])),
+        "resembles": None if finding.resembles is None else asdict(finding.resembles),
     }
 
 

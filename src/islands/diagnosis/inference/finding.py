@@ -3,6 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import scipy
 
 from islands.diagnosis.calibration.levenberg_marquardt import (
@@ -17,6 +18,7 @@ from islands.diagnosis.inference.confidence import (
 )
 from islands.diagnosis.inference.confounders import Confounder, find_confounder
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, find_alternatives
+from islands.diagnosis.inference.resemblance import Resemblance, describe_curve_signal, find_resemblance
 from islands.diagnosis.inference.screening import ScreenedEffect, bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome
 from islands.diagnosis.inference.verdict import (
@@ -82,6 +84,8 @@ class Finding:
     is_claimed : bool
         Whether it is claimed as a cause. If a remainder shows that the simulation is still wrong, only the
         first effect is: further ones may follow its wrong form. No cause is if others are much more probable.
+    resembles : Resemblance or None
+        Simple law that a free curve has within its intervals; None for another effect.
     """
 
     name: str
@@ -96,6 +100,7 @@ class Finding:
     noise_fraction: float | None = None
     term: str = ""
     depends_on_time: bool = False
+    resembles: Resemblance | None = None
 
 
 def list_free_forms(findings: Sequence[Finding]) -> list[Finding]:
@@ -208,8 +213,20 @@ def _describe_effect(
         error_fraction=explained_fraction(reference, fit, 0.0),
         noise_fraction=noise_fraction(reference, outcome.noise_floor),
         depends_on_time=effect.depends_on_time,
+        resembles=_find_resemblance(effect, values, fit),
     )
     return finding, [each for each, _ in screened if each.effect.cause in equal]
+
+
+def _find_resemblance(
+    effect: Effect, values: Mapping[str, Value], fit: CalibrationResult
+) -> Resemblance | None:
+    """Return the law that a free curve resembles; None for another effect."""
+    signal = describe_curve_signal(effect.name, fit.simulation.context)
+    if signal is None:
+        return None
+    bounds = np.array([each.ci95 or (each.value, each.value) for each in values.values()])
+    return find_resemblance(bounds.mean(axis=1), 0.5 * np.diff(bounds)[:, 0], signal)
 
 
 def list_equivalents(

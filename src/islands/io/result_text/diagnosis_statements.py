@@ -499,6 +499,9 @@ def _name_values(facts: DiagnosisFacts, effect: Document) -> str:
         f"{name} = {write_value(each, facts.is_exact)}" for name, each in effect["parameters"].items()
     )
     name = f"{effect['name']} {effect['term']}" if effect.get("term") else str(effect["name"])
+    if law := effect.get("resembles"):
+        article = "an" if law["law"].startswith("a") else "a"
+        return f"{name}, which resembles {article} {law['law']}: {law['formula']}; {values}"
     return f"{name}: {values}" if values else name
 
 

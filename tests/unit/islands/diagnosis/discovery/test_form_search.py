@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import islands
+from islands.diagnosis import procedure
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.documents.extension_json import extended_document
+from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.filters import low_pass
 from islands.effects.free_forms import FREE_FORMS
@@ -44,6 +46,7 @@ def test_curve_of_no_listed_form_is_a_family_with_its_shape() -> None:
     assert str(found.verdict) == "family"
     (form, *_) = found.effects
     assert (form.name, form.family) == ("output-curve", "shape")
+    assert form.resembles is None
     values = [each.value for each in form.parameters.values()]
     np.testing.assert_allclose(values, characteristic(PLACES), atol=0.01)
     assert found.gain is not None
@@ -53,6 +56,22 @@ def test_curve_of_no_listed_form_is_a_family_with_its_shape() -> None:
     document = extended_document(found.best, found.record)
     saved = simulate_spec(document, found.record, columns={"theirs": THEIRS})
     np.testing.assert_allclose(saved, found.best.output, rtol=1e-9)
+
+
+@pytest.mark.ci
+def test_curve_with_the_shape_of_a_power_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Missing terms, which would replace the curve, are not searched for."""
+    monkeypatch.setattr(procedure, "find_missing_terms", lambda *_: None)
+    peak = float(np.max(np.abs(THEIRS)))
+    y = peak * np.sign(THEIRS) * np.abs(THEIRS / peak) ** 2.5
+    found = diagnose(y, ("output-curve", "output-saturation", "offset"))
+    form = found.causes[0]
+    assert form.resembles is not None
+    assert form.resembles.law == "power law"
+    assert form.resembles.value == pytest.approx(2.5, rel=0.1)
+    (entry, *_) = diagnosis_document(found)["effects"]
+    assert entry["resembles"]["formula"] == form.resembles.formula
+    assert f"output-curve, which resembles a power law: {form.resembles.formula};" in found.summary
 
 
 @pytest.mark.ci

@@ -71,6 +71,18 @@ def test_a_gain_whose_interval_includes_zero_is_no_gain():
     assert "the RMSE falls" not in said
 
 
+def test_a_free_curve_states_the_law_that_it_resembles():
+    law = {
+        "law": "absolute value",
+        "formula": "y + 0.98 |y|",
+        "parameter": "factor",
+        "value": 0.98,
+        "unit": "",
+    }
+    said = text("family", effects=[{**CAUSE, "name": "output-curve", "free_form": True, "resembles": law}])
+    assert "output-curve, which resembles an absolute value: y + 0.98 |y|; tau = 0.03 s" in said
+
+
 def test_a_cause_that_others_exceed_is_uncertain():
     unlikely = {**CAUSE, "confidence": 0.36, "equivalents": ["sensor-lag"]}
     said = text("named", effects=[unlikely], gain=GAIN)
