@@ -110,6 +110,7 @@ def test_a_class_without_a_model_has_a_row():
     assert row.per_seed[0].reason == "no model of several outputs"
 
 
+@pytest.mark.ci
 def test_each_class_is_measured_on_the_tests_in_the_unit_of_the_set(monkeypatch):
     half = make_model({**SPRING, "c1": 0.6})
     messages = []

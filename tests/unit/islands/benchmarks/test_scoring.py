@@ -48,6 +48,7 @@ def test_each_segment_has_initial_samples():
     assert measure_rmse(model, BenchmarkTest(record, 5, 5)) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.ci
 def test_a_latent_model_takes_the_initial_samples_only():
     """Its memory is 20 samples, the benchmark allows 9."""
     record = spring_record(400)

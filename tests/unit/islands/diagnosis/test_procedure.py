@@ -126,6 +126,7 @@ def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) 
     assert found.best is found.base
 
 
+@pytest.mark.ci
 def test_only_the_improbable_cause_of_several_is_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     def describe(*arguments: Any) -> tuple:
         findings, equivalents = describe_effects(*arguments)

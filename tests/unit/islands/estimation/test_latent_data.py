@@ -47,6 +47,7 @@ def fit_bistable(weight, data):
     return Draft(layout, ("tanh",), theta, free, np.zeros((len(data.used), 1))).begin(data.used)
 
 
+@pytest.mark.ci
 def test_a_second_equilibrium_has_a_large_error():
     u = np.random.default_rng(0).standard_normal(1000)
     data = make_latent_data(Dataset(u, u, 1.0))

@@ -78,6 +78,7 @@ def test_units_that_act_on_nothing_are_removed():
     assert _remove_idle_units(reduced) is reduced
 
 
+@pytest.mark.ci
 def test_models_of_a_front_have_different_structures():
     record = spring_record(240, noise=0.02)
     systems = fit(record)

@@ -106,6 +106,7 @@ class Stage(islands.Simulator):
         return values[0] * x
 
 
+@pytest.mark.ci
 def test_simulator_of_the_user_is_diagnosed_like_a_function(
     record: tuple[islands.Dataset, Signal],
 ) -> None:

@@ -74,6 +74,7 @@ def test_single_precision_is_no_discrepancy(seed: int) -> None:
     assert (found.verdict, found.effects) == (Verdict.NOTHING, ())
 
 
+@pytest.mark.ci
 def test_second_effect_below_the_resolution_is_not_named() -> None:
     u = excite(1)
     y = respond(u)
@@ -84,6 +85,7 @@ def test_second_effect_below_the_resolution_is_not_named() -> None:
     assert [each.name for each in found.effects] == ["offset"]
 
 
+@pytest.mark.ci
 def test_effect_that_the_resolution_shows_is_named() -> None:
     u = excite(1)
     y = respond(u)

@@ -108,6 +108,7 @@ def test_effect_of_the_catalogue_keeps_its_name() -> None:
     assert [each.name for each in found.effects] == ["cubic-stiffness"]
 
 
+@pytest.mark.ci
 def test_document_and_text_contain_the_terms() -> None:
     record, found = find("u**5")
     columns = {"y_model": follow(record.u[:, 0], DT)}

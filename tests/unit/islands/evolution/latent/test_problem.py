@@ -36,6 +36,7 @@ def make_system(fitness, size, units=()):
     return FittedStateSpace(1, 1, units, (0.5,) * 6, free, ((0.0,),), fitness, fitness)
 
 
+@pytest.mark.ci
 def test_the_number_of_threads_does_not_matter(problem, archipelagos):
     evolution = problem.open(threads=1)
     island, info = evolution.first_generation(0, 5)
