@@ -61,7 +61,8 @@ def classify_answer(outcome: UnusualOutcome) -> Answer:
 
 def _is_cause(claim: Claim, cause: UnusualCause) -> bool:
     if claim.term:
-        return bool(cause.terms) and re.search(cause.terms, claim.term) is not None
+        law = cause.terms
+        return bool(law) and re.search(law, claim.term) is not None
     return claim.name in cause.names
 
 
@@ -69,7 +70,8 @@ def _is_family(claim: Claim, cause: UnusualCause) -> bool:
     if _is_cause(claim, cause):
         return True
     if claim.term:
-        return bool(cause.family_terms) and re.search(cause.family_terms, claim.term) is not None
+        law = cause.family_terms
+        return bool(law) and re.search(law, claim.term) is not None
     names = {claim.name, *claim.equivalents}
     families = {CATALOGUE[name].family for name in names if name in CATALOGUE}
     return bool((names | families) & (cause.family | cause.names))

@@ -31,6 +31,10 @@ from islands.simulators.output_equation import OutputEquation
 #: each effect, and another one, such as a sign for a smoothed sign, is no other cause.
 MIN_RELATIVE_GAIN = 0.1
 
+#: Score by which terms that begin or end within the record have to be better than effects: with an instant, a
+#: simple law imitates an effect with memory, such as a creep.
+GATED_MARGIN = 3.0 * EQUIVALENCE_MARGIN
+
 #: Terms that are the law of an effect, which the catalogue has smoothed, as regular expressions.
 SMOOTHED_LAWS = {"coulomb-friction": r"sign\([^*]*\)"}
 
@@ -99,6 +103,8 @@ class MissingTerms:
             values = sum(len(term.parameters) for term in found.terms)
             if values + _count_values(found.fit) < _count_values(hypothesis.fit):
                 margin = EQUIVALENCE_MARGIN  # Effects with more values are no idealisation of the terms.
+        if any(each.term.gate for each in found.terms):
+            margin = max(margin, GATED_MARGIN)
         return self.discovery.worse_by >= margin
 
 

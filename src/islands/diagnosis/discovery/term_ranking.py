@@ -55,6 +55,8 @@ def rank_terms(
     parallel_map : ParallelMap
         Simulates the terms.
     """
+    if not candidates:
+        return []
     projections = [Projection(fit, target) for target in targets]
 
     def explain_group(group: Sequence[CandidateTerm]) -> NDArray[np.float64]:

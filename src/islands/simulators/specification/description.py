@@ -65,7 +65,7 @@ def describe_extension(
                 start += len(parameters)
             return make_extended_spec(
                 simulator.simulator, values[:inner_size], found, simulator.scales, inputs, output, shape
-            )
+            ).model_copy(update={"tested": simulator.tested})
         case NarxSimulator():
             model = simulator.with_shape(values, shape) if shape else simulator.with_values(values)
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)

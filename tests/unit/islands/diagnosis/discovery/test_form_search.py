@@ -141,7 +141,7 @@ def test_free_form_vanishes_at_its_nominal_values(form: islands.Effect) -> None:
     )
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_equation_replaces_two_names_that_fit_worse() -> None:
     """A damping curve fits better than two names, and the equation explains as much as the curve."""
     found = run_trial(Trial(("cubic-damping",), 7_715_009, "white", (0.2, 1.0), core="second-order"))

@@ -289,7 +289,7 @@ def diagnose(name: str) -> Diagnosis:
     return islands.diagnose(simulate(law), OdeSpec.model_validate({"kind": "ode", **DOCUMENT}))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() -> None:
     found = diagnose("bilinear")
     assert found.verdict == Verdict.DISCOVERED

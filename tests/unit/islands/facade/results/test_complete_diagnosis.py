@@ -95,7 +95,7 @@ def test_an_extension_that_may_diverge_is_refused(found, tmp_path):
 
 def test_a_notebook_shows_the_sentences_and_a_figure(found):
     html = found._repr_html_()
-    assert "<p>The simulation lacks a known effect, which explains the discrepancy.</p>" in html
+    assert "<p>The simulation probably lacks a known effect, which explains the discrepancy.</p>" in html
     assert 'alt="measured and simulated output"' in html
     assert found.plot("residual").axes
     with pytest.raises(islands.SettingsError, match="unknown figure 'loop'"):
@@ -117,7 +117,7 @@ def test_a_diagnosis_without_an_effect_has_no_simulation(found, tmp_path):
 def test_a_folder_states_what_the_run_stated(found, tmp_path):
     loaded = islands.load(found.save(tmp_path / "saved"))
     assert str(loaded) == found.summary
-    assert "<p>The simulation lacks a known effect" in loaded._repr_html_()
+    assert "<p>The simulation probably lacks a known effect" in loaded._repr_html_()
 
 
 def test_properties_of_the_noise_are_no_claimed_causes(found):
