@@ -87,6 +87,11 @@ def map_segments(function: Callable[[Signal], Signal], signal: Signal, segments:
     return np.concatenate([function(signal[first:last]) for first, last in bounds])
 
 
+def delay_samples(signal: Signal, lag: int) -> Signal:
+    """Return a signal some samples late, shape (samples,); until then it has its first value."""
+    return np.concatenate([np.full(min(lag, signal.size), signal[0]), signal])[: signal.size]
+
+
 def take_backward_differences(signal: Signal) -> Signal:
     """Return the differences of a signal to its previous sample, shape (samples,); the first one is zero.
 

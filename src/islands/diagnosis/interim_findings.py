@@ -16,13 +16,12 @@ from islands.diagnosis.calibration.starts_calibrator import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.missing_terms import MissingTerms
-from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.inference.strategies import SearchOutcome, analyse_residual, make_outcome
 from islands.diagnosis.inference.verdict import Verdict
-from islands.diagnosis.noise_claim import judge_noise
+from islands.diagnosis.noise_claim import complete_findings
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect
@@ -152,11 +151,9 @@ class InterimFindings:
                     left_out[0] = f"{SCREENING} ({len(screened)} are screened)"
             outcome = _make_outcome(base, screened, target, rng)
             found = make_diagnosis(record, outcome, base, None, DiagnosisRun((), rng))
-        best = base if target.has_feedback else found.best
-        closed_loop = find_closed_loop(best, target, record.input_names[0])
-        found = judge_noise(found, target, noise_level, rng)
-        findings = (*record_findings, *closed_loop, *found.record_findings)
-        return replace(found, record_findings=findings, left_out=tuple(left_out))
+        fit = base if target.has_feedback else found.best
+        found = complete_findings(found, fit, target, record_findings, noise_level, rng)
+        return replace(found, left_out=tuple(left_out))
 
 
 class _ScreeningFits:

@@ -1,10 +1,13 @@
 """Claim that a residual is noise: what decides it, and what the user has to judge."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.diagnosis.inference.hidden_structure import find_hidden_structure
 from islands.diagnosis.inference.noise_detectors import COLOURED_NOISE
@@ -43,6 +46,32 @@ def validate_noise_level(noise_level: float | None) -> None:
         )
 
 
+def complete_findings(
+    found: Diagnosis,
+    fit: CalibrationResult,
+    target: Target,
+    record_findings: Sequence[RecordFinding],
+    noise_level: float | None,
+    rng: np.random.Generator,
+) -> Diagnosis:
+    """Return a diagnosis with all findings about its record, and with the claim about its residual.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    fit : CalibrationResult
+        Simulation whose residual shows a closed loop.
+    target : Target
+    record_findings : sequence of RecordFinding
+        Findings from before the search.
+    noise_level, rng
+        As for `judge_noise`.
+    """
+    closed_loop = find_closed_loop(fit, target, found.record.input_names[0])
+    found = judge_noise(found, target, noise_level, rng)
+    return replace(found, record_findings=(*record_findings, *closed_loop, *found.record_findings))
+
+
 def judge_noise(
     found: Diagnosis, target: Target, noise_level: float | None, rng: np.random.Generator
 ) -> Diagnosis:
@@ -61,7 +90,7 @@ def judge_noise(
         Standard deviation of the noise of the output, in its unit, that the user knows.
     """
     residual = (target.y - found.best.output)[target.estimation_part]
-    claim = _describe_residual(found, target, noise_level)
+    claim = _describe_residual(residual, found, target, noise_level)
     found = replace(found, noise_claim=claim)
     if found.verdict != Verdict.NOTHING or target.is_matched(found.best.output):
         return found
@@ -82,13 +111,13 @@ def judge_noise(
     return replace(found, verdict=Verdict.NOISE) if is_slow and noise_level is None else found
 
 
-def _describe_residual(found: Diagnosis, target: Target, noise_level: float | None) -> NoiseClaim:
+def _describe_residual(
+    residual: Signal, found: Diagnosis, target: Target, noise_level: float | None
+) -> NoiseClaim:
     """Return size and correlation time of a residual; white noise has a correlation time of zero."""
-    known = target.estimation_part
-    residual = (target.y - found.best.output)[known]
     context = replace(found.best.simulation.context, segments=target.fitted_segments)
     # White noise has an autoregression by chance; the gain that makes it a finding is rarer.
-    detection = COLOURED_NOISE.detect(target.y[known], residual, context)
+    detection = COLOURED_NOISE.detect(target.y[target.estimation_part], residual, context)
     is_coloured = detection is not None and detection.score_gain > MIN_GAIN
     correlation_time = _find_correlation_time(residual) * context.dt if is_coloured else 0.0
     return NoiseClaim(float(np.sqrt(np.mean(residual**2))), correlation_time, noise_level)

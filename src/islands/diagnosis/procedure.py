@@ -24,11 +24,7 @@ from islands.diagnosis.discovery.equation_simulator import find_equations
 from islands.diagnosis.discovery.form_search import compare_with_free_forms
 from islands.diagnosis.discovery.missing_terms import explain_all, find_missing_terms, replaces_effects
 from islands.diagnosis.gross_errors.channel_admission import admit_channels
-from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
-from islands.diagnosis.gross_errors.record_finding import (
-    describe_extrapolation,
-    describe_gaps,
-)
+from islands.diagnosis.gross_errors.record_finding import describe_extrapolation, describe_gaps
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
 from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_late_effects
 from islands.diagnosis.inference.extension_trial import try_extension
@@ -50,7 +46,7 @@ from islands.diagnosis.interim_findings import (
     MODEL_ERROR,
     InterimFindings,
 )
-from islands.diagnosis.noise_claim import judge_noise, validate_noise_level
+from islands.diagnosis.noise_claim import complete_findings, validate_noise_level
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import EFFECTS
@@ -174,10 +170,9 @@ def diagnose(
         for each in (select_effects(simulator, context, prior_std, catalogue, free) for free in (False, True))
     )
     found = _find_causes(record, base, target, run.with_effects(effects), forms, interim, seed)
-    closed_loop = find_closed_loop(held or found.best, target, record.input_names[0])
-    found = judge_noise(found, target, noise_level, run.rng)
-    findings = (*record_findings, *closed_loop, *found.record_findings)
-    return interim.complete(replace(found, record_findings=findings))
+    return interim.complete(
+        complete_findings(found, held or found.best, target, record_findings, noise_level, run.rng)
+    )
 
 
 def _find_causes(

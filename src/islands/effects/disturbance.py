@@ -16,8 +16,8 @@ from islands.effects.interface.map_equation import MapEquation
 LINE_ERROR = 0.1
 
 
-def _second_input_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return u + values[0] * channel(context, False)
+def _add_channel(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return signal + values[0] * channel(context, False)
 
 
 def _second_input_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
@@ -39,7 +39,7 @@ SECOND_INPUT = Effect(
     site=Site.INPUT,
     parameters=_second_input_parameters,
     starting_points=_second_input_starting_points,
-    form=_second_input_form,
+    form=_add_channel,
     equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
     source="Ljung, System Identification, 2nd ed., section 4.2",
     is_applicable=lambda context: has_channel(context, False),
@@ -47,10 +47,6 @@ SECOND_INPUT = Effect(
     distinguished_by="the response to the channel has the dynamics of that to the input",
     occurs_in="a second actuator, a feedforward or a load that the simulation does not read",
 )
-
-
-def _cross_coupling_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * channel(context, False)
 
 
 def _cross_coupling_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
@@ -77,7 +73,7 @@ CROSS_COUPLING = Effect(
     site=Site.OUTPUT,
     parameters=_cross_coupling_parameters,
     starting_points=_cross_coupling_starting_points,
-    form=_cross_coupling_form,
+    form=_add_channel,
     equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from islands.data.averaging import average_samples
 from islands.data.dataset import Dataset
 from islands.data.loops import has_loops, loop_starts, measure_area
+from islands.data.segments import delay_samples
 from islands.inspection.blocks import assign_blocks, resample, sum_blocks
 from islands.inspection.fact import Fact
 
@@ -182,7 +183,7 @@ def _predict(record: Dataset) -> list[NDArray[np.float64]]:
     u = record.u[:, 0] - record.u[0, 0]
     u = u / np.ptp(u)
     filtered = [u, *(_filter(u, constant) for constant in _TIME_CONSTANTS)]
-    lagged = [np.concatenate([np.full(lag, u[0]), u[:-lag]]) for lag in (1, 2, 4, 8)]
+    lagged = [delay_samples(u, lag) for lag in (1, 2, 4, 8)]
     smooth = [signal**power for signal in filtered + lagged for power in range(1, 1 + _POWERS)]
     plays = [_apply_play(u, width) for width in _WIDTHS]
     trend = np.linspace(-1.0, 1.0, u.size)

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.data.segments import delay_samples
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Site
 from islands.effects.interface.force import sum_output_forces
@@ -119,7 +120,7 @@ class LinearSimulator(Simulator):
     ) -> Signal:
         """Simulate several runs; those with the same input share its delay, and equal forces."""
         inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
-        deviations = {key: self._delay(x) - self.reference_input for key, x in inputs.items()}
+        deviations = {key: delay_samples(x, self.delay) - self.reference_input for key, x in inputs.items()}
         found = np.empty((len(runs), runs[0].x.size))
         for row, run in zip(found, runs, strict=True):
             numerator, denominator, level, state = self.split_values(run.values)
@@ -131,9 +132,6 @@ class LinearSimulator(Simulator):
             coordinates = [inputs[run.input_key] for run in runs]
             found += sum_output_forces(coordinates, context, [run.forces for run in runs])
         return found[:, ::every]
-
-    def _delay(self, x: Signal) -> Signal:
-        return np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
 
     def _find_state_at_rest(self) -> Signal:
         remainder = 1.0 - float(self.denominator.sum())
@@ -164,7 +162,7 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
             f"{record.samples} samples are too few to estimate a linear model of order {order}: take a lower "
             "order or a longer record"
         )
-    delayed = np.concatenate([np.full(delay, u[0]), u[: u.size - delay]]) - u[0]
+    delayed = delay_samples(u, delay) - u[0]
     found, smallest = None, np.inf
     denominator = np.zeros(order)
     for _ in range(_ITERATIONS):

@@ -7,7 +7,7 @@ from time import monotonic
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine
 from islands.evolution.problem import Problem
-from islands.progress import Stop
+from islands.progress import Stop, TimeLimit
 
 
 class TimedEngine:
@@ -29,11 +29,10 @@ class TimedEngine:
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Run the next search."""
-        now = monotonic()
-        until = now + (self._until - now) / self._left
+        limit = TimeLimit(self._until, monotonic, stop).share(self._left)
         self._left = max(1, self._left - 1)
         begun = False
-        epochs = self._engine.run(problem, start, lambda: stop() or (begun and monotonic() > until))
+        epochs = self._engine.run(problem, start, lambda: limit() if begun else stop())
         with closing(epochs):
             for epoch in epochs:
                 begun = True

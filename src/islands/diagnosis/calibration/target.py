@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.segments import find_bounds, map_segments
+from islands.data.segments import delay_samples, find_bounds, map_segments
 from islands.diagnosis.calibration.resolution import is_unresolved
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.estimation.noise_model import NoiseModel
@@ -81,7 +82,7 @@ class Target:
         """
         if not self.has_feedback:
             return context
-        return replace(context, u=map_segments(_delay, context.u, context.segments))
+        return replace(context, u=map_segments(partial(delay_samples, lag=1), context.u, context.segments))
 
     def residual(self, simulated: Signal) -> Signal:
         """Return the whitened residual over the estimation part."""
@@ -90,8 +91,3 @@ class Target:
     def is_matched(self, simulated: Signal) -> bool:
         """Return whether a signal is the output of the estimation part, as far as its resolution shows."""
         return is_unresolved((self.y - simulated)[self.estimation_part], self.resolution)
-
-
-def _delay(u: Signal) -> Signal:
-    """Return a signal one sample late."""
-    return np.concatenate([u[:1], u[:-1]])

@@ -13,6 +13,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -45,7 +46,7 @@ from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_ranking import RankedTerm, rank_terms
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
 from islands.diagnosis.inference.resolved_effects import may_be_zero
-from islands.diagnosis.inference.screening import bic_penalty, transfer_parameters
+from islands.diagnosis.inference.screening import bic_penalty, get_starting_points, transfer_parameters
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import catalogue_order
@@ -347,7 +348,7 @@ def _with_effect(found: TermSearchResult, effect: Effect, target: Target) -> Ter
     for fit in (found.base, found.fit):
         simulation = fit.simulation.with_effects(catalogue_order((*fit.simulation.effects, effect)))
         start = transfer_parameters(fit.values, fit.simulation, simulation)
-        points = effect.starting_points(fit.simulation.context, target.y - fit.output)
+        points = get_starting_points(effect, simulation, fill_gaps(target.y - fit.output))
         starts = np.tile(start, (len(points), 1))
         starts[:, simulation.get_slice(effect)] = points
         fits += calibrate_all(StartsCalibrator(target), [(simulation, list(starts))], map)

@@ -9,10 +9,11 @@ line. Whatever repeats with the periods of the input is no noise.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from islands.data.segments import find_runs, map_segments
+from islands.data.segments import delay_samples, find_runs, map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
@@ -118,10 +119,7 @@ def _list_functions(fit: CalibrationResult, target: Target) -> Mapping[str, list
     lags = [lag for lag in MEMORY_LAGS if lag < target.fitted // 10]
     return {
         "fine map of the input": [(cells == cell).astype(np.float64) for cell in range(edges.size + 1)],
-        "memory of the input": [
-            map_segments(lambda part, lag=lag: _delay(part, lag), u, segments)  # type: ignore[misc]
-            for lag in lags
-        ],
+        "memory of the input": [map_segments(partial(delay_samples, lag=lag), u, segments) for lag in lags],
     }
 
 
@@ -151,10 +149,6 @@ def _convolve(signal: Signal, response: Signal, segments: Sequence[int]) -> Sign
         return np.asarray(np.fft.irfft(spectrum, size)[: part.size] + part[0] * response.sum())
 
     return map_segments(convolve, signal, segments)
-
-
-def _delay(signal: Signal, lag: int) -> Signal:
-    return np.concatenate([np.full(min(lag, signal.size), signal[0]), signal])[: signal.size]
 
 
 def _span(columns: Signal) -> Signal:

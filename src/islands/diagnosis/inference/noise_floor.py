@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import scipy
 
-from islands.data.segments import count_runs, find_bounds, take_backward_differences
+from islands.data.segments import count_runs, delay_samples, find_bounds, take_backward_differences
 from islands.diagnosis.inference.noise_surrogates import (
     Randomisation,
     draw_surrogates,
@@ -198,7 +198,7 @@ def _make_columns(signal: Signal, rate: Signal, rate_scale: float, widths: Seque
     decays = [np.exp(-1.0 / time_constant) for time_constant in TIME_CONSTANTS]
     return [
         *(signal, rate, np.tanh(rate / rate_scale)),
-        *(np.concatenate([np.full(lag, signal[0]), signal])[: signal.size] for lag in LAGS),
+        *(delay_samples(signal, lag) for lag in LAGS),
         *(filter_linearly([1.0 - a], [1.0, -a], signal - signal[0]) for a in decays),
         *(play_from(signal, width) for width in widths),
     ]
