@@ -50,6 +50,10 @@ def pytest_configure(config):
         from islands.facade.warm_up import warm_up
 
         warm_up()
+        if config.getoption("numprocesses", None):
+            from support.kernels import compile_further_kernels
+
+            compile_further_kernels()
 
 
 @pytest.hookimpl(wrapper=True)

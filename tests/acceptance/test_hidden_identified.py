@@ -32,7 +32,6 @@ def test_clean_record_only_yields_the_model_form_error(seconds: float) -> None:
 @pytest.mark.parametrize(
     ("name", "seconds"),
     [
-        pytest.param("coulomb-friction", SHORT, marks=ci),
         pytest.param("coulomb-friction", SECONDS, marks=nightly),
         pytest.param("offset", SECONDS, marks=nightly),
     ],

@@ -1,4 +1,4 @@
-"""Option ``--costs``: report wall and CPU time by folder, and the fast tests over the limit."""
+"""Option ``--costs``: report wall and CPU time by folder, and the tests over the limit of their level."""
 
 import resource
 from collections import defaultdict
@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-#: CPU time in seconds that a test without a mark may take, including its fixtures.
-LIMIT = 0.5
+#: CPU times in seconds that a test without a mark and a test of the level ci may take, including their fixtures.
+LIMIT, CI_LIMIT = 0.5, 4.0
 
 _spent = 0.0
 
@@ -43,11 +43,13 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         return
     groups = ("", "passed", "failed", "skipped")
     phases = [report for group in groups for report in terminalreporter.getreports(group)]
-    tests, folders = defaultdict(float), defaultdict(lambda: [set(), 0.0, 0.0])
+    tests, limits = defaultdict(float), {}
+    folders = defaultdict(lambda: [set(), 0.0, 0.0])
     for report in phases:
         folder = "/".join(report.nodeid.split("::")[0].split("/")[1:-1][:3])
-        if not {"ci", "nightly"} & report.keywords.keys():
+        if "nightly" not in report.keywords:
             tests[report.nodeid] += report.cpu
+            limits[report.nodeid] = CI_LIMIT if "ci" in report.keywords else LIMIT
         folders[folder][0].add(report.nodeid)
         folders[folder][1] += report.duration
         folders[folder][2] += report.cpu
@@ -56,5 +58,5 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     for folder, (ids, wall, cpu) in sorted(folders.items(), key=lambda item: -item[1][2]):
         terminalreporter.line(f"{folder:40} {len(ids):6} {wall:8.1f} {cpu:8.1f}")
     for test, cpu in sorted(tests.items(), key=lambda item: -item[1]):
-        if cpu > LIMIT:
+        if cpu > limits[test]:
             terminalreporter.line(f"{cpu:6.1f} s of CPU: {test}")

@@ -44,6 +44,10 @@ SCALED_FORMS = {
     "sign({signal})*exp(-({signal}/{scale})**2)": 0.1,
 }
 
+#: Functions of one signal and the time with a scale that is fitted, and its nominal value relative to the
+#: duration of the record: a parameter that settles as the machine warms up or runs in.
+FADING_FORMS = {f"{{signal}}*exp(-{TIME}/{{scale}})": 0.3}
+
 #: Further scales from which a fit starts, relative to the nominal one.
 STARTING_SCALES = (0.3, 3.0)
 
@@ -295,6 +299,10 @@ def list_candidate_terms(
             for form, scale in SCALED_FORMS.items():
                 text = form.format(signal=signal, scale="{scale}")
                 terms.append(CandidateTerm(target, text, 1.0, scale * sizes[signal], unit, scale_unit))
+            own_unit = find_factor_unit(unit, parse_expression(signal), units)
+            for form, scale in FADING_FORMS.items():
+                text = form.format(signal=signal, scale="{scale}")
+                terms.append(CandidateTerm(target, text, sizes[signal], scale * duration, own_unit, "s"))
     return tuple(terms)
 
 

@@ -278,7 +278,8 @@ def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
             fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
             best = min(fits, key=lambda fit: fit.score)
             if best.score < found.fit.score - MIN_GAIN:
-                found = _improve(found, calibrate(best.simulation, target, best.values))
+                # The search ends, since each move gains: a calibration of whitened errors may have a worse score.
+                found = _improve(replace(found, fit=best), calibrate(best.simulation, target, best.values))
             else:
                 distance /= 2.0
     return found

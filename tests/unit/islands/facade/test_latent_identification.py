@@ -42,17 +42,6 @@ def result():
 
 
 @pytest.mark.ci
-def test_the_cubic_spring_is_found():
-    found = identify_record(spring_record(1200, noise=0.02), preset="latent")
-    best = found.best.model
-    assert (best.order, best.units) == (2, ("cube",))
-    assert rmse(best, spring_record(1500, noise=0.02, seed=9)) == pytest.approx(0.02, rel=0.1)
-    assert "resonance at 5.1" in best.equation().plain
-    # The unit reads the states, so the system is no Hammerstein system.
-    assert any(name.startswith("w1") for name in best.names)
-
-
-@pytest.mark.ci
 def test_modes_have_standard_errors(result, tmp_path):
     for each in result.models:
         assert len(each.model.quantity_errors) == len(each.model.quantities)

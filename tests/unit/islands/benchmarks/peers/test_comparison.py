@@ -61,6 +61,7 @@ def test_a_simulation_that_diverges_on_the_test_has_no_error(tmp_path, value):
     assert row.reason == "the free run diverges"
 
 
+@pytest.mark.ci
 def test_a_child_that_exceeds_its_cpu_limit_is_ended(tmp_path):
     row = run(tmp_path, SCRIPT + "    while True:\n        pass", limit=1.0)
     assert row.reason == "it exceeds the limit of 1 s of CPU"

@@ -121,6 +121,7 @@ def test_document_and_text_contain_the_terms() -> None:
     assert "u**5" in DiagnosisResult.from_diagnosis(found).summary
 
 
+@pytest.mark.ci
 def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:
     record, found = find("u**5")
     spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))

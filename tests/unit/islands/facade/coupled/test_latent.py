@@ -32,7 +32,7 @@ def found():
     return identify_coupled(curves_record(300, 1), **SHORT)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_two_outputs_with_different_curves_are_found():
     record, test = curves_record(400, 1), curves_record(1500, 7)
     result = fit_coupled(record, model="latent")

@@ -94,6 +94,7 @@ def test_means_do_not_reach_across_recordings():
     assert data.estimation.segments == tuple(n // count for n in split(record).estimation.segments)
 
 
+@pytest.mark.ci
 def test_the_choice_is_deterministic(averaged):
     assert result_json(islands.fit(lag(), **LIBRARY).search_result) == result_json(averaged.search_result)
 
