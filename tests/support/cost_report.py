@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-#: CPU times in seconds that a test without a mark and a test of the level ci may take, including their fixtures.
+#: CPU times in seconds of a test without a mark, and of one of the level ci, with their fixtures.
 LIMIT, CI_LIMIT = 0.5, 4.0
 
 _spent = 0.0

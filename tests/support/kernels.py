@@ -19,5 +19,5 @@ def compile_further_kernels() -> None:
     for effect in CATALOGUE.values():
         extended = ExtendedSimulator(make_piezo(), (effect,), context)
         values = extended.nominal
-        values[extended.get_slice(effect)] = tuple(effect.starting_points(context, u))[0]
+        values[extended.get_slice(effect)] = next(iter(effect.starting_points(context, u)))
         extended.simulate(values)

@@ -278,7 +278,7 @@ def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
             fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
             best = min(fits, key=lambda fit: fit.score)
             if best.score < found.fit.score - MIN_GAIN:
-                # The search ends, since each move gains: a calibration of whitened errors may have a worse score.
+                # Each move gains, so that the search ends; a calibration of whitened errors may score worse.
                 found = _improve(replace(found, fit=best), calibrate(best.simulation, target, best.values))
             else:
                 distance /= 2.0

@@ -60,8 +60,10 @@ def find_closed_loop(fit: CalibrationResult, target: Target, input_name: str) ->
     Parameters
     ----------
     fit : CalibrationResult
-        The best simulation.
+        The best simulation. Errors below the resolution of the output are rounding, and no noise.
     """
+    if target.is_matched(fit.output):
+        return ()
     u, residual = fit.simulation.context.u[: target.fitted], (target.y - fit.output)[: target.fitted]
     residual = np.where(np.isnan(residual), np.nanmean(residual), residual)
     # Feedback within a sample and a simulation that responds at once are alike.

@@ -49,6 +49,8 @@ def hold_direct_term(base: CalibrationResult, target: Target) -> CalibrationResu
     base : CalibrationResult
         The simulation without effects.
     """
+    if target.is_matched(base.output):
+        return None
     linear = _find_linear(base)
     if linear is not None and not linear.delay and "b0" not in target.prior_std:
         # A direct term that is fitted to the noise may be small compared with the whole response.

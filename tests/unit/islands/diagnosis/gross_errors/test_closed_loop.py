@@ -84,3 +84,17 @@ def test_closed_loop_is_said_and_changes_no_verdict() -> None:
         output=found.record.u[:, 0],
     )
     assert acts_at_once(at_once)
+
+
+@pytest.mark.ci
+def test_errors_below_the_resolution_are_no_noise_that_is_fed_back() -> None:
+    def plant(u: np.ndarray, _dt: float) -> np.ndarray:
+        return simulate(u)
+
+    def diagnose(error: float) -> islands.DiagnosisResult:
+        record = recorded(u, simulate(u) + error * np.roll(u, -1))
+        return islands.diagnose(record, islands.function_simulator(plant), effects=())
+
+    u = np.random.default_rng(0).standard_normal(SAMPLES)
+    assert [each.name for each in diagnose(1e-3).record_findings] == ["closed-loop"]
+    assert not diagnose(1e-9).record_findings
