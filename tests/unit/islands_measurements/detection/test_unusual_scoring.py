@@ -57,6 +57,7 @@ def outcome(
         ("amplitude-damping", [term("a2*u in output"), term("a1*(x**2*v) in dv/dt")], "", Answer.RIGHT),
         ("amplitude-damping", [term("a1*(v**3) in dv/dt")], "discovered", Answer.FAMILY),
         ("fading-damper", [term("a1*(t*v) in dv/dt")], "discovered", Answer.RIGHT),
+        ("fading-damper", [term("a1*(v*exp(-t/s1)) in dv/dt")], "discovered", Answer.RIGHT),
         ("fading-damper", [term("a1*(t*abs(v)) in dv/dt")], "discovered", Answer.FAMILY),
         ("fading-damper", [effect("periodic-disturbance")], "named", Answer.WRONG),
         ("fifth-power", [term("a1*(x**5) in dv/dt")], "discovered", Answer.RIGHT),

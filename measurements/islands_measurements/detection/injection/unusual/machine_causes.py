@@ -270,7 +270,7 @@ MACHINE_CAUSES = (
         "the damper loses 50 to 90 % of its damping",
         _under_force(_fading_damper),
         "",
-        r"\((t\*v|v\*t)\)",
+        r"\((t\*v|v\*t|v\*exp\(-t/s\d\))\)",
         "damping-curve viscous",
         r"(?=.*\bt\b)(?=.*\bv\b)",
     ),

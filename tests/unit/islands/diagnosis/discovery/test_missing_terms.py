@@ -12,9 +12,10 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
-from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.record_simulation import simulate_spec
+from islands.diagnosis.discovery import term_search
 from islands.diagnosis.discovery.candidate_terms import (
     MAX_MULTIPLIED_SIGNALS,
     find_free_numbers,
@@ -166,6 +167,38 @@ def test_friction_in_a_part_of_the_time_is_found_with_its_instant(is_onset: bool
     assert values["s1"] == pytest.approx(5.2, abs=0.05)
     expected = "from t = s1 on" if is_onset else "until t = s1"
     assert found.terms[0].describe() == f"a1*(sign(v)) in dv/dt, {expected}"
+
+
+@pytest.mark.ci
+def test_instants_move_as_long_as_the_score_improves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calibrations of whitened errors may have a worse score than what they start from."""
+
+    def force(_x: float, v: float, _u: float, t: float) -> float:
+        return 6.0 * np.tanh(v / 0.01) * (t >= 5.2)
+
+    found = search(force, timed=True)
+    assert found is not None
+    record = simulate(force, timed=True)
+    target = make_target(record, count_fitted_samples(record), {})
+    place = [each.name for each in found.fit.simulation.parameters].index("s1")
+    values = found.fit.values.copy()
+    values[place] -= 0.5
+    late = replace(found, fit=evaluate_fit(found.fit.simulation, target, values))
+    monkeypatch.setattr(term_search, "calibrate", lambda *given: evaluate_fit(*given[:2], 1.1 * given[2]))
+    moved = term_search._move_instants(late, target)
+    assert moved.fit.score < late.fit.score
+    assert moved.fit.values[place] == pytest.approx(5.2, abs=0.05)
+
+
+@pytest.mark.ci
+def test_damping_that_fades_is_found_with_its_time() -> None:
+    found = search(lambda _x, v, _u, t: 4.0 * v * (1.0 - np.exp(-t / 3.0)), timed=True)
+    assert found is not None
+    assert [each.term.text for each in found.terms] == ["v*exp(-t/{scale})"]
+    values = dict(zip((each.name for each in found.fit.simulation.parameters), found.fit.values, strict=True))
+    assert values["a1"] == pytest.approx(4.0, rel=0.05)
+    assert values["s1"] == pytest.approx(3.0, rel=0.1)
+    assert found.terms[0].term.depends_on_time
 
 
 @pytest.mark.ci
