@@ -151,7 +151,8 @@ def make_diagnosis(
     is_explained = verdict not in (Verdict.UNKNOWN, Verdict.STOPPED)
     noise = describe_noise(record.y[:fitted], residual, context) if is_explained else ()
     as_given = evaluate_fit(base.simulation, target, base.simulation.nominal)
-    nominal = fit_initial_states(as_given, target, 0).output
+    # The first recording begins as the simulation states.
+    nominal = fit_initial_states(as_given, target, 1).output
     return Diagnosis(
         verdict,
         (*findings, *noise),
@@ -190,7 +191,7 @@ def _measure_confirmed_gain(
     """Return the gain of the effects of an outcome on the hold-out part; None if that refutes them."""
     hypothesis, target = outcome.hypothesis, outcome.target
     holdout = slice(target.fitted, record.samples)
-    reference = choose_reference_fit(hypothesis, base, target)
+    reference = choose_reference_fit(hypothesis.effects, base, target)
     before = fit_initial_states(reference, target, target.fitted).output
     gain = measure_gain(record, before, hypothesis.fit.output, holdout, outcome.noise_floor**0.5, rng)
     # Under model error, a gain in the estimation part is no evidence of one in another part.

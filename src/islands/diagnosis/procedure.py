@@ -27,6 +27,7 @@ from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.diagnosis.gross_errors.record_finding import describe_extrapolation, describe_gaps
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
 from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_late_effects
+from islands.diagnosis.inference.exchanged_parts import exchange_parts
 from islands.diagnosis.inference.extension_trial import try_extension
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.inference.strategies import (
@@ -212,8 +213,11 @@ def _find_causes(
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
         found = extend_equations(found, terms, target, run)
     # An extension that diverges beyond its record is not offered.
-    trial = None if found.gain is None else try_extension(record, base, found.best, target)
-    return replace(found, trial=trial)
+    if found.gain is None:
+        return found
+    trial = try_extension(record, base, found.best, target)
+    exchange = exchange_parts(record, found.base, found.best, target, found.noise_floor, run.rng)
+    return replace(found, trial=trial, exchange=exchange)
 
 
 def _start_run(seed: int, parallel_map: ParallelMap, progress: ProgressCallback) -> DiagnosisRun:

@@ -8,6 +8,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.discovery.missing_terms import Discovery
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.diagnosis.inference.exchanged_parts import ExchangedParts
 from islands.diagnosis.inference.extension_trial import ExtensionTrial
 from islands.diagnosis.inference.finding import Finding
 from islands.diagnosis.inference.holdout import HoldoutGain
@@ -95,6 +96,8 @@ class Diagnosis:
         Size and correlation time of the residual; None if there is a gross error.
     trial : ExtensionTrial or None
         Trial of the extended simulation beyond the record; None if no effect was added to it.
+    exchange : ExchangedParts or None
+        The extended simulation fitted to the hold-out recordings; None if there are none.
     left_out : tuple of str
         Steps that a stopped diagnosis has left out; empty for a complete one.
     """
@@ -117,6 +120,7 @@ class Diagnosis:
     shape: EffectShape | None = None
     noise_claim: NoiseClaim | None = None
     trial: ExtensionTrial | None = None
+    exchange: ExchangedParts | None = None
     left_out: tuple[str, ...] = ()
 
     @property

@@ -9,22 +9,28 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.target import Target
 
 
-def fit_initial_states(fit: CalibrationResult, target: Target, first_sample: int) -> CalibrationResult:
-    """Fit the initial states of the recordings after the first one that begin at ``first_sample`` or later.
+def fit_initial_states(
+    fit: CalibrationResult, target: Target, first: int, last: int | None = None
+) -> CalibrationResult:
+    """Fit the initial states of recordings.
 
     All other parameters keep their values. Other recordings do not predict the initial state of a recording
-    in the hold-out part; with a wrong one, the errors would be those of the transient.
+    that is not fitted; with a wrong one, the errors would be those of the transient.
 
     Parameters
     ----------
     fit : CalibrationResult
     target : Target
         Target of the fit; the states are fitted to the unweighted output of their recordings.
+    first, last : int
+        The recordings begin at sample ``first`` or later, and before ``last``; by default until the end.
     """
     simulation = fit.simulation
     bounds = find_bounds(simulation.context.segments, target.y.size)
-    recordings = [index for index, (first, _) in enumerate(bounds) if index and first >= first_sample]
-    is_state = np.isin(simulation.recordings, recordings)
+    end = target.y.size if last is None else last
+    recordings = [index for index, (begin, _) in enumerate(bounds) if first <= begin < end]
+    is_initial = np.array([parameter.initial for parameter in simulation.parameters], dtype=bool)
+    is_state = is_initial & np.isin(simulation.recordings, recordings)
     if not is_state.any():
         return fit
     is_fitted = np.zeros(target.y.size, dtype=bool)

@@ -10,6 +10,7 @@ from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
 from islands.diagnosis.findings import ResidualFormula
+from islands.diagnosis.inference.exchanged_parts import ExchangedParts
 from islands.diagnosis.inference.finding import Finding, list_free_forms
 from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
@@ -66,6 +67,7 @@ def diagnosis_document(
         **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None or diagnosis.refusal else "extended.json",
         "extension": None if diagnosis.trial is None else asdict(diagnosis.trial),
+        "exchange": None if diagnosis.exchange is None else _describe_exchange(diagnosis.exchange),
         "record_findings": [each.as_document() for each in diagnosis.record_findings],
         "left_out": list(diagnosis.left_out),
         "wall_s": wall_s,
@@ -155,6 +157,11 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "free_form": bool(list_free_forms([finding])),
         "resembles": None if finding.resembles is None else asdict(finding.resembles),
     }
+
+
+def _describe_exchange(exchange: ExchangedParts) -> dict[str, Any]:
+    values = [{**asdict(each), "agrees": each.agrees} for each in exchange.values]
+    return {"gain": asdict(exchange.gain), "values": values}
 
 
 def _describe_shape(shape: EffectShape) -> dict[str, Any]:

@@ -38,6 +38,10 @@ ORDER = 20
 #: Number of lags on each side, in samples.
 LAGS = 10
 
+#: Size of an innovation of the input, in medians, at which it is also clipped: a few steps of a setpoint are
+#: much larger than the noise that is fed back.
+LARGE_INNOVATION = 3.0
+
 #: Distance from the null distribution above which feedback is reported, in standard deviations.
 MIN_DISTANCE = 4.0
 
@@ -112,6 +116,13 @@ def measure_feedback(
     if u.size < MIN_SAMPLES or np.ptp(u) == 0.0 or np.ptp(residual) == 0.0:
         return None
     errors, inputs = whiten(residual), whiten(u)
+    limit = LARGE_INNOVATION * float(np.median(np.abs(inputs)))
+    found = (_correlate(errors, each, first, least) for each in (inputs, np.clip(inputs, -limit, limit)))
+    return next((each for each in found if each is not None), None)
+
+
+def _correlate(errors: Signal, inputs: Signal, first: int, least: float) -> tuple[int, float, float] | None:
+    """Return the feedback that `measure_feedback` returns, from innovations of residual and input."""
     spectrum = np.conj(np.fft.rfft(errors)) * np.fft.rfft(inputs)
     size = float(np.sqrt((errors @ errors) * (inputs @ inputs)))
     if size == 0.0:

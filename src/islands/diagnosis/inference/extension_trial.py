@@ -80,7 +80,7 @@ def _list_ends(
     """Return the fit, and the points at the ends of the intervals of added parameters, with labels."""
     simulation, covariance = best.simulation, estimate_covariance(best, target)
     labels, points = [""], [best.values]
-    for index, name in _find_added(base, best).items():
+    for index, name in find_added_parameters(base, best).items():
         deviation = float(np.sqrt(max(covariance[index, index], 0.0)))
         for end in (-_HALF_WIDTH, _HALF_WIDTH) if deviation > 0.0 else ():
             points.append(best.values + end / deviation * covariance[index])
@@ -88,7 +88,7 @@ def _list_ends(
     return labels, simulation.project(np.array(points))
 
 
-def _find_added(base: CalibrationResult, best: CalibrationResult) -> dict[int, str]:
+def find_added_parameters(base: CalibrationResult, best: CalibrationResult) -> dict[int, str]:
     """Return the names of the parameters of terms and effects by their places in the extension."""
     known = {parameter.name for parameter in base.simulation.parameters}
     simulation = best.simulation

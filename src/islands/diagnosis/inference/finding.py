@@ -194,7 +194,7 @@ def _describe_effect(
             values = _scale_values(confounder, values, fit)
     named = scored.pop(name)
     others = [*scored.values(), ScoredAlternative(0.0, sum_squares_by_block(without.fit, fit, target))]
-    reference = choose_reference_fit(hypothesis, without.fit, target)
+    reference = choose_reference_fit(hypothesis.effects, without.fit, target)
     explained = explained_fraction(reference, fit, outcome.noise_floor)
     if outcome.verdict == Verdict.REMAINDER and explained < 1.0:
         others.append(make_unlisted_cause(named, 1.0 - explained))

@@ -2,9 +2,10 @@
 
 A search for effects takes the colour of a residual for noise, and a coarse map of the input averages an error
 that alternates over the input, such as that of a quantised actuator. The residual is therefore regressed on
-free functions of the input through the simulation: a fine map, and a memory. Whatever has a frequency that
-moves, such as an unmeasured force with a sweep, fills a band as noise does, but within a short window it is a
-line. Whatever repeats with the periods of the input is no noise.
+free functions through the simulation: a fine map and a memory of the input, and a map of the output, for a
+law of the state. Whatever has a frequency that moves, such as an unmeasured force with a sweep, fills a band
+as noise does, but within a short window it is a line. Whatever repeats with the periods of the input is no
+noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,6 +31,9 @@ from islands.estimation.noise_model import fit_noise
 
 #: Number of cells of the map of the input. A sawtooth over the input needs three cells for each tooth.
 CELLS = 120
+
+#: The same of the output, for a law of the state. It has no teeth, and fewer cells are more sensitive to it.
+OUTPUT_CELLS = 40
 
 #: Least number of samples in a cell.
 MIN_CELL_SAMPLES = 8
@@ -110,17 +114,24 @@ def _compare_with_shifts(
 
 
 def _list_functions(fit: CalibrationResult, target: Target) -> Mapping[str, list[Signal]]:
-    """Return functions of the input by name: cells of its values, and its past values."""
-    context = fit.simulation.context
-    u, segments = context.u, context.segments
-    count = min(CELLS, target.fitted // MIN_CELL_SAMPLES)
-    edges = np.unique(np.quantile(u[: target.fitted], np.linspace(0.0, 1.0, count + 1)[1:-1]))
-    cells = np.searchsorted(edges, u, side="right")
-    lags = [lag for lag in MEMORY_LAGS if lag < target.fitted // 10]
+    """Return functions by name: cells of the input and of the simulated output, and past inputs."""
+    context, fitted = fit.simulation.context, target.fitted
+    lags = [lag for lag in MEMORY_LAGS if lag < fitted // 10]
     return {
-        "fine map of the input": [(cells == cell).astype(np.float64) for cell in range(edges.size + 1)],
-        "memory of the input": [map_segments(partial(delay_samples, lag=lag), u, segments) for lag in lags],
+        "fine map of the input": _divide_into_cells(context.u, CELLS, fitted),
+        "map of the output": _divide_into_cells(fit.output, OUTPUT_CELLS, fitted),
+        "memory of the input": [
+            map_segments(partial(delay_samples, lag=lag), context.u, context.segments) for lag in lags
+        ],
     }
+
+
+def _divide_into_cells(signal: Signal, most: int, fitted: int) -> list[Signal]:
+    """Return where a signal is in each of up to ``most`` cells with equal numbers of samples, as 0 and 1."""
+    count = min(most, fitted // MIN_CELL_SAMPLES)
+    edges = np.unique(np.quantile(signal[:fitted], np.linspace(0.0, 1.0, count + 1)[1:-1]))
+    cells = np.searchsorted(edges, signal, side="right")
+    return [(cells == cell).astype(np.float64) for cell in range(edges.size + 1)]
 
 
 def _respond_to_pulse(fit: CalibrationResult) -> Signal | None:

@@ -174,7 +174,7 @@ def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
     hypothesis = flatten_ends(hypothesis, target)
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
-        choose_reference_fit(hypothesis, base, target),
+        choose_reference_fit(hypothesis.effects, base, target),
         hypothesis.fit,
         rest.noise_floor if target.effective_samples is None else 0.0,
     )

@@ -87,7 +87,7 @@ def validate_out_of_sample(
     part of its response that no simulation reproduces.
     """
     while hypothesis.effects:
-        reference = choose_reference_fit(hypothesis, base, target)
+        reference = choose_reference_fit(hypothesis.effects, base, target)
         keep_values = reference is not base
         if cross_validate_gain(reference, keep_values, hypothesis.fit, target, rng) > 0.0:
             break
@@ -129,15 +129,15 @@ def _sum_confounder_excess(hypothesis: Hypothesis, target: Target) -> float:
 
 
 def choose_reference_fit(
-    hypothesis: Hypothesis, base: CalibrationResult, target: Target
+    effects: Sequence[Effect], base: CalibrationResult, target: Target
 ) -> CalibrationResult:
-    """Return the fit that a hypothesis is compared with: the calibrated simulation without effects.
+    """Return the fit that effects are compared with: the calibrated simulation without them.
 
-    Calibration absorbs a wrong gain or parameter. A hypothesis that has only such effects is therefore
+    Calibration absorbs a wrong gain or parameter. An extension that has only such effects is therefore
     compared with the simulation at its nominal values. Initial states of recordings after the first have no
     nominal values and are those of the calibration.
     """
-    if all(effect.family == "scale" for effect in hypothesis.effects):
+    if all(effect.family == "scale" for effect in effects):
         simulation = base.simulation
         nominal = np.where(simulation.is_copy, base.values, simulation.nominal)
         return evaluate_fit(simulation, target, nominal)

@@ -625,6 +625,34 @@ def _describe_gain(facts: DiagnosisFacts) -> str:
     return f"{text}."
 
 
+def _describe_exchange(facts: DiagnosisFacts) -> str:
+    exchange = facts.document["exchange"]
+    gain, values = exchange["gain"], exchange["values"]
+    low, high = gain["ci95"]
+    before, after = (facts.write_error(gain[each]["rmse"]) for each in ("before", "after"))
+    falls = (
+        f"falls from {before} to {after}, by {gain['reduction_percent']:.1f} % ({low:.1f} to {high:.1f} with "
+        "95 % confidence)"
+        if low > 0.0
+        else f"does not fall significantly: {before} without them, {after} with them"
+    )
+    text = (
+        f"The reverse: with all values fitted to {facts.held_out_part} alone, the RMSE of the data that were "
+        f"used for estimation {falls}."
+    )
+    listed = "; ".join(
+        f"{each['name']} = {each['estimation']:.3g} and {each['validation']:.3g} {each['unit']}".rstrip()
+        for each in values
+        if not each["agrees"]
+    )
+    if listed:
+        return (
+            f"{text} Both parts have different values: {listed}. The system differs between them, or the "
+            "cause is another one."
+        )
+    return f"{text} Both parts have the same values, within 10 % or four standard deviations."
+
+
 def name_reference(document: Document) -> str:
     """Name the simulation with which the extended one is compared.
 
@@ -844,6 +872,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda _: "A flexible model of the past of input and output predicts a part of the residual.",
     ),
     Statement("gain", lambda facts: facts.gain is not None, _describe_gain),
+    Statement("exchange", lambda facts: facts.document.get("exchange"), _describe_exchange),
     Statement(
         "time-dependent",
         lambda facts: facts.gain is not None and facts.time_dependent,

@@ -11,7 +11,6 @@ from islands.data.dataset import join
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import cross_validate_gain
-from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.noise_detectors import DETECTORS, NoiseFinding
 from islands.diagnosis.inference.noise_floor import explainable_variance, noise_variance_from_periods
 from islands.diagnosis.inference.residual_structure import find_residual_structure
@@ -153,7 +152,7 @@ def test_penalty_counts_the_initial_states_of_every_recording() -> None:
 def test_reference_at_nominal_values_keeps_the_initial_states_of_recordings() -> None:
     fit, target = make_fit(LENGTHS)
     gain = (CATALOGUE["sensor-gain"],)
-    reference = choose_reference_fit(Hypothesis(fit, 0.0, gain), fit, target)
+    reference = choose_reference_fit(gain, fit, target)
     names = [parameter.name for parameter in fit.simulation.parameters]
     changed = reference.values != fit.simulation.nominal
     assert [name for name, kept in zip(names, changed, strict=True) if kept] == [

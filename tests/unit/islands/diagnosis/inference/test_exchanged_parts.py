@@ -1,0 +1,74 @@
+"""An extension that is fitted to the hold-out recordings: gain on the others, and values of both."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.data.split import hold_out
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.documents.result_json import diagnosis_document
+from islands.diagnosis.inference.exchanged_parts import ExchangedParts, exchange_parts
+from islands.effects.catalogue import CATALOGUE
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.factory import make_simulator
+from support.joined_oscillator import SIGMA, oscillator_recordings
+
+#: Recordings of which the second one has another input.
+LENGTHS = (500, 400)
+
+
+def record(first: float, second: float) -> Dataset:
+    """Return a recording of an oscillator with a cubic spring, and one with another for validation."""
+    one, _ = oscillator_recordings(1, LENGTHS, "cubic-stiffness", first)
+    _, other = oscillator_recordings(1, LENGTHS, "cubic-stiffness", second)
+    return hold_out(one, other)
+
+
+def exchange(given: Dataset, name: str = "cubic-stiffness") -> ExchangedParts | None:
+    fitted = count_fitted_samples(given)
+    simulator = make_simulator("second-order", given)
+    base = ExtendedSimulator(simulator, (), make_context(given, simulator, fitted))
+    extended = base.with_effects((CATALOGUE[name],))
+    target = make_target(given, fitted, {})
+    fits = [calibrate(each, target, each.nominal) for each in (base, extended)]
+    return exchange_parts(given, *fits, target, SIGMA, np.random.default_rng(0))
+
+
+def test_the_right_law_has_the_same_values_and_reduces_the_error_of_the_data_that_were_not_fitted() -> None:
+    found = exchange(record(3000.0, 3000.0))
+    assert found is not None
+    assert found.gain.ci95[0] > 80.0
+    assert found.gain.after.rmse == pytest.approx(SIGMA, rel=0.1)
+    (value,) = found.values
+    assert (value.name, value.unit) == ("cubic-stiffness k", "N/m^3")
+    assert value.agrees
+    assert value.estimation == pytest.approx(value.validation, rel=0.05)
+
+
+def test_another_coefficient_in_the_validation_data_is_a_contradiction() -> None:
+    found = exchange(record(3000.0, 1500.0))
+    assert found is not None
+    (value,) = found.values
+    assert not value.agrees
+    assert value.estimation == pytest.approx(2.0 * value.validation, rel=0.1)
+    assert found.gain.after.rmse > 3.0 * SIGMA
+
+
+def test_the_end_of_a_recording_is_no_other_input() -> None:
+    one, _ = oscillator_recordings(1, LENGTHS, "cubic-stiffness", 3000.0)
+    assert exchange(one) is None
+
+
+@pytest.mark.ci
+def test_the_text_states_both_values_where_they_contradict_each_other() -> None:
+    effects = (CATALOGUE["cubic-stiffness"],)
+    found = islands.diagnose(record(3000.0, 1500.0), "second-order", effects=effects)
+    document = diagnosis_document(found)
+    assert not document["exchange"]["values"][0]["agrees"]
+    assert "The reverse: with all values fitted to the validation recording alone" in found.summary
+    assert "Both parts have different values: cubic-stiffness k = 3e+03 and 1." in found.summary
+    found = islands.diagnose(record(3000.0, 3000.0), "second-order", effects=effects)
+    assert "Both parts have the same values" in found.summary
