@@ -7,6 +7,7 @@ it.
 import itertools
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,18 +36,35 @@ RATE_FACTORS = ("a", "abs(a)", "sign(a)")
 #: Largest number of signals of which products are candidates: these grow with the cube of the number.
 MAX_MULTIPLIED_SIGNALS = 8
 
-#: Functions with a scale that is fitted, and its nominal value relative to the largest value of their signal:
-#: a saturation, and two forms of the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, A survey
-#: of models, analysis tools and compensation methods for the control of machines with friction, 1994).
-SCALED_FORMS = {
-    "tanh({signal}/{scale})": 0.3,
-    "sign({signal})*exp(-abs({signal}/{scale}))": 0.1,
-    "sign({signal})*exp(-({signal}/{scale})**2)": 0.1,
-}
 
-#: Functions of one signal and the time with a scale that is fitted, and its nominal value relative to the
-#: duration of the record: a parameter that settles as the machine warms up or runs in.
-FADING_FORMS = {f"{{signal}}*exp(-{TIME}/{{scale}})": 0.3}
+class ScaledForm(NamedTuple):
+    """Function of a signal with a scale that is fitted.
+
+    Attributes
+    ----------
+    text : str
+        Expression with ``{signal}`` and ``{scale}``.
+    scale : float
+        Nominal value of the scale, relative to the largest value of its argument.
+    limit : str
+        Expression without a scale that the function approaches if the scale is extreme.
+    """
+
+    text: str
+    scale: float
+    limit: str
+
+
+#: A saturation, and two forms of the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, A survey
+#: of models, analysis tools and compensation methods for the control of machines with friction, 1994).
+SCALED_FORMS = (
+    ScaledForm("tanh({signal}/{scale})", 0.3, "sign({signal})"),
+    ScaledForm("sign({signal})*exp(-abs({signal}/{scale}))", 0.1, "sign({signal})"),
+    ScaledForm("sign({signal})*exp(-({signal}/{scale})**2)", 0.1, "sign({signal})"),
+)
+
+#: A parameter that settles as the machine warms up or runs in: the argument of the scale is the time.
+FADING_FORM = ScaledForm(f"{{signal}}*exp(-{TIME}/{{scale}})", 0.3, f"{TIME}*{{signal}}")
 
 #: Further scales from which a fit starts, relative to the nominal one.
 STARTING_SCALES = (0.3, 3.0)
@@ -116,6 +134,8 @@ class CandidateTerm:
         Units of the coefficient and of the scale; empty if they are not known.
     gate : Gate or None
         Part of the time in which the term acts, whose instant is the scale; None if it always acts.
+    limit : str
+        Expression of the term that it approaches if its scale is extreme; empty if it has none.
     """
 
     target: str
@@ -125,6 +145,7 @@ class CandidateTerm:
     unit: str = ""
     scale_unit: str = ""
     gate: Gate | None = None
+    limit: str = ""
 
     @property
     def value_count(self) -> int:
@@ -296,14 +317,30 @@ def list_candidate_terms(
             terms.append(CandidateTerm(target, text, size, unit=own_unit))
         for signal in signals:
             scale_unit = find_expression_unit(parse_expression(signal), units)
-            for form, scale in SCALED_FORMS.items():
-                text = form.format(signal=signal, scale="{scale}")
-                terms.append(CandidateTerm(target, text, 1.0, scale * sizes[signal], unit, scale_unit))
             own_unit = find_factor_unit(unit, parse_expression(signal), units)
-            for form, scale in FADING_FORMS.items():
-                text = form.format(signal=signal, scale="{scale}")
-                terms.append(CandidateTerm(target, text, sizes[signal], scale * duration, own_unit, "s"))
+            terms += [
+                _make_scaled(target, form, signal, 1.0, sizes[signal], (unit, scale_unit))
+                for form in SCALED_FORMS
+            ]
+            terms.append(_make_scaled(target, FADING_FORM, signal, sizes[signal], duration, (own_unit, "s")))
     return tuple(terms)
+
+
+def _make_scaled(
+    target: str, form: ScaledForm, signal: str, size: float, largest: float, units: tuple[str, str]
+) -> CandidateTerm:
+    """Return a term with a scale.
+
+    Parameters
+    ----------
+    size, largest : float
+        Largest values of the expression, and of the argument of the scale.
+    units : tuple of str
+        Units of the coefficient and of the scale.
+    """
+    text = form.text.format(signal=signal, scale="{scale}")
+    limit = form.limit.format(signal=signal)
+    return CandidateTerm(target, text, size, form.scale * largest, *units, limit=limit)
 
 
 def _list_texts(signals: list[str], rate: str) -> Iterator[str]:

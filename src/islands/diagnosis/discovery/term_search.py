@@ -214,6 +214,7 @@ def search_terms(
         best = _select_discretisation(best, target)
         best = _eliminate_terms(best, system, target, target_sizes, run)
         best = _improve(best, _calibrate_smoothed(best.fit, target, equations.sizes))
+        best = _take_limits(best, system, target, target_sizes, candidates, equations.sizes)
         best = _move_instants(best, target)
         best = _correct_timing(best, system, target, target_sizes, run)
         if best.cost > before - MIN_GAIN or _may_lack_a_term(best, target):
@@ -258,6 +259,35 @@ def _calibrate_smoothed(
     simulator = with_equations(fit.simulation.simulator, replace(system, derivatives=derivatives))
     smoothed = calibrate(replace(fit.simulation, simulator=simulator), target, fit.values)
     return calibrate(fit.simulation, target, smoothed.values)
+
+
+def _take_limits(
+    found: TermSearchResult,
+    system: OdeSystem,
+    target: Target,
+    target_sizes: Mapping[str, float],
+    candidates: Sequence[CandidateTerm],
+    sizes: Mapping[str, float],
+) -> TermSearchResult:
+    """Replace terms by those that they approach for an extreme scale, if that costs less.
+
+    The calibration of a sign may have ended too early, while that of a function with a scale has not.
+    """
+    simple = {(each.target, each.text): each for each in candidates if each.scale is None}
+    log_n = float(np.log(found.fit.noise.effective_samples))
+    for each in found.terms:
+        limit = simple.get((each.term.target, each.term.limit))
+        if limit is None or any(other.term == limit for other in found.terms):
+            continue
+        simpler = replace(each, term=limit, penalty=each.penalty - log_n)
+        terms = tuple(simpler if other is each else other for other in found.terms)
+        numbered = [(other.term, other.number) for other in terms]
+        simulation, start = add_terms(found.fit, system, numbered, target_sizes)
+        tried = replace(found, fit=calibrate(simulation, target, start), terms=terms)
+        tried = _improve(tried, _calibrate_smoothed(tried.fit, target, sizes))
+        if tried.cost < found.cost:
+            found = tried
+    return found
 
 
 def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:

@@ -87,9 +87,8 @@ def feeds_back_at_once(fit: CalibrationResult, target: Target) -> bool:
     # The covariance with the noise is that of all changes: slope = direct term + covariance / mean square.
     weights = np.array([np.mean(inputs[part] ** 2) for part in (is_large, ~is_large)]) * (1.0, -1.0)
     direct, of_direct = weights @ (large, small), weights**2 @ (of_large, of_small)
-    return abs(large - small) > MIN_CONTRADICTION * float(np.sqrt(of_large + of_small)) and abs(
-        direct
-    ) < MAX_DIRECT_TERM * float(np.sqrt(of_direct))
+    is_contradicted = abs(large - small) > MIN_CONTRADICTION * float(np.sqrt(of_large + of_small))
+    return is_contradicted and bool(abs(direct) < MAX_DIRECT_TERM * np.sqrt(of_direct))
 
 
 def list_late_effects(effects: Sequence[Effect], base: CalibrationResult) -> list[Effect]:

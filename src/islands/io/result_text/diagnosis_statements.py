@@ -868,7 +868,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement("remainder", lambda facts: facts.remainder, _describe_remainder),
     Statement(
         "predictable-residual",
-        lambda facts: facts.verdict == "named with remainder" and not facts.remainder,
+        lambda facts: _has("named with remainder", "unknown")(facts) and not facts.remainder,
         lambda _: "A flexible model of the past of input and output predicts a part of the residual.",
     ),
     Statement("gain", lambda facts: facts.gain is not None, _describe_gain),
