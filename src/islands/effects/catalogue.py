@@ -37,7 +37,7 @@ from islands.effects.nonlinearity import (
 )
 from islands.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
 from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
-from islands.effects.time_variation import AGEING, GAIN_STEP
+from islands.effects.time_variation import AGEING, GAIN_STEP, TEMPERATURE_GAIN
 from islands.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
 
 #: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
@@ -76,6 +76,7 @@ EFFECTS: tuple[Effect, ...] = (
     JUMP,
     THERMAL_DRIFT,
     CROSS_COUPLING,
+    TEMPERATURE_GAIN,
     SECOND_INPUT,
     PERIODIC_DISTURBANCE,
     CYCLIC_ERROR,

@@ -1,4 +1,4 @@
-"""Effects that change with time: a step of the gain, ageing."""
+"""Changes of the gain: a step at an instant, ageing, a temperature."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
+from islands.effects.channels import channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
@@ -116,4 +117,35 @@ AGEING = Effect(
     similar_to="gain-step, linear-drift",
     distinguished_by="a residual proportional to time and output",
     occurs_in="heating of a drive or sensor, wear, depolarisation during the record",
+)
+
+
+def _temperature_gain_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return u * (1.0 + values[0] * channel(context, True))
+
+
+def _temperature_gain_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("k", f"1/{channel_unit(context, True)}", 0.0, 0.01 / channel_range(context, True)),)
+
+
+def _temperature_gain_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 / channel_range(context, True),),)
+
+
+TEMPERATURE_GAIN = Effect(
+    name="temperature-gain",
+    summary="The gain depends on a temperature: u (1 + k (T - T(0))), where T is a given channel",
+    family="change",
+    site=Site.INPUT,
+    parameters=_temperature_gain_parameters,
+    starting_points=_temperature_gain_starting_points,
+    form=_temperature_gain_form,
+    equation=lambda _: MapEquation("x*(1 + n0*z0)", (("temperature",),)),
+    source="Doebelin, Measurement Systems, section 2",
+    is_applicable=lambda context: has_channel(context, True),
+    similar_to="ageing if the temperature only rises, thermal-drift",
+    distinguished_by="a residual proportional to the input and to a channel in K, degC or degF",
+    occurs_in="magnets, viscosity in valves, piezo ceramics, resistance of a winding",
 )

@@ -141,6 +141,7 @@ OSCILLATOR = Rig(
         Fault("exponential-creep", 0.01, 1.0, (after_plant(signal_faults.exponential_creep(0.3, 4.0)),)),
         Fault("second-hysteresis", 0.002, 0.3, (add_force(force_faults.hysteresis),)),
         Fault("second-input", 0.002, 0.3, (before_plant(signal_faults.second_input),)),
+        Fault("temperature-gain", 0.005, 0.5, (before_plant(signal_faults.temperature_gain),)),
         Fault("backlash", 0.05, 2.5, (before_plant(signal_faults.backlash),)),
         Fault(
             "coulomb-friction",

@@ -200,6 +200,12 @@ def second_input(rng: np.random.Generator, strength: float) -> Map:
     return lambda drive, u: u + c * drive.peak_input * drive.neighbour
 
 
+def temperature_gain(rng: np.random.Generator, strength: float) -> Map:
+    """Gain that depends on the temperature."""
+    c = random_sign(rng) * strength
+    return lambda drive, u: u * (1.0 + c * drive.temperature)
+
+
 def rate_limit(_rng: np.random.Generator, strength: float) -> Map:
     """Rate limiter; the strength is the RMS of the rate of the input relative to the limit."""
 
