@@ -141,13 +141,18 @@ def _score_fresh(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statis
     """Score claims and extensions on fresh records.
 
     Ratios of the errors are those of causes whose extension can hold there. Extensions of disturbances that
-    have another phase there are counted apart.
+    have another phase there are counted apart, and those that are not offered make no record worse.
     """
     sure = [claim for each in outcomes for claim in list_sure_claims(each)]
-    extended = [(UNUSUAL_CAUSES[each.trial.cause], each.fresh) for each in outcomes if each.fresh is not None]
-    carried = [fresh for cause, fresh in extended if cause.carries]
-    disturbed = [fresh for cause, fresh in extended if not cause.carries]
-    ratios = [fresh.ratio for cause, fresh in extended if cause.carries and not cause.is_clean]
+    extended = [each for each in outcomes if each.fresh is not None]
+    offered = [
+        (UNUSUAL_CAUSES[each.trial.cause], each.fresh)
+        for each in extended
+        if each.fresh is not None and not each.is_refused
+    ]
+    carried = [fresh for cause, fresh in offered if cause.carries]
+    disturbed = [fresh for cause, fresh in offered if not cause.carries]
+    ratios = [fresh.ratio for cause, fresh in offered if cause.carries and not cause.is_clean]
     worse = "extensions that make a fresh record worse or diverge"
     return [
         Proportion(
@@ -176,6 +181,7 @@ def _score_fresh(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statis
             sum(each.is_worse for each in disturbed),
             len(disturbed),
         ),
+        Proportion("extensions that are refused", sum(each.is_refused for each in extended), len(extended)),
     ]
 
 

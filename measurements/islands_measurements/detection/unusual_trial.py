@@ -114,6 +114,8 @@ class UnusualOutcome:
         None if the diagnosis has no extension.
     findings : tuple of str
         Names of the properties of the noise, and descriptions of the findings about the record.
+    is_refused : bool
+        Whether the extended simulation is not offered. Its errors say whether the claims hold.
     error : str
         Traceback of an error that ended the diagnosis, or of a refusal; empty without one.
     """
@@ -124,6 +126,7 @@ class UnusualOutcome:
     claims: tuple[Claim, ...] = ()
     fresh: FreshErrors | None = None
     findings: tuple[str, ...] = ()
+    is_refused: bool = False
     error: str = ""
 
 
@@ -157,7 +160,8 @@ def run_unusual_trial(trial: UnusualTrial) -> UnusualOutcome:
             claims = tuple(replace(each, loss=_measure_loss(each, found, other, fresh)) for each in claims)
         notes = tuple(each.name for each in found.noise)
         notes += tuple(each.description for each in found.record_findings)
-        return UnusualOutcome(trial, misfit, str(found.verdict), claims, fresh, notes)
+        is_refused = found.refusal is not None
+        return UnusualOutcome(trial, misfit, str(found.verdict), claims, fresh, notes, is_refused)
     except Exception:  # Any error is counted, with its traceback.
         return UnusualOutcome(trial, misfit, "error", error=traceback.format_exc(limit=-3))
 

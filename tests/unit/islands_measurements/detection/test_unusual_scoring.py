@@ -1,5 +1,7 @@
 """Scores of trials with unusual causes."""
 
+from dataclasses import replace
+
 import pytest
 
 from islands.effects.catalogue import CATALOGUE
@@ -128,6 +130,7 @@ def test_scores_count_causes_claims_extensions_and_clean_records() -> None:
         outcome("clean-loop"),
         outcome("clean-loop", verdict="unknown"),
         outcome("clean-pink", effect("jump", 0.5), fresh=HELD),
+        replace(outcome("clean-pink", fresh=WORSE), is_refused=True),
     ]
     rows = score_unusual(outcomes)
     assert {row.name: (row.count, row.of) for row in rows if isinstance(row, Proportion)} == {
@@ -139,8 +142,9 @@ def test_scores_count_causes_claims_extensions_and_clean_records() -> None:
         "the same below 0.2": (1, 3),
         "extensions that make a fresh record worse or diverge": (1, 4),
         "the same, of disturbances that have another phase there": (1, 1),
-        "clean records with a name": (1, 3),
-        "clean records with 'unknown'": (1, 3),
+        "extensions that are refused": (1, 6),
+        "clean records with a name": (1, 4),
+        "clean records with 'unknown'": (1, 4),
     }
     (median,) = (row for row in rows if isinstance(row, Statistic))
     assert (median.value, median.of) == (pytest.approx(0.3), 3)
