@@ -3,9 +3,10 @@
 A search for effects takes the colour of a residual for noise, and a coarse map of the input averages an error
 that alternates over the input, such as that of a quantised actuator. The residual is therefore regressed on
 free functions through the simulation: a fine map and a memory of the input, and a map of the output, for a
-law of the state. Whatever has a frequency that moves, such as an unmeasured force with a sweep, fills a band
-as noise does, but within a short window it is a line. Whatever repeats with the periods of the input is no
-noise.
+law of the state. Where the simulation itself is wrong, as for a sensor that shows the absolute value, curves
+of the input after lags of several lengths are tried as well. Whatever has a frequency that moves, such as an
+unmeasured force with a sweep, fills a band as noise does, but within a short window it is a line. Whatever
+repeats with the periods of the input is no noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,6 +29,7 @@ from islands.diagnosis.inference.noise_surrogates import (
 from islands.diagnosis.inference.residual_structure import MIN_DISTANCE, SHIFTS
 from islands.effects.interface.effect import Signal
 from islands.estimation.noise_model import fit_noise
+from islands.kernels.linear_filter import filter_linearly
 
 #: Number of cells of the map of the input. A sawtooth over the input needs three cells for each tooth.
 CELLS = 120
@@ -40,6 +42,9 @@ MIN_CELL_SAMPLES = 8
 
 #: Lags of the memory, in samples.
 MEMORY_LAGS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
+
+#: Time constants of the lags whose curves are tried, in samples.
+LAG_CONSTANTS = (1, 2, 4, 8, 16, 32, 64, 128)
 
 #: Lengths of the windows in which a line is searched for, in samples, and the largest sweep in each, in
 #: cycles per window.
@@ -99,11 +104,8 @@ def _compare_with_shifts(
         [np.roll(residual, shift) for shift in rng.integers(count // 20, count - count // 20, SHIFTS)]
     )
     distances = {}
-    for name, functions in _list_functions(fit, target).items():
-        columns = [
-            projection(_convolve(each, response, fit.simulation.context.segments))[:count]
-            for each in functions
-        ]
+    for name, functions in _list_functions(fit, target, response).items():
+        columns = [projection(each)[:count] for each in functions]
         basis = _span(np.column_stack(columns))
         if basis.shape[1] == 0:
             continue
@@ -113,17 +115,37 @@ def _compare_with_shifts(
     return distances
 
 
-def _list_functions(fit: CalibrationResult, target: Target) -> Mapping[str, list[Signal]]:
-    """Return functions by name: cells of the input and of the simulated output, and past inputs."""
+def _list_functions(fit: CalibrationResult, target: Target, response: Signal) -> Mapping[str, list[Signal]]:
+    """Return responses to cells of the input and the output and to past inputs, and curves of lags."""
     context, fitted = fit.simulation.context, target.fitted
     lags = [lag for lag in MEMORY_LAGS if lag < fitted // 10]
-    return {
+    delayed = [map_segments(partial(delay_samples, lag=lag), context.u, context.segments) for lag in lags]
+    functions = {
         "fine map of the input": _divide_into_cells(context.u, CELLS, fitted),
         "map of the output": _divide_into_cells(fit.output, OUTPUT_CELLS, fitted),
-        "memory of the input": [
-            map_segments(partial(delay_samples, lag=lag), context.u, context.segments) for lag in lags
-        ],
+        "memory of the input": delayed,
     }
+    responses = {
+        name: [_convolve(each, response, context.segments) for each in signals]
+        for name, signals in functions.items()
+    }
+    return {**responses, "curve of a lag of the input": _list_curves(context.u, context.segments, fitted)}
+
+
+def _list_curves(u: Signal, segments: Sequence[int], fitted: int) -> list[Signal]:
+    """Return the square and the absolute value of the deviation of the input from its mean after each lag."""
+
+    def lag(part: Signal, constant: int) -> Signal:
+        weight = 1.0 / constant
+        return np.asarray(filter_linearly([weight], [1.0, weight - 1.0], part))
+
+    deviation = u - u[:fitted].mean()
+    lagged = [
+        map_segments(partial(lag, constant=constant), deviation, segments)
+        for constant in LAG_CONSTANTS
+        if constant < fitted // 10
+    ]
+    return [curve for each in lagged for curve in (each**2, np.abs(each))]
 
 
 def _divide_into_cells(signal: Signal, most: int, fitted: int) -> list[Signal]:

@@ -171,7 +171,7 @@ def test_friction_in_a_part_of_the_time_is_found_with_its_instant(is_onset: bool
 
 @pytest.mark.ci
 def test_instants_move_as_long_as_the_score_improves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Calibrations of whitened errors may have a worse score than what they start from."""
+    """A calibration of whitened errors may have a worse score than its start."""
 
     def force(_x: float, v: float, _u: float, t: float) -> float:
         return 6.0 * np.tanh(v / 0.01) * (t >= 5.2)

@@ -37,7 +37,7 @@ def exchange(given: Dataset, name: str = "cubic-stiffness") -> ExchangedParts | 
     return exchange_parts(given, *fits, target, SIGMA, np.random.default_rng(0))
 
 
-def test_the_right_law_has_the_same_values_and_reduces_the_error_of_the_data_that_were_not_fitted() -> None:
+def test_a_right_law_has_the_same_values_and_reduces_the_error_of_other_data() -> None:
     found = exchange(record(3000.0, 3000.0))
     assert found is not None
     assert found.gain.ci95[0] > 80.0
