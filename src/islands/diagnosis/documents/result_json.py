@@ -161,7 +161,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
 
 def _describe_exchange(exchange: ExchangedParts) -> dict[str, Any]:
     values = [{**asdict(each), "agrees": each.agrees} for each in exchange.values]
-    return {"gain": asdict(exchange.gain), "values": values}
+    return {"gain": None if exchange.gain is None else asdict(exchange.gain), "values": values}
 
 
 def _describe_shape(shape: EffectShape) -> dict[str, Any]:

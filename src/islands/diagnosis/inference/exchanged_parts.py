@@ -64,13 +64,13 @@ class ExchangedParts:
 
     Attributes
     ----------
-    gain : HoldoutGain
-        Errors over the estimation part, which was not fitted.
+    gain : HoldoutGain or None
+        Errors over the estimation part, which was not fitted; None if a simulation diverges there.
     values : tuple of ExchangedValue
         Parameters of the effects and terms.
     """
 
-    gain: HoldoutGain
+    gain: HoldoutGain | None
     values: tuple[ExchangedValue, ...]
 
 
@@ -110,7 +110,8 @@ def exchange_parts(
     before, after = (
         fit_initial_states(each, target, 0, target.fitted).output for each in (reference, fits[1])
     )
-    gain = measure_gain(record, before, after, slice(0, target.fitted), floor, rng)
+    is_finite = bool(np.isfinite([before, after]).all())
+    gain = measure_gain(record, before, after, slice(0, target.fitted), floor, rng) if is_finite else None
     deviations = estimate_deviations(best, target), estimate_deviations(fits[1], exchanged)
     values = tuple(
         ExchangedValue(

@@ -628,6 +628,9 @@ def _describe_gain(facts: DiagnosisFacts) -> str:
 def _describe_exchange(facts: DiagnosisFacts) -> str:
     exchange = facts.document["exchange"]
     gain, values = exchange["gain"], exchange["values"]
+    text = f"The reverse: with all values fitted to {facts.held_out_part} alone, "
+    if gain is None:
+        return f"{text}a simulation diverges on the data that were used for estimation."
     low, high = gain["ci95"]
     before, after = (facts.write_error(gain[each]["rmse"]) for each in ("before", "after"))
     falls = (
@@ -636,10 +639,7 @@ def _describe_exchange(facts: DiagnosisFacts) -> str:
         if low > 0.0
         else f"does not fall significantly: {before} without them, {after} with them"
     )
-    text = (
-        f"The reverse: with all values fitted to {facts.held_out_part} alone, the RMSE of the data that were "
-        f"used for estimation {falls}."
-    )
+    text += f"the RMSE of the data that were used for estimation {falls}."
     listed = "; ".join(
         f"{each['name']} = {each['estimation']:.3g} and {each['validation']:.3g} {each['unit']}".rstrip()
         for each in values

@@ -1,16 +1,21 @@
 """An extension that is fitted to the hold-out recordings: gain on the others, and values of both."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import islands
 from islands.data.dataset import Dataset
 from islands.data.split import hold_out
-from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.documents.result_json import diagnosis_document
+from islands.diagnosis.inference import exchanged_parts
 from islands.diagnosis.inference.exchanged_parts import ExchangedParts, exchange_parts
 from islands.effects.catalogue import CATALOGUE
+from islands.io.result_text.diagnosis_statements import describe_details
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.factory import make_simulator
@@ -40,6 +45,7 @@ def exchange(given: Dataset, name: str = "cubic-stiffness") -> ExchangedParts | 
 def test_a_right_law_has_the_same_values_and_reduces_the_error_of_other_data() -> None:
     found = exchange(record(3000.0, 3000.0))
     assert found is not None
+    assert found.gain is not None
     assert found.gain.ci95[0] > 80.0
     assert found.gain.after.rmse == pytest.approx(SIGMA, rel=0.1)
     (value,) = found.values
@@ -51,10 +57,25 @@ def test_a_right_law_has_the_same_values_and_reduces_the_error_of_other_data() -
 def test_another_coefficient_in_the_validation_data_is_a_contradiction() -> None:
     found = exchange(record(3000.0, 1500.0))
     assert found is not None
+    assert found.gain is not None
     (value,) = found.values
     assert not value.agrees
     assert value.estimation == pytest.approx(2.0 * value.validation, rel=0.1)
     assert found.gain.after.rmse > 3.0 * SIGMA
+
+
+def test_a_simulation_that_diverges_on_the_estimation_data_has_no_gain(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def diverge(fit: CalibrationResult, target: Target, first: int, last: int) -> CalibrationResult:
+        assert (first, last) == (0, target.fitted)
+        return replace(fit, output=np.full(fit.output.size, np.nan))
+
+    monkeypatch.setattr(exchanged_parts, "fit_initial_states", diverge)
+    found = exchange(record(3000.0, 3000.0))
+    assert found is not None
+    assert found.gain is None
+    assert found.values
 
 
 def test_the_end_of_a_recording_is_no_other_input() -> None:
@@ -70,5 +91,7 @@ def test_the_text_states_both_values_where_they_contradict_each_other() -> None:
     assert not document["exchange"]["values"][0]["agrees"]
     assert "The reverse: with all values fitted to the validation recording alone" in found.summary
     assert "Both parts have different values: cubic-stiffness k = 3e+03 and 1." in found.summary
+    document["exchange"]["gain"] = None
+    assert any("alone, a simulation diverges on the data" in each for each in describe_details(document))
     found = islands.diagnose(record(3000.0, 3000.0), "second-order", effects=effects)
     assert "Both parts have the same values" in found.summary
