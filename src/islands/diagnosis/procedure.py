@@ -28,7 +28,7 @@ from islands.diagnosis.gross_errors.record_finding import describe_extrapolation
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
 from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_late_effects
 from islands.diagnosis.inference.exchanged_parts import exchange_parts
-from islands.diagnosis.inference.extension_trial import try_extension
+from islands.diagnosis.inference.extension_trial import refine_extension
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.inference.strategies import (
     WITH_MODEL_ERROR,
@@ -215,9 +215,9 @@ def _find_causes(
     # An extension that diverges beyond its record is not offered.
     if found.gain is None:
         return found
-    trial = try_extension(record, base, found.best, target)
-    exchange = exchange_parts(record, found.base, found.best, target, found.noise_floor, run.rng)
-    return replace(found, trial=trial, exchange=exchange)
+    best, trial = refine_extension(record, base, found.best, target)
+    exchange = exchange_parts(record, found.base, best, target, found.noise_floor, run.rng)
+    return replace(found, best=best, trial=trial, exchange=exchange)
 
 
 def _start_run(seed: int, parallel_map: ParallelMap, progress: ProgressCallback) -> DiagnosisRun:

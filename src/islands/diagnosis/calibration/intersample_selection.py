@@ -36,11 +36,7 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     simulator = fit.simulation.simulator
     if not simulator.is_continuous_time:
         return simulator
-    inner, current = (
-        (simulator.simulator, simulator.intersample)
-        if isinstance(simulator, ResampledSimulator)
-        else (simulator, InterSample.FOH)
-    )
+    inner, (current, _) = _get_inner(simulator), get_discretisation(simulator)
     tried = {}
     for intersample in (current, *(each for each in InterSample if each != current)):
         candidate = _refine_steps(inner, intersample, fit)
@@ -57,6 +53,18 @@ def get_discretisation(simulator: Simulator) -> Discretisation:
         if isinstance(simulator, ResampledSimulator)
         else (InterSample.FOH, 1)
     )
+
+
+def halve_step(simulator: Simulator) -> Simulator | None:
+    """Return a simulator with twice the number of steps per sample; None if it has no smaller step."""
+    intersample, oversampling = get_discretisation(simulator)
+    if not simulator.is_continuous_time or oversampling >= MAX_OVERSAMPLING:
+        return None
+    return ResampledSimulator(_get_inner(simulator), intersample, 2 * oversampling)
+
+
+def _get_inner(simulator: Simulator) -> Simulator:
+    return simulator.simulator if isinstance(simulator, ResampledSimulator) else simulator
 
 
 def _with_simulator(simulation: ExtendedSimulator, simulator: Simulator) -> ExtendedSimulator:

@@ -1,6 +1,6 @@
 """Trial of an extended simulation: over the intervals of its parameters, and with a larger input.
 
-An effect whose value is uncertain may make a simulation diverge on the next record.
+An effect whose value is uncertain, or whose force is stiff, may make a simulation diverge on the next record.
 """
 
 from dataclasses import dataclass, replace
@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.data.signal_ranges import SignalRange, measure_ranges
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, estimate_covariance
+from islands.diagnosis.calibration.intersample_selection import halve_step
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    estimate_covariance,
+    evaluate_fit,
+)
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.effect import Signal
 from islands.simulators.extended import ExtendedSimulator
@@ -21,6 +26,9 @@ INPUT_FACTOR = 1.2
 #: Largest distance of the output from its recorded range, in widths of that range. That of the simulation
 #: without effects counts if it is larger.
 MAX_EXCURSION = 10.0
+
+#: Largest ratio of the mean squares with smaller steps and without. Values are those of the larger ones.
+MAX_STEP_LOSS = 1.05
 
 #: Half width of a confidence interval of 95 % in standard deviations.
 _HALF_WIDTH = 1.96
@@ -44,6 +52,32 @@ class ExtensionTrial:
     ranges: tuple[SignalRange, ...]
     input_factor: float
     refusal: str | None = None
+
+
+def refine_extension(
+    record: Dataset, base: CalibrationResult, best: CalibrationResult, target: Target
+) -> tuple[CalibrationResult, ExtensionTrial]:
+    """Try an extension, with smaller steps if it diverges: a force that settles fast may be stiff.
+
+    Parameters
+    ----------
+    record, base, best, target
+        As in `try_extension`.
+
+    Returns
+    -------
+    CalibrationResult
+        The extension that is offered, or ``best`` if none is. All values are those of ``best``.
+    ExtensionTrial
+    """
+    first = trial = try_extension(record, base, best, target)
+    fit, simulator = best, halve_step(best.simulation.simulator)
+    while trial.refusal is not None and simulator is not None:
+        fit = evaluate_fit(replace(best.simulation, simulator=simulator), target, best.values)
+        if not fit.mean_square < MAX_STEP_LOSS * best.mean_square:
+            break
+        trial, simulator = try_extension(record, base, fit, target), halve_step(simulator)
+    return (fit, trial) if trial.refusal is None else (best, first)
 
 
 def try_extension(
@@ -129,7 +163,8 @@ def _scale_input(fit: CalibrationResult, factor: float) -> ExtendedSimulator:
 def _describe_refusal(label: str, factor: float) -> str:
     at = f" with {label}, an end of its 95 % interval" if label else ""
     larger = f" {'and' if at else 'with'} {factor:g} times the recorded input" if factor != 1.0 else ""
+    where = f"{at}{larger}," if label or larger else ""
     return (
-        f"The extended simulation is not offered:{at}{larger}, it diverges, or its output leaves the "
+        f"The extended simulation is not offered:{where} it diverges, or its output leaves the "
         f"recorded range by more than {MAX_EXCURSION:g} times its width."
     )

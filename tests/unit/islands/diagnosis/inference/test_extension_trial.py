@@ -7,17 +7,27 @@ import pytest
 from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
-from islands.diagnosis.inference.extension_trial import INPUT_FACTOR, ExtensionTrial, try_extension
+from islands.diagnosis.inference.extension_trial import (
+    INPUT_FACTOR,
+    ExtensionTrial,
+    refine_extension,
+    try_extension,
+)
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.specification.factory import make_simulator
+from islands_measurements.detection.injection.unusual.table import UNUSUAL_CAUSES
+from islands_measurements.detection.unusual_trial import draw_record
 
 #: Input.
 SIGNAL = lfilter([0.3], [1.0, -0.7], np.random.default_rng(0).standard_normal(400))
@@ -103,3 +113,24 @@ def test_excursion_of_the_simulation_without_the_extension_is_allowed(scale: flo
     assert try_extension(record, base, best, target).refusal is None
     loud = replace(best, values=np.array([scale, 40.0 * scale * float(np.ptp(u))]))
     assert try_extension(record, base, loud, target).refusal is not None
+
+
+@pytest.mark.ci
+def test_force_that_settles_within_a_step_is_offered_with_smaller_steps() -> None:
+    measured, _ = draw_record(UNUSUAL_CAUSES["dahl-friction"], 8100000)
+    record = measured.record
+    fitted = count_fitted_samples(record)
+    simulator = ResampledSimulator(make_simulator("second-order", record), InterSample.BAND_LIMITED, 2)
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
+    target = make_target(record, fitted, {})
+    base = calibrate(simulation, target, simulation.nominal)
+    extended = simulation.with_effects([CATALOGUE["second-hysteresis"]])
+    start = [0.8, 8.0, 2000.0, *base.values[3:], 2120.0, 1890.0, -160.0, 0.0]
+    best = calibrate(extended, target, np.array(start))
+    refused = try_extension(record, base, best, target)
+    assert refused.refusal is not None
+    assert "it diverges" in refused.refusal
+    refined, trial = refine_extension(record, base, best, target)
+    assert trial.refusal is None
+    np.testing.assert_array_equal(refined.values, best.values)
+    assert get_discretisation(refined.simulation.simulator) == (InterSample.BAND_LIMITED, 4)
