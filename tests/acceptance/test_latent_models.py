@@ -126,6 +126,7 @@ def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     assert "unknown structure of narx models 'wiener'" in text
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
 def test_the_example_of_the_guide_leads_from_a_record_to_a_program(tmp_path):
     guide = (ROOT / "docs/how-to/fit-a-latent-model.md").read_text("utf-8")

@@ -361,8 +361,13 @@ def test_a_figure_is_saved_as_svg_png_and_csv(
     assert picture.getcolors(maxcolors=1) is None
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [
+        pytest.param("light", 1280, marks=pytest.mark.nightly),
+        pytest.param("dark", 390, marks=pytest.mark.ci),
+    ],
+)
 def test_a_latent_model_has_parameters_and_figures_of_its_parts(
     opened: Callable[..., Any], latent: str, expect: Any, scheme: str, width: int
 ) -> None:

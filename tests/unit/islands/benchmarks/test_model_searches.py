@@ -28,8 +28,9 @@ def test_every_class_has_a_search():
     assert [each for each in CLASSES if MODEL_SEARCHES[each].is_random] == [LATENT]
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("kind", [LATENT, LINEAR])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(LATENT, marks=pytest.mark.nightly), pytest.param(LINEAR, marks=pytest.mark.ci)]
+)
 def test_every_output_of_several_has_a_latent_model(kind):
     record = curves_record(300, 4)
     found = search(kind, record)

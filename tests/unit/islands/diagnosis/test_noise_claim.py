@@ -70,8 +70,9 @@ def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
     assert stated.verdict == Verdict.NOTHING
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
+)
 def test_quantised_actuator_is_no_noise(seed: int) -> None:
     found = islands.diagnose(make_quantised_actuator(seed), "linear:2")
     assert found.verdict == Verdict.UNKNOWN
@@ -90,8 +91,9 @@ def test_swept_force_is_unknown(seed: int) -> None:
     assert "moving frequency" in found.residual_structure
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
+)
 def test_day_wave_is_never_within_the_noise(seed: int) -> None:
     assert islands.diagnose(make_day_wave(seed), "linear:1").verdict not in (Verdict.NOTHING, Verdict.NAMED)
     stated = islands.diagnose(make_day_wave(seed), "linear:1", noise_level=0.1)

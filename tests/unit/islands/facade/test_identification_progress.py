@@ -71,7 +71,7 @@ def test_several_outputs_pass_the_same_phases_one_after_the_other(phases):
     assert 0.2 < seen[-2] < seen[-1] < 1.0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_fit_of_latent_models_reports_their_generations():
     reported = []
     progress = PhasedProgress(lambda *each: reported.append(each), class_phases("latent", 240))
