@@ -90,7 +90,7 @@ def simulate_axis(cogging: float, pitch: float, samples: int, rng: np.random.Gen
     return islands.Dataset(*(u, y, DT, ("u_N",)), output_name="x_m", input_units=("N",), output_unit="m")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_cogging_of_an_axis_is_named_with_its_pitch() -> None:
     others = ("coulomb-friction", "periodic-disturbance", "backlash")
     effects = [*EFFECTS, *(CATALOGUE[name] for name in others)]

@@ -38,7 +38,7 @@ def test_curve_of_a_cubic_spring_is_within_the_band_of_the_free_curve() -> None:
     assert len(draw_effect_shape(shape).axes) == 1
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_smooth_curve_is_not_shown_for_a_step() -> None:
     found = diagnose_fault("coulomb-friction", 3)
     assert [each.name for each in found.effects] == ["coulomb-friction"]

@@ -56,7 +56,7 @@ def test_name_of_an_unlisted_cause_that_leaves_a_remainder_is_not_certain() -> N
     assert found.confidence < 0.6
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_unlisted_cause_of_a_recorded_output_is_discovered() -> None:
     found = run_trial(Trial(("cubic-damping",), 910005, core="column"))
     assert (found.verdict, found.named) == ("discovered", ("missing-term",))
