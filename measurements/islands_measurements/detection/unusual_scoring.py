@@ -144,12 +144,12 @@ def _score_fresh(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statis
     have another phase there are counted apart, and those that are not offered make no record worse.
     """
     sure = [claim for each in outcomes for claim in list_sure_claims(each)]
-    extended = [each for each in outcomes if each.fresh is not None]
-    offered = [
-        (UNUSUAL_CAUSES[each.trial.cause], each.fresh)
-        for each in extended
-        if each.fresh is not None and not each.is_refused
+    extended = [
+        (UNUSUAL_CAUSES[each.trial.cause], each.fresh, each.is_refused)
+        for each in outcomes
+        if each.fresh is not None
     ]
+    offered = [(cause, fresh) for cause, fresh, is_refused in extended if not is_refused]
     carried = [fresh for cause, fresh in offered if cause.carries]
     disturbed = [fresh for cause, fresh in offered if not cause.carries]
     ratios = [fresh.ratio for cause, fresh in offered if cause.carries and not cause.is_clean]
@@ -181,7 +181,7 @@ def _score_fresh(outcomes: Sequence[UnusualOutcome]) -> list[Proportion | Statis
             sum(each.is_worse for each in disturbed),
             len(disturbed),
         ),
-        Proportion("extensions that are refused", sum(each.is_refused for each in extended), len(extended)),
+        Proportion("extensions that are refused", sum(refused for *_, refused in extended), len(extended)),
     ]
 
 

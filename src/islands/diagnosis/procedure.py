@@ -212,9 +212,9 @@ def _find_causes(
     found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
         found = extend_equations(found, terms, target, run)
-    # An extension that diverges beyond its record is not offered.
     if found.gain is None:
         return found
+    # An extension that diverges beyond its record is not offered.
     best, trial = refine_extension(record, base, found.best, target)
     exchange = exchange_parts(record, found.base, best, target, found.noise_floor, run.rng)
     return replace(found, best=best, trial=trial, exchange=exchange)

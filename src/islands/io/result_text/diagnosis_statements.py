@@ -611,8 +611,7 @@ def _describe_remainder(facts: DiagnosisFacts) -> str:
 def _describe_gain(facts: DiagnosisFacts) -> str:
     assert facts.gain is not None
     before, after = map(facts.write_error, facts.errors)
-    low, high = facts.gain["ci95"]
-    percent = f"{facts.gain['reduction_percent']:.1f} % ({low:.1f} to {high:.1f} with 95 % confidence)"
+    percent = _write_reduction(facts.gain)
     without = f"{before} ({name_reference(facts.document)})"
     beginning = f"On {facts.held_out_part}, excluded from fitting, the RMSE"
     text = f"{beginning} falls from {without} to {after}, by {percent}"
@@ -625,18 +624,22 @@ def _describe_gain(facts: DiagnosisFacts) -> str:
     return f"{text}."
 
 
+def _write_reduction(gain: Document) -> str:
+    """Write the reduction of an error with its confidence interval."""
+    low, high = gain["ci95"]
+    return f"{gain['reduction_percent']:.1f} % ({low:.1f} to {high:.1f} with 95 % confidence)"
+
+
 def _describe_exchange(facts: DiagnosisFacts) -> str:
     exchange = facts.document["exchange"]
     gain, values = exchange["gain"], exchange["values"]
     text = f"The reverse: with all values fitted to {facts.held_out_part} alone, "
     if gain is None:
         return f"{text}a simulation diverges on the data that were used for estimation."
-    low, high = gain["ci95"]
     before, after = (facts.write_error(gain[each]["rmse"]) for each in ("before", "after"))
     falls = (
-        f"falls from {before} to {after}, by {gain['reduction_percent']:.1f} % ({low:.1f} to {high:.1f} with "
-        "95 % confidence)"
-        if low > 0.0
+        f"falls from {before} to {after}, by {_write_reduction(gain)}"
+        if gain["ci95"][0] > 0.0
         else f"does not fall significantly: {before} without them, {after} with them"
     )
     text += f"the RMSE of the data that were used for estimation {falls}."
