@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from islands.estimation.latent_data import LatentData, measure_held_out
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import StateSpaceLayout, find_codes, read_at_once
-from islands.simulation.initial_states import Segment
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
+from islands.simulation.segment_lanes import SegmentLanes
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class Draft:
             self.states[:, kept],
         )
 
-    def begin(self, segments: tuple[Segment, ...]) -> StateSpaceFit:
+    def begin(self, segments: SegmentLanes) -> StateSpaceFit:
         """Return the fit of the free parameters to segments, without any step."""
         theta = np.where(self.free, self.theta, 0.0)
         return StateSpaceFit(theta, number(self.free), find_codes(self.units), segments, self.states)

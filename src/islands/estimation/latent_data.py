@@ -20,7 +20,8 @@ from islands.data.input_lead import advance_all_inputs
 from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import StateSpaceLayout
-from islands.simulation.initial_states import Segment, estimate_states, simulate_errors
+from islands.simulation.initial_states import Segment, estimate_states
+from islands.simulation.segment_lanes import SegmentLanes
 
 #: Blocks of a record, samples of a block at least, and the part of each that is held out at least. Slow
 #: states are not visible in short blocks.
@@ -32,7 +33,7 @@ _USED_ROWS, _FINAL_ROWS = 600, 4_000
 #: Rows of all blocks for the estimation in a search, at most: of many recordings, some are left out.
 _ALL_USED_ROWS = 6_000
 
-#: Samples from which the initial states of a block are estimated, at least for a state and at most.
+#: Samples from which the initial states of a free run are estimated, at least for a state and at most.
 SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
 
 #: Simulations of held-out rows from disturbed states, the standard deviation of the disturbance relative to
@@ -119,12 +120,12 @@ class LatentData:
         In the units of the signals, with all inputs one sample early.
     scaled : Dataset
         The same record with the standard deviation 1 of all signals.
-    used : tuple of Segment
+    used : SegmentLanes
         Blocks for the estimation.
-    final : tuple of Segment
+    final : SegmentLanes
         The same blocks with further rows, for the final estimation.
-    whole : tuple of Segment
-        The same blocks with all rows up to the next one, which are held out for the comparison of models.
+    held_out : HeldOutRows
+        The rows between a block and the next one, for the comparison of models.
     scales : SignalScales
         Of the record.
     limits : SensorLimits
@@ -133,9 +134,9 @@ class LatentData:
 
     record: Dataset
     scaled: Dataset
-    used: tuple[Segment, ...]
-    final: tuple[Segment, ...]
-    whole: tuple[Segment, ...]
+    used: SegmentLanes
+    final: SegmentLanes
+    held_out: "HeldOutRows"
     scales: SignalScales
     limits: SensorLimits
 
@@ -161,7 +162,8 @@ def make_latent_data(record: Dataset) -> LatentData:
         used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS), scaled_limits))
         final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), scaled_limits))
         whole.append(_take(scaled, begin, end, scaled_limits))
-    return LatentData(record, scaled, tuple(used), tuple(final), tuple(whole), scales, limits)
+    blocks = SegmentLanes(used), SegmentLanes(final), _hold_out(whole, used)
+    return LatentData(record, scaled, *blocks, scales, limits)
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -194,16 +196,56 @@ def _take(record: Dataset, begin: int, end: int, limits: tuple[float, float]) ->
     return Segment(u, y, *limits)
 
 
-def _count_memory(segment: Segment, order: int) -> int:
+def _count_memory(segment: Segment) -> int:
     """Return the number of rows from which initial states are estimated."""
-    return min(len(segment.y) // 3, max(SAMPLES_PER_STATE * order, LARGEST_MEMORY))
+    return min(len(segment.y) // 3, LARGEST_MEMORY)
 
 
 def estimate_start(
     theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, order: int
 ) -> NDArray[np.float64]:
     """Estimate the states at the first row of a block."""
-    return estimate_states(theta, codes, segment.take(0, _count_memory(segment, order)), np.zeros(order))
+    return estimate_states(theta, codes, segment.take(0, _count_memory(segment)), np.zeros(order))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOutRows:
+    """Free runs of the blocks whose errors on the held-out rows compare models.
+
+    Attributes
+    ----------
+    late : tuple of Segment
+        Held-out rows of each block.
+    runs : SegmentLanes
+        All rows of each block, then those with larger inputs, then its held-out rows. Outputs that are not
+        scored are missing.
+    disturbed : SegmentLanes
+        Rows about the first held-out one of each block, once for each disturbance.
+    """
+
+    late: tuple[Segment, ...]
+    runs: SegmentLanes
+    disturbed: SegmentLanes
+
+
+def _hold_out(whole: Sequence[Segment], used: Sequence[Segment]) -> HeldOutRows:
+    """Make the free runs of blocks of which the first rows are used."""
+    cuts = [len(each.y) for each in used]
+    late = [each.take(cut, None) for each, cut in zip(whole, cuts, strict=True)]
+    larger = [replace(each, u=_LARGER_INPUTS * each.u, y=np.full_like(each.y, np.nan)) for each in whole]
+    disturbed = [
+        _score(each, cut).take(max(0, cut - _FORGETTING), cut + _DISTURBED_ROWS)
+        for each, cut in zip(whole, cuts, strict=True)
+    ]
+    runs = [*map(_score, whole, cuts), *larger, *map(_score, late, map(_count_memory, late))]
+    return HeldOutRows(tuple(late), SegmentLanes(runs), SegmentLanes(_DISTURBED * disturbed))
+
+
+def _score(segment: Segment, first: int) -> Segment:
+    """Return a segment without the outputs before a row."""
+    y = segment.y.copy()
+    y[:first] = np.nan
+    return replace(segment, y=y)
 
 
 def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
@@ -218,45 +260,18 @@ def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
     scales = measure_deviations(fit.theta, fit.codes, data.used[0].u, fit.states[0])
     if scales is None:
         return np.inf
-    rng = np.random.default_rng(_SEED)
-    blocks = []
-    for segment, used, states in zip(data.whole, data.used, fit.states, strict=True):
-        larger = replace(segment, u=_LARGER_INPUTS * segment.u)
-        if simulate_errors(fit.theta, fit.codes, larger, states) is None:
+    order, rows = fit.states.shape[1], data.held_out
+    starts = [estimate_start(fit.theta, fit.codes, each, order) for each in rows.late]
+    normal = np.random.default_rng(_SEED).standard_normal((len(starts), _DISTURBED, order))
+    disturbed = _DISTURBANCE * scales * normal.transpose(1, 0, 2).reshape(-1, order)
+    errors = []
+    for lanes, states in (
+        (rows.disturbed, disturbed),
+        (rows.runs, np.vstack([fit.states, fit.states, starts])),
+    ):
+        squares = lanes.sum_squared_errors(fit.theta, fit.codes, states)
+        if squares is None:
             return np.inf
-        disturbed = _DISTURBANCE * scales * rng.standard_normal((_DISTURBED, len(states)))
-        runs = _simulate_held_out(fit, segment, len(used.y), states, disturbed)
-        if runs is None:
-            return np.inf
-        blocks.append(runs)
-    errors = [np.concatenate(run) for run in zip(*blocks, strict=True)]
-    return max(_mean_square(each) for each in errors) * data.scales.height**2
-
-
-def _simulate_held_out(
-    fit: StateSpaceFit,
-    segment: Segment,
-    cut: int,
-    states: NDArray[np.float64],
-    disturbed: NDArray[np.float64],
-) -> list[NDArray[np.float64]] | None:
-    """Return the errors of the rows of a block from row ``cut`` on, by free run; None after a divergence."""
-    held_out = segment.take(cut, None)
-    memory, first = _count_memory(held_out, len(states)), max(0, cut - _FORGETTING)
-    start = estimate_start(fit.theta, fit.codes, held_out, len(states))
-    late = segment.take(first, cut + _DISTURBED_ROWS)
-    runs = [(segment, states, cut), (held_out, start, memory)]
-    runs += [(late, each, cut - first) for each in disturbed]
-    found = []
-    for rows, begin, scored in runs:
-        errors = simulate_errors(fit.theta, fit.codes, rows, begin)
-        if errors is None:
-            return None
-        found.append(errors[scored:])
-    return found
-
-
-def _mean_square(errors: NDArray[np.float64]) -> float:
-    """Return the mean square of the errors of measured outputs."""
-    measured = errors[~np.isnan(errors)]
-    return float(np.mean(measured**2)) if measured.size else 0.0
+        sums, counts = (each.reshape(-1, len(starts)).sum(axis=1) for each in (squares, lanes.counts))
+        errors += (sums / np.maximum(counts, 1)).tolist()
+    return float(max(errors)) * data.scales.height**2

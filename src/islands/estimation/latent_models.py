@@ -158,8 +158,9 @@ def estimate_models(front: Sequence[FittedStateSpace], record: Dataset, steps: S
         reduced += [best] if direct else []
         # Systems may be equal once blocks are removed.
         different = {each.key: each for each in map(_remove_idle_units, reduced)}
-        finished = threads.map(partial(_finish, data=data, steps=steps), different.values())
-        models = [make_latent_model(each, data) for each in finished]
+        # The largest ones take the longest time: the others use the other threads in the meantime.
+        finished = threads.map(partial(_finish, data=data, steps=steps), list(different.values())[::-1])
+        models = [make_latent_model(each, data) for each in finished][::-1]
     return models if direct else [replace(each, input_names=record.input_names) for each in models]
 
 

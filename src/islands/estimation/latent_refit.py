@@ -13,6 +13,7 @@ from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import LatentModel
 from islands.simulation.initial_states import Segment, read_inputs
 from islands.simulation.outcome import EvaluationOutcome, Status
+from islands.simulation.segment_lanes import SegmentLanes
 
 
 def refit_latent(
@@ -43,7 +44,7 @@ def refit_latent(
         segments.append(Segment(scales.scale_inputs(u), y, *scaled_limits))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
-    fit = StateSpaceFit(theta, number(free), model.codes, segments, states)
+    fit = StateSpaceFit(theta, number(free), model.codes, SegmentLanes(segments), states)
     if not np.isfinite(fit.mean_square):
         return EvaluationOutcome(Status.DIVERGED, "a free run of the state space diverges")
     fit.advance(max_steps, stop)

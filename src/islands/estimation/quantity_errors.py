@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.estimation.covariance import sandwich
 from islands.estimation.damped_least_squares import inner_products
-from islands.estimation.shooting_residual import make_residual
+from islands.kernels.state_space import accumulate_products
 from islands.models.latent import LatentModel
 from islands.models.linear_system import Quantity, list_modes, measure_gains, measure_mode
+from islands.simulation.initial_states import estimate_initial_states, read_inputs
+from islands.simulation.layout import find_intervals
 
 #: Information of a direction, relative to the largest, up to which it has no effect: of changes of the
 #: coordinates, it is the rounding error of the sums, 1e-17 to 1e-15.
@@ -48,15 +50,15 @@ def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | Non
         samples than parameters, or if a quantity has no derivative, as at a double pole or of an integrator.
     """
     theta = np.array(model.parameters)
-    residual = make_residual(model, record, None, warm_up)
-    error = residual(theta)
-    if model.dt is None or error is None or not np.isfinite(error).all() or error.size <= theta.size:
+    found = _differentiate_errors(model, record, model.maximum_lag if warm_up is None else warm_up)
+    if model.dt is None or found is None or found[1].size <= theta.size:
         return model
     slopes = _differentiate(model, theta)
     if slopes is None:
         return model
+    jacobian, error = found
     unit = np.where(theta == 0.0, 1.0, np.abs(theta))
-    jacobian = residual.differentiate(theta, np.diag(unit))
+    jacobian *= unit[:, None]
     norms = np.sqrt(np.einsum("fk,fk->f", jacobian, jacobian))
     norms[norms == 0.0] = 1.0
     jacobian /= norms[:, None]
@@ -70,6 +72,37 @@ def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | Non
     variances = np.array([sandwich(each[None], error)[0, 0] for each in influences])
     variances *= (error.size - 1) / max(1, error.size - int(np.count_nonzero(kept)))
     return replace(model, quantity_errors=tuple(np.sqrt(variances).tolist()))
+
+
+def _differentiate_errors(
+    model: LatentModel, record: Dataset, warm_up: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return the derivatives and the errors of the free run of each segment; None if it diverges.
+
+    Returns
+    -------
+    ndarray, shape (parameters, samples)
+    ndarray, shape (samples,)
+    """
+    free = np.isin(model.layout.names, model.wiring)
+    places, columns = np.where(free, np.cumsum(free) - 1, -1), int(np.count_nonzero(free))
+    starts, lengths = find_intervals(record, warm_up, None)
+    states = estimate_initial_states(model, record, starts, warm_up)
+    products = np.empty((columns + model.order + 1,) * 2)
+    found = []
+    for first, length, start in zip(starts.tolist(), lengths.tolist(), states, strict=True):
+        # The states are those at the last sample before the prediction, the output of which is no error.
+        begin, end = first - 1 - max(model.leads[1 + model.order :]), first + length
+        u, _ = read_inputs(record, model, begin, end)
+        y = np.append(np.nan, record.y[first:end])
+        rows = np.zeros((len(products), len(y)))
+        signals = np.ascontiguousarray(u), start, y, *model.limits.range
+        done = accumulate_products(model.theta, places, model.codes, *signals, columns, products, rows)
+        if done < len(y) or not np.isfinite(rows).all():
+            return None
+        found.append(rows[:, 1:])
+    joined = np.concatenate(found, axis=1)
+    return joined[:columns], joined[-1]
 
 
 def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:

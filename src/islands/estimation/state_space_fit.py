@@ -4,15 +4,14 @@ Every segment has its initial states, which are eliminated from the normal equat
 small and separate for each segment (Schur complement). Steps are damped (Levenberg 1944, Marquardt 1963).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.kernels.state_space import accumulate_products
-from islands.kernels.summation import dot
-from islands.simulation.initial_states import Segment, simulate_errors
+from islands.kernels.state_space import NO_DERIVATIVES, accumulate_products
+from islands.simulation.segment_lanes import SegmentLanes
 
 #: Initial damping, its factors after a failed and a successful step, its limits.
 _DAMPING, _INCREASE, _DECREASE, _LEAST_DAMPING, _MAX_DAMPING = 1e-2, 4.0, 0.2, 1e-12, 1e8
@@ -35,7 +34,7 @@ class StateSpaceFit:
     places : ndarray of int64, shape (parameters,)
         Column of each free parameter; -1 for a fixed one.
     codes : ndarray of int64, shape (units,)
-    segments : sequence of Segment
+    segments : SegmentLanes
     states : ndarray, shape (segments, states)
         States at the first rows.
     mean_square : float
@@ -47,7 +46,7 @@ class StateSpaceFit:
     theta: NDArray[np.float64]
     places: NDArray[np.int64]
     codes: NDArray[np.int64]
-    segments: Sequence[Segment]
+    segments: SegmentLanes
     states: NDArray[np.float64]
     mean_square: float = field(init=False)
     gain: float = field(init=False, default=np.inf)
@@ -86,57 +85,47 @@ class StateSpaceFit:
         return False
 
     def _measure(self, theta: NDArray[np.float64], states: NDArray[np.float64]) -> float:
-        total, count = 0.0, 0
-        for segment, start in zip(self.segments, states, strict=True):
-            error = simulate_errors(theta, self.codes, segment, start)
-            if error is None:
-                return np.inf
-            error = error[~np.isnan(error)]
-            total += float(dot(error, 0, error, 0, error.size))
-            count += error.size
-        return total / max(1, count)
+        errors = self.segments.sum_squared_errors(theta, self.codes, states)
+        return np.inf if errors is None else float(errors.sum() / max(1, self.segments.counts.sum()))
 
-    def _accumulate(self) -> list[NDArray[np.float64]] | None:
+    def _accumulate(self) -> NDArray[np.float64] | None:
         columns = int(self.places.max()) + 1
         size = columns + self.states.shape[1] + 1
-        found = []
-        for segment, start in zip(self.segments, self.states, strict=True):
-            products = np.empty((size, size))
+        found = np.empty((len(self.segments), size, size))
+        for segment, start, products in zip(self.segments, self.states, found, strict=True):
             rows = accumulate_products(
                 *(self.theta, self.places, self.codes, segment.u, start),
-                *(segment.y, segment.lower, segment.upper, columns, products),
+                *(segment.y, segment.lower, segment.upper, columns, products, NO_DERIVATIVES),
             )
-            if rows < len(segment.y) or not np.isfinite(products).all():
+            if rows < len(segment.y):
                 return None
-            found.append(products)
-        return found
+        return found if np.isfinite(found).all() else None
 
-    def _move(
-        self, products: Sequence[NDArray[np.float64]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _move(self, products: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the parameters and states after a damped step."""
         order = self.states.shape[1]
-        columns = len(products[0]) - order - 1
+        columns = products.shape[1] - order - 1
         own, shared = slice(columns, columns + order), slice(0, columns)
-        total = np.add.reduce([each[shared, shared] for each in products])
-        scale = _scale(np.diag(total))
+        total = products[:, shared, shared].sum(axis=0)
+        scale = _scale(np.diagonal(total))
         normal = total + self._damping * np.diag(scale**2)
-        right = np.add.reduce([each[shared, -1] for each in products])
-        solved = []
-        for each in products:
-            block = each[own, own] + self._damping * np.diag(_scale(np.diag(each)[own]) ** 2)
-            coupled = np.linalg.solve(block, np.column_stack([each[own, shared], each[own, -1]]))
-            normal -= each[shared, own] @ coupled[:, :-1]
-            right = right - each[shared, own] @ coupled[:, -1]
-            solved.append(coupled)
+        blocks = products[:, own, own].copy()
+        # The right-hand sides of the states are the columns of the parameters, and the error.
+        others = np.concatenate([products[:, own, shared], products[:, own, -1:]], axis=2)
+        places = np.arange(order)
+        blocks[:, places, places] += self._damping * _scale(blocks[:, places, places]) ** 2
+        coupled = np.linalg.solve(blocks, others)
+        reduced = (products[:, shared, own] @ coupled).sum(axis=0)
+        right = products[:, shared, -1].sum(axis=0) - reduced[:, -1]
+        normal -= reduced[:, :-1]
         step = np.linalg.solve(normal / np.outer(scale, scale), right / scale) / scale
         theta = self.theta.copy()
         theta[self.places >= 0] += step[self.places[self.places >= 0]]
-        changes = [coupled[:, -1] - coupled[:, :-1] @ step for coupled in solved]
-        return theta, self.states + np.array(changes)
+        return theta, self.states + coupled[:, :, -1] - coupled[:, :, :-1] @ step
 
 
 def _scale(squares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the norms of derivatives, none much smaller than the median."""
+    """Return the norms of derivatives along the last axis, none much smaller than their median."""
     norms = np.sqrt(np.maximum(squares, 0.0))
-    return np.maximum(norms, max(_LEAST_SCALE * float(np.median(norms)), np.finfo(float).tiny ** 0.25))
+    least = _LEAST_SCALE * np.median(norms, axis=-1, keepdims=True)
+    return np.maximum(norms, np.maximum(least, np.finfo(float).tiny ** 0.25))

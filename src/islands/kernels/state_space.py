@@ -14,6 +14,7 @@ import numpy as np
 from islands.kernels.gram import add_tiles, read_tiles
 from islands.kernels.jit_cache import kernel
 from islands.kernels.simd import VECTOR, add, broadcast, load, multiply, padded_size, store
+from islands.kernels.simd_functions import absolute, select_less
 from islands.kernels.summation import CHUNK
 
 #: Codes of the functions of the units.
@@ -21,6 +22,12 @@ TANH, SQUARE, CUBE, MAGNITUDE, HINGE, ROOT, DEAD_ZONE, SATURATION, BELL = range(
 
 #: A state with a larger absolute value has diverged.
 BOUND = 1e6
+
+#: No derivatives of single rows are written.
+NO_DERIVATIVES = np.empty((0, 0))
+
+#: Derivatives up to this magnitude are zero, and the rows after which they are compared with it.
+_TINY, _FLUSHED_ROWS = 1e-140, 32
 
 #: Least distance from zero at which the slope of the root is evaluated.
 _LEAST_ROOT = 1e-6
@@ -52,7 +59,7 @@ def evaluate_unit(code, s):
 
 
 @kernel(forceinline=True)
-def _place(n, inputs, units):
+def place_blocks(n, inputs, units):
     """Return the positions of B, C, D, E, F, W, b, c and d."""
     at_c = n * (n + inputs)
     at_e = at_c + n + inputs
@@ -76,7 +83,7 @@ def _evaluate_units(theta, at_w, at_b, codes, signals, h, slope):
 @kernel(forceinline=True)
 def _compute_output(theta, n, signals, h):
     """Return the output of a row."""
-    _, at_c, _, _, at_f, _, _, _, at_level = _place(n, signals.size - n, h.size)
+    _, at_c, _, _, at_f, _, _, _, at_level = place_blocks(n, signals.size - n, h.size)
     y = theta[at_level]
     for j in range(signals.size):
         y += theta[at_c + j] * signals[j]
@@ -89,7 +96,7 @@ def _compute_output(theta, n, signals, h):
 def _advance(theta, n, signals, h, after):
     """Write the states at the next row; return whether they are bounded."""
     units, inputs = h.size, signals.size - n
-    at_b, _, _, at_e, _, _, _, at_drift, _ = _place(n, inputs, units)
+    at_b, _, _, at_e, _, _, _, at_drift, _ = place_blocks(n, inputs, units)
     for i in range(n):
         found = theta[at_drift + i]
         for j in range(n):
@@ -114,7 +121,7 @@ def simulate_state_space(
 ):
     """Simulate the rows; return the number of rows before a divergence."""
     n, inputs, units = x.size, u.shape[1], codes.size
-    _, _, _, _, _, at_w, at_bias, _, _ = _place(n, inputs, units)
+    _, _, _, _, _, at_w, at_bias, _, _ = place_blocks(n, inputs, units)
     signals, after = np.empty(n + inputs), np.empty(n)
     h, slope = np.empty(units), np.empty(units)
     signals[:n] = x
@@ -139,7 +146,7 @@ def simulate_states(
 ):
     """Simulate the states at the rows; return the number of rows before a divergence."""
     n, inputs, units = x.size, u.shape[1], codes.size
-    _, _, _, _, _, at_w, at_bias, _, _ = _place(n, inputs, units)
+    _, _, _, _, _, at_w, at_bias, _, _ = place_blocks(n, inputs, units)
     signals, after = np.empty(n + inputs), np.empty(n)
     h, slope = np.empty(units), np.empty(units)
     signals[:n] = x
@@ -154,71 +161,106 @@ def simulate_states(
 
 
 @kernel(forceinline=True)
-def _add(slopes, at, place, value):
-    """Add a value to the derivative with respect to a parameter, if it is free."""
+def _put(values, at, place, value):
+    """Write the value of a parameter, if it is free."""
     if place >= 0:
-        slopes[at + place] += value
+        values[at + place] = value
 
 
 @kernel(forceinline=True)
-def _multiply_rows(matrix, rows, columns, slopes, width, out):
-    """Multiply the derivatives of the states, vectors of ``width`` parameters, by a matrix."""
-    for p in range(0, width, VECTOR):
-        for i in range(rows):
-            total = broadcast(0.0, 1)
-            for j in range(columns):
-                total = add(total, multiply(broadcast(matrix[i, j], 1), load(slopes, j * width + p, 1)))
-            store(out, i * width + p, total)
+def _multiply(matrix, rows, n, states, width, effects, of_units, direct, out, begin):
+    """Write the derivatives of ``rows`` signals, vectors of ``width`` parameters.
 
-
-@kernel(forceinline=True)
-def _differentiate_output(theta, places, n, signals, h, slope, states, width, gain, out):
-    """Write the derivatives of the output at one row."""
-    units, inputs = h.size, signals.size - n
-    _, at_c, _, _, at_f, at_w, at_bias, _, at_level = _place(n, inputs, units)
-    for j in range(n):
-        found = theta[at_c + j]
-        for unit in range(units):
-            found += theta[at_f + unit] * slope[unit] * theta[at_w + unit * signals.size + j]
-        gain[0, j] = found
-    _multiply_rows(gain, 1, n, states, width, out)
-    _add(out, 0, places[at_level], 1.0)
-    for j in range(signals.size):
-        _add(out, 0, places[at_c + j], signals[j])
-    for unit in range(units):
-        _add(out, 0, places[at_f + unit], h[unit])
-        factor = theta[at_f + unit] * slope[unit]
-        _add(out, 0, places[at_bias + unit], factor)
-        for j in range(signals.size):
-            _add(out, 0, places[at_w + unit * signals.size + j], factor * signals[j])
-
-
-@kernel(forceinline=True)
-def _differentiate_states(theta, places, n, signals, h, slope, states, width, jacobian, out):
-    """Write the derivatives of the states at the next row."""
-    units, inputs = h.size, signals.size - n
-    at_b, _, _, at_e, _, at_w, at_bias, at_drift, _ = _place(n, inputs, units)
-    for i in range(n):
-        for j in range(n):
-            total = theta[i * n + j]
-            for unit in range(units):
-                total += theta[at_e + i * units + unit] * slope[unit] * theta[at_w + unit * signals.size + j]
-            jacobian[i, j] = total
-    _multiply_rows(jacobian, n, n, states, width, out)
-    for i in range(n):
+    They are the derivatives of the states times a matrix, those of the units times their effects, and the
+    direct ones.
+    """
+    wide = width - width % (4 * VECTOR)
+    for i in range(rows):
         at = i * width
-        _add(out, at, places[at_drift + i], 1.0)
-        for j in range(n):
-            _add(out, at, places[i * n + j], signals[j])
-        for j in range(inputs):
-            _add(out, at, places[at_b + i * inputs + j], signals[n + j])
+        for p in range(0, wide, 4 * VECTOR):
+            total = add(load(direct, at + p, 4), multiply(load(effects, at + p, 4), load(of_units, p, 4)))
+            for j in range(n):
+                total = add(total, multiply(broadcast(matrix[i * n + j], 4), load(states, j * width + p, 4)))
+            store(out, begin + at + p, total)
+        for p in range(wide, width, VECTOR):
+            last = add(load(direct, at + p, 1), multiply(load(effects, at + p, 1), load(of_units, p, 1)))
+            for j in range(n):
+                last = add(last, multiply(broadcast(matrix[i * n + j], 1), load(states, j * width + p, 1)))
+            store(out, begin + at + p, last)
+
+
+@kernel(forceinline=True)
+def _write_direct(places, n, signals, h, slope, width, products, matrix, of_units, direct):
+    """Write the slopes at one row: ``matrix`` with respect to the states, the others to the parameters.
+
+    The slopes with respect to the states are those of the linear part and of all units.
+    """
+    inputs, units, size = signals.size - n, h.size, matrix.size
+    at_b, at_c, at_d, at_e, at_f, at_w, at_bias, _, _ = place_blocks(n, inputs, units)
+    for p in range(0, size, VECTOR):
+        total = load(products, p, 1)
         for unit in range(units):
-            _add(out, at, places[at_e + i * units + unit], h[unit])
-            factor = theta[at_e + i * units + unit] * slope[unit]
-            if factor != 0.0:
-                _add(out, at, places[at_bias + unit], factor)
-                for j in range(signals.size):
-                    _add(out, at, places[at_w + unit * signals.size + j], factor * signals[j])
+            total = add(total, multiply(broadcast(slope[unit], 1), load(products, (unit + 1) * size + p, 1)))
+        store(matrix, p, total)
+    for unit in range(units):
+        _put(of_units, 0, places[at_bias + unit], slope[unit])
+        for j in range(n + inputs):
+            _put(of_units, 0, places[at_w + unit * (n + inputs) + j], slope[unit] * signals[j])
+    for i in range(n + 1):
+        at_states, at_inputs = (at_c, at_d) if i == n else (i * n, at_b + i * inputs)
+        effects = at_f if i == n else at_e + i * units
+        for j in range(n):
+            _put(direct, i * width, places[at_states + j], signals[j])
+        for j in range(inputs):
+            _put(direct, i * width, places[at_inputs + j], signals[n + j])
+        for unit in range(units):
+            _put(direct, i * width, places[effects + unit], h[unit])
+
+
+@kernel
+def _prepare(theta, places, n, inputs, units, width, size, products, effects, direct):
+    """Write what does not depend on the row; all arrays have rows for the states and one for the output.
+
+    ``products`` has the slopes of the linear part with respect to the states, and behind them the products
+    of effect and weights of each unit; ``effects`` has the effects of the unit of each weight and offset, and
+    ``direct`` the derivatives with respect to the constants.
+    """
+    _, at_c, _, at_e, at_f, at_w, at_bias, at_drift, at_level = place_blocks(n, inputs, units)
+    products[:], effects[:], direct[:] = 0.0, 0.0, 0.0
+    for i in range(n + 1):
+        linear = at_c if i == n else i * n
+        at = at_f if i == n else at_e + i * units
+        _put(direct, i * width, places[at_level if i == n else at_drift + i], 1.0)
+        for j in range(n):
+            products[i * n + j] = theta[linear + j]
+        for unit in range(units):
+            _put(effects, i * width, places[at_bias + unit], theta[at + unit])
+            for j in range(n + inputs):
+                weight = at_w + unit * (n + inputs) + j
+                _put(effects, i * width, places[weight], theta[at + unit])
+                if j < n:
+                    products[(unit + 1) * size + i * n + j] = theta[at + unit] * theta[weight]
+
+
+@kernel(forceinline=True)
+def _flush(values):
+    """Replace tiny derivatives by zero.
+
+    The derivatives with respect to the initial states decay, as do those of a unit that is not active. An
+    operation on subnormal numbers, which their products are first, takes a hundred times as long.
+    """
+    tiny, zero = broadcast(_TINY, 1), broadcast(0.0, 1)
+    for p in range(0, values.size, VECTOR):
+        one = load(values, p, 1)
+        store(values, p, select_less(absolute(one), tiny, zero, one))
+
+
+@kernel(forceinline=True)
+def _fill_chunk(staged, count, width, columns, filled, chunk):
+    """Write the columns of ``count`` rows into a chunk, whose columns are contiguous."""
+    for p in range(columns):
+        for row in range(count):
+            chunk[p * CHUNK + filled + row] = staged[row * width + p]
 
 
 @kernel
@@ -233,48 +275,61 @@ def accumulate_products(
     upper,
     columns,  # number of free parameters; the states at the first row have the columns after them
     out,  # out, float64 [columns + states + 1, columns + states + 1]
+    derivatives,  # out, float64 [columns + states + 1, row]: those of each row; of no columns, not written
 ):
     """Compute the inner products of all derivatives and of the error ``y - simulation``, which is last.
 
-    Return the number of rows before a divergence.
+    Rows without an error have no derivatives. Return the number of rows before a divergence.
     """
-    n, units = x.size, codes.size
-    _, _, _, _, _, at_w, at_bias, _, _ = _place(n, u.shape[1], units)
+    n, inputs, units = x.size, u.shape[1], codes.size
+    _, _, _, _, _, at_w, at_bias, _, _ = place_blocks(n, inputs, units)
     free = columns + n
-    width = -(-free // VECTOR) * VECTOR
+    width = -(-(free + 1) // VECTOR) * VECTOR
+    size = -(-(n + 1) * n // VECTOR) * VECTOR
+    products, matrix = padded_size((units + 1) * size), padded_size(size)
+    effects, direct = padded_size((n + 1) * width), padded_size((n + 1) * width)
+    _prepare(theta, places, n, inputs, units, width, size, products, effects, direct)
     now, later = padded_size(n * width), padded_size(n * width)
     now[:] = 0.0
     for i in range(n):
         now[i * width + columns + i] = 1.0
-    slopes, after = padded_size(width), np.empty(n)
-    jacobian, gain = np.empty((n, n)), np.empty((1, n))
-    signals, h, slope = np.empty(n + u.shape[1]), np.empty(units), np.empty(units)
+    of_units, staged = padded_size(width), padded_size(VECTOR * width)
+    of_units[:] = 0.0
+    signals, h, slope, after = np.empty(n + inputs), np.empty(units), np.empty(units), np.empty(n)
     signals[:n] = x
     blocks = -(-(free + 1) // 4)
     tiles = blocks * (blocks + 1) // 2
     chunk, running = padded_size(4 * blocks * CHUNK), padded_size(16 * VECTOR * tiles)
     chunk[:], running[:] = 0.0, 0.0
-    filled = 0
+    filled = waiting = 0
     for k in range(u.shape[0]):
+        if k % _FLUSHED_ROWS == 0:
+            _flush(now)
         signals[n:] = u[k]
         _evaluate_units(theta, at_w, at_bias, codes, signals, h, slope)
         error = y[k] - _compute_output(theta, n, signals, h)
+        _write_direct(places, n, signals, h, slope, width, products, matrix, of_units, direct)
         if not (math.isnan(y[k]) or (y[k] >= upper and error < 0.0) or (y[k] <= lower and error > 0.0)):
-            _differentiate_output(theta, places, n, signals, h, slope, now, width, gain, slopes)
-            for p in range(free):
-                chunk[p * CHUNK + filled] = slopes[p]
-            chunk[free * CHUNK + filled] = error
-            filled += 1
+            row = matrix[n * n :], effects[n * width :], direct[n * width :]
+            _multiply(row[0], 1, n, now, width, row[1], of_units, row[2], staged, waiting * width)
+            staged[waiting * width + free] = error
+            for p in range(derivatives.shape[0]):
+                derivatives[p, k] = staged[waiting * width + p]
+            waiting += 1
+            if waiting == VECTOR:
+                _fill_chunk(staged, waiting, width, free + 1, filled, chunk)
+                filled, waiting = filled + VECTOR, 0
             if filled == CHUNK:
                 add_tiles(chunk, blocks, 0, tiles, running)
                 filled = 0
         if not _advance(theta, n, signals, h, after):
             return k
-        _differentiate_states(theta, places, n, signals, h, slope, now, width, jacobian, later)
+        _multiply(matrix, n, n, now, width, effects, of_units, direct, later, 0)
         signals[:n] = after
         now, later = later, now
+    _fill_chunk(staged, waiting, width, free + 1, filled, chunk)
     for p in range(free + 1):
-        chunk[p * CHUNK + filled : (p + 1) * CHUNK] = 0.0
+        chunk[p * CHUNK + filled + waiting : (p + 1) * CHUNK] = 0.0
     add_tiles(chunk, blocks, 0, tiles, running)
     read_tiles(running, blocks, 0, tiles, free + 1, out)
     return u.shape[0]

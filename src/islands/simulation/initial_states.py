@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.kernels.state_space import accumulate_products, simulate_state_space
+from islands.kernels.state_space import NO_DERIVATIVES, accumulate_products, simulate_state_space
 from islands.models.latent import LatentModel
 
 #: Weight of the measurement of the initial states, relative to the variance of the output of the states.
@@ -128,7 +128,8 @@ def _minimise(
     for _ in range(_STATE_STEPS):
         states = best + step
         rows = accumulate_products(
-            *(theta, places, codes, segment.u, states, segment.y, segment.lower, segment.upper, 0, products)
+            *(theta, places, codes, segment.u, states, segment.y, segment.lower, segment.upper),
+            *(0, products, NO_DERIVATIVES),
         )
         error = products[-1, -1] + fixed * float(np.sum((states - rest) ** 2))
         if rows == len(segment.y) and np.isfinite(products).all() and error < least:

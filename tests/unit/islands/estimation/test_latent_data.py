@@ -11,23 +11,30 @@ from islands.simulation.initial_states import Segment, simulate_errors
 from support.latent_systems import spring_record
 
 
+def whole_blocks(data):
+    """Return the blocks with all rows, whose outputs are missing before the held-out ones."""
+    return data.held_out.runs[: len(data.used)]
+
+
 @pytest.mark.parametrize("samples", [240, 3000, 30_000])
 def test_every_row_is_in_one_block(samples):
-    record = spring_record(samples)
-    data = make_latent_data(record)
+    data = make_latent_data(spring_record(samples))
     # The first sample lacks its input.
-    assert sum(len(block.y) for block in data.whole) == samples - 1
+    assert sum(len(block.y) for block in whole_blocks(data)) == samples - 1
     assert max(len(block.y) for block in data.used) <= 600
     assert max(len(block.y) for block in data.final) <= 6000
-    for used, final, whole in zip(data.used, data.final, data.whole, strict=True):
-        assert len(used.y) <= 0.8 * len(whole.y) + 1
-        assert np.array_equal(used.y, whole.y[: len(used.y)])
+    for used, final, whole in zip(data.used, data.final, whole_blocks(data), strict=True):
+        cut = len(used.y)
+        assert cut <= 0.8 * len(whole.y) + 1
+        assert np.array_equal(used.y, final.y[:cut])
         assert np.array_equal(final.u, whole.u[: len(final.u)])
+        assert np.isnan(whole.y[:cut]).all()
+        assert np.array_equal(final.y[cut:], whole.y[cut : len(final.y)])
 
 
 def test_blocks_do_not_cross_segments():
     data = make_latent_data(join([spring_record(700), spring_record(300, seed=3)]))
-    assert [len(block.y) for block in data.whole] == [699, 299]
+    assert [len(block.y) for block in whole_blocks(data)] == [699, 299]
 
 
 def test_signals_have_the_standard_deviation_1():
@@ -103,5 +110,5 @@ def test_many_recordings_are_used_in_part():
     assert len(data.used) == 10
     assert sum(len(block.y) for block in data.used) <= 6_000
     # The blocks are from the whole record, with the first and the last recording.
-    assert np.array_equal(data.whole[0].y, data.scaled.y[1:1600])
-    assert np.array_equal(data.whole[-1].y, data.scaled.y[-1599:])
+    assert np.array_equal(data.held_out.late[0].y, data.scaled.y[600:1600])
+    assert np.array_equal(data.held_out.late[-1].y, data.scaled.y[-1000:])

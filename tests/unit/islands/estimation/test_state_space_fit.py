@@ -7,6 +7,7 @@ import pytest
 
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.simulation.initial_states import Segment
+from islands.simulation.segment_lanes import SegmentLanes
 from support.latent_systems import make_model, spring_record
 
 # The kernels of state spaces are compiled at their first use.
@@ -17,7 +18,7 @@ MODEL = make_model()
 
 def cut(record, *rows):
     bounds = [0, *rows, record.samples]
-    return [Segment(record.u[a:b].copy(), record.y[a:b].copy()) for a, b in pairwise(bounds)]
+    return SegmentLanes(Segment(record.u[a:b].copy(), record.y[a:b].copy()) for a, b in pairwise(bounds))
 
 
 def begin(segments, theta=MODEL.theta, free=None):
@@ -59,12 +60,12 @@ def test_missing_outputs_have_no_influence():
     record = spring_record(600)
     (whole,), (holes,) = cut(record), cut(record)
     holes.y[100:140] = np.nan
-    fits = [begin([each]) for each in (whole, holes)]
+    fits = [begin(SegmentLanes([each])) for each in (whole, holes)]
     for fit in fits:
         fit.advance(30)
         assert fit.mean_square < 1e-10
     whole.y[100:140] = 50.0
-    assert begin([whole]).mean_square > 1.0
+    assert begin(SegmentLanes([whole])).mean_square > 1.0
 
 
 def test_fixed_parameters_do_not_move():

@@ -7,6 +7,7 @@ from islands.kernels.state_space import (
     BELL,
     BOUND,
     CUBE,
+    NO_DERIVATIVES,
     TANH,
     accumulate_products,
     evaluate_unit,
@@ -79,7 +80,8 @@ def test_the_products_are_those_of_the_derivatives_and_the_error(code):
     places[:4] = -1
     columns = theta.size - 4
     products = np.empty((columns + ORDER + 1,) * 2)
-    assert accumulate_products(theta, places, codes, u, x, y, *LIMITS, columns, products) == ROWS
+    single = np.zeros((columns + ORDER + 1, ROWS))
+    assert accumulate_products(theta, places, codes, u, x, y, *LIMITS, columns, products, single) == ROWS
     values = np.concatenate([theta[4:], x])
 
     def run(moved):
@@ -89,6 +91,8 @@ def test_the_products_are_those_of_the_derivatives_and_the_error(code):
     slopes = np.array([(run(values + step) - run(values - step)) / 2e-6 for step in steps])
     rows = np.vstack([slopes, y - run(values)])[:, known]
     assert products == pytest.approx(rows @ rows.T, rel=1e-4, abs=1e-4)
+    assert single[:, known] == pytest.approx(rows, rel=1e-4, abs=1e-6)
+    assert not single[:, ~known].any()
 
 
 def test_a_measured_limit_is_left_out_where_the_simulation_is_beyond_it():
@@ -99,13 +103,17 @@ def test_a_measured_limit_is_left_out_where_the_simulation_is_beyond_it():
     measured = np.clip(y, lower, upper)
     places, size = np.arange(theta.size), theta.size + ORDER + 1
     inside, missing = np.empty((size, size)), np.empty((size, size))
-    accumulate_products(theta, places, codes, u, x, measured, lower, upper, theta.size, inside)
+    accumulate_products(
+        theta, places, codes, u, x, measured, lower, upper, theta.size, inside, NO_DERIVATIVES
+    )
     y[(measured == lower) | (measured == upper)] = np.nan
-    accumulate_products(theta, places, codes, u, x, y, *LIMITS, theta.size, missing)
+    accumulate_products(theta, places, codes, u, x, y, *LIMITS, theta.size, missing, NO_DERIVATIVES)
     assert np.array_equal(inside, missing)
     # A simulation that does not reach a measured limit has an error.
     theta[-1] -= 10.0
-    accumulate_products(theta, places, codes, u, x, measured, lower, upper, theta.size, inside)
+    accumulate_products(
+        theta, places, codes, u, x, measured, lower, upper, theta.size, inside, NO_DERIVATIVES
+    )
     assert inside[-1, -1] > 50.0 * np.count_nonzero(measured == upper)
 
 
@@ -132,6 +140,22 @@ def test_a_divergence_ends_the_simulation_at_its_row():
     assert rows == int(np.log2(BOUND)) - 1
     fixed = np.full(theta.size, -1)
     found = accumulate_products(
-        theta, fixed, np.zeros(0, np.int64), np.ones((100, 1)), np.ones(1), np.ones(100), *LIMITS, 0, products
+        *(theta, fixed, np.zeros(0, np.int64), np.ones((100, 1)), np.ones(1), np.ones(100), *LIMITS),
+        *(0, products, NO_DERIVATIVES),
     )
     assert found == rows
+
+
+def test_derivatives_that_decay_end_at_zero():
+    # The derivative with respect to the initial state is 0.9^k: subnormal from k = 6 700 on.
+    theta = np.array([0.9, 1.0, 1.0, 0.0, 0.0, 0.0])
+    fixed, rows = np.full(theta.size, -1), 8000
+    products, single = np.empty((2, 2)), np.zeros((2, rows))
+    zeros = np.zeros(rows)
+    accumulate_products(
+        *(theta, fixed, np.zeros(0, np.int64), np.zeros((rows, 1)), np.zeros(1), zeros, *LIMITS),
+        *(0, products, single),
+    )
+    assert single[0, :3000] == pytest.approx(0.9 ** np.arange(3000), rel=1e-9)
+    assert not single[0, 4000:].any()
+    assert products[0, 0] == pytest.approx(1.0 / (1.0 - 0.81))
