@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from islands.estimation.latent_data import LatentData, measure_held_out
 from islands.estimation.state_space_fit import StateSpaceFit
-from islands.models.latent import StateSpaceLayout, find_codes, read_at_once
+from islands.models.latent import StateSpaceLayout, read_at_once
+from islands.models.unit_functions import find_codes, parse_unit
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes
 
@@ -23,7 +24,7 @@ class FittedStateSpace:
     order, inputs : int
         Numbers of states and inputs.
     units : tuple of str
-        Function of each unit, an entry of ``UNITS``.
+        Function of each unit, as `parse_unit` reads it.
     theta : tuple of float
         All parameters in the order of `StateSpaceLayout`.
     free : tuple of bool
@@ -60,8 +61,8 @@ class FittedStateSpace:
 
     @property
     def size(self) -> int:
-        """Number of free parameters."""
-        return sum(self.free)
+        """Number of free parameters, and of the further operations of units that are no single function."""
+        return sum(self.free) + sum(parse_unit(each).operations - 1 for each in self.units)
 
     @property
     def key(self) -> tuple[str, ...]:

@@ -27,7 +27,8 @@ from islands.estimation.latent_data import (
 from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
 from islands.estimation.modal_form import find_modal_form
 from islands.kernels.state_space import evaluate_unit
-from islands.models.latent import LatentModel, StateSpaceLayout, find_codes
+from islands.models.latent import LatentModel, StateSpaceLayout
+from islands.models.unit_functions import find_codes
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 

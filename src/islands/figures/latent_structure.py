@@ -10,7 +10,8 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from islands.figures.style import MEASURED, REMARK, SIMULATED, WIDTH, blank, finish, house_style
-from islands.models.latent import LatentModel, evaluate_curve
+from islands.models.latent import LatentModel
+from islands.models.unit_functions import evaluate_curve
 from islands.models.signal_statement import symbols
 
 #: Horizontal places in inches: end of the names of inputs, their bus, bus of the states, bus to the states,

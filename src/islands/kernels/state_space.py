@@ -17,8 +17,12 @@ from islands.kernels.simd import VECTOR, add, broadcast, load, multiply, padded_
 from islands.kernels.simd_functions import absolute, select_less
 from islands.kernels.summation import CHUNK
 
-#: Codes of the functions of the units.
-TANH, SQUARE, CUBE, MAGNITUDE, HINGE, ROOT, DEAD_ZONE, SATURATION, BELL = range(9)
+#: Codes of functions. The code of a unit is that of its function, or has several operations, each a digit of
+#: base 16. They begin with the lowest digit, and with the argument as the only value.
+TANH, SQUARE, CUBE, MAGNITUDE, HINGE, ROOT, DEAD_ZONE, SATURATION, BELL = range(1, 10)
+
+#: Operations that begin a further value with the argument, and that multiply the last two values.
+ARGUMENT, PRODUCT, OPERATION_BITS, OPERATION = 10, 11, 4, 15
 
 #: A state with a larger absolute value has diverged.
 BOUND = 1e6
@@ -34,8 +38,8 @@ _LEAST_ROOT = 1e-6
 
 
 @kernel(forceinline=True)
-def evaluate_unit(code, s):
-    """Return the value of the function of a unit and its slope."""
+def _evaluate_function(code, s):
+    """Return the value of a function and its slope."""
     if code == TANH:
         value = math.tanh(s)
         return value, 1.0 - value * value
@@ -56,6 +60,30 @@ def evaluate_unit(code, s):
         return min(max(s, -1.0), 1.0), 1.0 if abs(s) < 1.0 else 0.0
     value = math.exp(-s * s)
     return value, -2.0 * s * value
+
+
+@kernel(forceinline=True)
+def evaluate_unit(code, s):
+    """Return the value of a unit and its slope."""
+    if code <= OPERATION:
+        return _evaluate_function(code, s)
+    value, slope = s, 1.0
+    second, second_slope, third, third_slope = 0.0, 0.0, 0.0, 0.0
+    while code:
+        operation = code & OPERATION
+        code >>= OPERATION_BITS
+        if operation == ARGUMENT:
+            third, third_slope = second, second_slope
+            second, second_slope = value, slope
+            value, slope = s, 1.0
+        elif operation == PRODUCT:
+            slope = slope * second + value * second_slope
+            value *= second
+            second, second_slope = third, third_slope
+        else:
+            value, factor = _evaluate_function(operation, value)
+            slope *= factor
+    return value, slope
 
 
 @kernel(forceinline=True)

@@ -29,11 +29,15 @@ from islands.kernels.simd_functions import (
     square_root,
 )
 from islands.kernels.state_space import (
+    ARGUMENT,
     BOUND,
     CUBE,
     DEAD_ZONE,
     HINGE,
     MAGNITUDE,
+    OPERATION,
+    OPERATION_BITS,
+    PRODUCT,
     ROOT,
     SATURATION,
     SQUARE,
@@ -43,8 +47,8 @@ from islands.kernels.state_space import (
 
 
 @kernel(forceinline=True)
-def _evaluate(code, s):
-    """Return the function of a unit of one vector."""
+def _evaluate_function(code, s):
+    """Return a function of one vector."""
     if code == TANH:
         return hyperbolic_tangent(s)
     if code == SQUARE:
@@ -63,6 +67,24 @@ def _evaluate(code, s):
     if code == SATURATION:
         return clip(s, 1.0)
     return exponential(negate(multiply(s, s)))
+
+
+@kernel(forceinline=True)
+def _evaluate(code, s):
+    """Return a unit of one vector."""
+    if code <= OPERATION:
+        return _evaluate_function(code, s)
+    value, second, third = s, s, s
+    while code:
+        operation = code & OPERATION
+        code >>= OPERATION_BITS
+        if operation == ARGUMENT:
+            value, second, third = s, value, second
+        elif operation == PRODUCT:
+            value, second = multiply(value, second), third
+        else:
+            value = _evaluate_function(operation, value)
+    return value
 
 
 @kernel(forceinline=True)

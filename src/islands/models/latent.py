@@ -3,7 +3,7 @@
     x(k+1) = A x(k) + B u(k) + E h(k) + o,    h(k) = f(W x(k) + V u(k) + s)
     y(k)   = C x(k) + D u(k) + F h(k) + level
 
-A unit is a function of one argument. Parameters that are zero are not part of a model, so that Wiener,
+A unit is a function of one argument (see `unit_functions`). Parameters that are zero are not part of a model, so that Wiener,
 Hammerstein and feedback systems are structures of one class (nonlinear linear-fractional representation:
 Schoukens and Toth, Automatica 113 (2020) 108731).
 """
@@ -34,21 +34,7 @@ from islands.models.linear_system import (
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
-
-#: Text of the function of each unit with its argument, in the order of the codes of the kernel.
-UNITS: Mapping[str, str] = MappingProxyType(
-    {
-        "tanh": "tanh({0})",
-        "square": "({0})^2",
-        "cube": "({0})^3",
-        "abs": "abs({0})",
-        "hinge": "max({0}, 0)",
-        "root": "sign({0})*sqrt({0})",
-        "dead zone": "(max({0} + -1, 0) + min({0} + 1, 0))",
-        "saturation": "min(max({0}, -1), 1)",
-        "bell": "exp(-({0})^2)",
-    }
-)
+from islands.models.unit_functions import find_codes, parse_unit
 
 #: Blocks of parameters that are zero in the structure of a system: effects of the units on the states or on
 #: the output, or weights of the states in the arguments of the units.
@@ -65,9 +51,6 @@ STRUCTURE_SUMMARIES: Mapping[str, str] = MappingProxyType(
         "feedback": "no unit acts on the output directly",
     }
 )
-
-#: Text of units in equations for readers, if it is another one.
-_NAMED_POWERS: Mapping[str, str] = MappingProxyType({"square": "square({0})", "cube": "cube({0})"})
 
 _Entry = TypeVar("_Entry", bound=np.generic)
 
@@ -157,7 +140,7 @@ class LatentModel(ParametricModel):
     order : int
         Number of states.
     units : tuple of str
-        Function of each unit, an entry of `UNITS`.
+        Function of each unit, as `parse_unit` reads it.
     wiring : tuple of str
         Names of the parameters that are not zero, in the order of `StateSpaceLayout`.
     memory : int
@@ -189,8 +172,8 @@ class LatentModel(ParametricModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if unknown := set(self.units) - set(UNITS):
-            raise ModelError(f"unknown unit {min(unknown)!r}; units are {', '.join(UNITS)}")
+        for unit in self.units:
+            parse_unit(unit)
         if tuple(name for name in self.layout.names if name in self.names) != self.names:
             known = ", ".join(self.layout.names)
             raise ModelError(f"the parameters of a model {self.kind} are some of {known}, in this order")
@@ -396,8 +379,7 @@ class LatentModel(ParametricModel):
         units = {0: [f"{name}(k)" for name in names], 1: [f"{name}(k-1)" for name in names]}
         sides = self._write_sides(units, write, _round)
         for name, unit in zip(names, self._places, strict=True):
-            text = _NAMED_POWERS.get(self.units[unit - 1], UNITS[self.units[unit - 1]])
-            sides[name] = text.format(self._write_argument(unit, 0, write))
+            sides[name] = parse_unit(self.units[unit - 1]).display(self._write_argument(unit, 0, write))
         return sides, names
 
     @property
@@ -421,7 +403,7 @@ class LatentModel(ParametricModel):
 
     def _write_unit(self, unit: int, lag: int, write: Factor) -> str:
         """Return the text of a unit at sample k - lag."""
-        return UNITS[self.units[unit - 1]].format(self._write_argument(unit, lag, write))
+        return parse_unit(self.units[unit - 1]).write(self._write_argument(unit, lag, write))
 
     def _write_argument(self, unit: int, lag: int, write: Factor) -> str:
         """Return the text of the argument of a unit at sample k - lag."""
@@ -470,21 +452,6 @@ def read_at_once(names: Sequence[str]) -> bool:
     """Return whether the output reads an input at sample k if these parameters are not zero."""
     units = {name[1:] for name in names if name[0] == "f"}
     return any(name[0] == "d" or (name[0] == "v" and name[1:].split("_")[0] in units) for name in names)
-
-
-def evaluate_curve(unit: str, arguments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the values of the function of a unit, an entry of ``UNITS``, for arguments of any shape."""
-    from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415 - see `LatentModel`
-
-    (code,) = find_codes([unit])
-    values = [evaluate_unit(code, s)[0] for s in np.ravel(arguments).tolist()]
-    return np.array(values, dtype=np.float64).reshape(np.shape(arguments))
-
-
-def find_codes(units: Sequence[str]) -> NDArray[np.int64]:
-    """Return the codes of units for the kernel."""
-    names = list(UNITS)
-    return np.array([names.index(unit) for unit in units], np.int64)
 
 
 def _round(value: float) -> str:

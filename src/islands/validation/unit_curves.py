@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.models.latent import LatentModel, evaluate_curve
+from islands.models.latent import LatentModel
+from islands.models.unit_functions import evaluate_curve
 from islands.simulation.unit_arguments import UnitRun, simulate_units
 from islands.validation.ensemble import Ensemble
 
@@ -49,7 +50,7 @@ class UnitCurve:
     Attributes
     ----------
     unit : str
-        An entry of ``UNITS``.
+        Function of the unit, as of `parse_unit`.
     abscissa : Abscissa
     channel : int
         Number of the input of the abscissa, from 0; -1 if it is none.

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData
 from islands.kernels.state_space import simulate_states
-from islands.models.latent import UNITS, ZERO_BLOCKS, StateSpaceLayout, find_codes
+from islands.models.latent import ZERO_BLOCKS, StateSpaceLayout
+from islands.models.unit_functions import (
+    ARGUMENT,
+    FUNCTIONS,
+    PRODUCT,
+    UnitFunction,
+    find_codes,
+    parse_unit,
+)
 
 #: Steps of the estimation of an offspring, before them of the effects of a new unit, and of a system that is
 #: estimated further.
@@ -25,6 +33,12 @@ STEPS, EFFECT_STEPS, FURTHER_STEPS = 8, 5, 24
 
 #: Most states and units of a system.
 MOST_STATES, MOST_UNITS = 8, 6
+
+#: Most operations of a unit that is drawn.
+MOST_OPERATIONS = 3
+
+#: Probability that a function is replaced by a single one, and that one of several operations loses some.
+_ANOTHER_FUNCTION, _PART = 0.6, 0.8
 
 #: Standard deviations of the offset of a new unit, of its first effects, and of a disturbance of arguments.
 _OFFSET, _EFFECT, _DISTURBANCE = 0.7, 1e-3, 0.3
@@ -178,7 +192,7 @@ def _replace_unit(system: FittedStateSpace, rng: Generator) -> Draft | None:
         return None
     place = int(rng.integers(len(system.units)))
     weights, offsets = (system.layout.split(np.array(system.theta))[name] for name in ("W", "s"))
-    drawn = _draw_unit(system, _draw_function(rng), rng)
+    drawn = _draw_unit(system, _vary_function(system.units[place], rng), rng)
     kept = {**drawn.values, "W": weights[place], "s": offsets[[place]]}
     left = _take(system.draft(), range(system.order), _others(system.units, place), 0)
     return _append_units(left, [drawn._replace(values=kept)])
@@ -264,7 +278,25 @@ def _others(items: Sequence[Any], place: int) -> list[int]:
 
 
 def _draw_function(rng: Generator) -> str:
-    return list(UNITS)[int(rng.integers(len(UNITS)))]
+    return list(FUNCTIONS)[int(rng.integers(len(FUNCTIONS)))]
+
+
+def _vary_function(function: str, rng: Generator) -> str:
+    """Return another function, or a tree about the function or within it."""
+    tree, argument = parse_unit(function), UnitFunction(ARGUMENT)
+    drawn = UnitFunction(_draw_function(rng), (argument,))
+    inside = [each for each in tree.operands if each.operands]
+    kind = rng.random()
+    if kind < _ANOTHER_FUNCTION:
+        return str(drawn)
+    if inside and (kind < _PART or tree.operations >= MOST_OPERATIONS):
+        return str(inside[int(rng.integers(len(inside)))])
+    larger = (
+        UnitFunction(drawn.name, (tree,)),
+        UnitFunction(PRODUCT, (tree, argument)),
+        UnitFunction(PRODUCT, (tree, drawn)),
+    )
+    return str(larger[int(rng.integers(len(larger)))]) if tree.operations < MOST_OPERATIONS else str(drawn)
 
 
 #: Relative frequency of each mutation, and its function, which returns None if it does not apply.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.kernels.state_space import BELL
+from islands.models.unit_functions import FUNCTIONS, find_codes
 from islands.simulation.initial_states import Segment, simulate_errors
 from islands.simulation.segment_lanes import SegmentLanes
 
@@ -31,11 +31,11 @@ def make_segments(lengths, rng):
     return segments
 
 
-@pytest.mark.parametrize("code", range(BELL + 1))
+@pytest.mark.parametrize("unit", [*FUNCTIONS, "tanh(square)", "s*abs", "bell*s*tanh(s*cube)"])
 @pytest.mark.parametrize("lengths", [(40,), (90, 30, 60), tuple(range(20, 31))])
-def test_the_errors_are_those_of_each_segment_alone(code, lengths):
-    rng, codes = np.random.default_rng(code), np.array([code, code])
-    segments, theta = make_segments(lengths, rng), make_theta(2, code)
+def test_the_errors_are_those_of_each_segment_alone(unit, lengths):
+    rng, codes = np.random.default_rng(7), find_codes([unit, unit])
+    segments, theta = make_segments(lengths, rng), make_theta(2)
     starts = rng.standard_normal((len(segments), STATES))
     lanes = SegmentLanes(segments)
     alone = [
@@ -66,7 +66,7 @@ def test_a_state_may_diverge_after_the_end_of_its_segment():
     rng = np.random.default_rng(3)
     theta = np.array([0.5, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     long, short = (Segment(np.zeros((rows, 1)), rng.standard_normal(rows)) for rows in (60, 4))
-    starts, codes = np.array([[0.1], [0.9]]), np.array([2])
+    starts, codes = np.array([[0.1], [0.9]]), find_codes(["cube"])
     alone = [
         simulate_errors(theta, codes, each, start) for each, start in zip((long, short), starts, strict=True)
     ]

@@ -9,7 +9,7 @@ from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import fit_linear_systems
 from islands.evolution.latent import variation
 from islands.evolution.latent.variation import MOST_UNITS, begin_system, cross, mutate
-from islands.models.latent import UNITS
+from islands.models.unit_functions import parse_unit
 from islands.progress import Steps
 from support.latent_systems import spring_record
 
@@ -83,7 +83,7 @@ def test_a_mutation_has_the_sizes_of_its_name(system, operation, order, units):
         assert (draft.layout.order, len(draft.units)) == (order, units)
         assert draft.theta.shape == draft.free.shape == (len(draft.layout.names),)
         assert draft.states.shape == (len(system.states), order)
-        assert set(draft.units) <= set(UNITS)
+        assert all(parse_unit(each).operations <= variation.MOST_OPERATIONS for each in draft.units)
 
 
 def test_a_state_that_is_added_hardly_changes_the_simulation(data, system):

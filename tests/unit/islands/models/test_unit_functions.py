@@ -1,0 +1,58 @@
+"""Functions of units: text, tree, code and values are one function."""
+
+import numpy as np
+import pytest
+
+from islands.errors import ModelError
+from islands.models.unit_functions import FUNCTIONS, evaluate_curve, find_codes, parse_unit
+
+TREES = {
+    "tanh": np.tanh,
+    "tanh(square)": lambda s: np.tanh(s**2),
+    "s*abs": lambda s: s * np.abs(s),
+    "bell*s": lambda s: np.exp(-(s**2)) * s,
+    "cube(s*tanh)": lambda s: (s * np.tanh(s)) ** 3,
+    "abs*s*tanh(s*cube)": lambda s: np.abs(s) * s * np.tanh(s**4),
+}
+
+
+@pytest.mark.parametrize("text", [*FUNCTIONS, *TREES])
+def test_the_text_is_read_as_it_is_written(text):
+    assert str(parse_unit(text)) == text
+
+
+def test_functions_have_the_codes_of_the_kernel():
+    assert find_codes(FUNCTIONS).tolist() == list(range(1, len(FUNCTIONS) + 1))
+    assert len(set(find_codes(TREES).tolist())) == len(TREES)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("text", TREES)
+def test_a_tree_has_the_values_of_its_text(text):
+    s = np.linspace(-1.5, 1.5, 31)
+    assert evaluate_curve(text, s) == pytest.approx(TREES[text](s))
+    written = parse_unit(text).write("s").replace("^", "**")
+    names = {"tanh": np.tanh, "exp": np.exp, "abs": np.abs}
+    assert eval(written, names, {"s": s}) == pytest.approx(TREES[text](s))
+
+
+def test_redundant_parentheses_are_left_out():
+    assert str(parse_unit("( s * abs )")) == "s*abs"
+    assert str(parse_unit("tanh(s)")) == "tanh"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("cosh", "unknown unit 'cosh'"),
+        ("tanh(", "unknown unit"),
+        ("tanh)", "unknown unit"),
+        ("", "unknown unit"),
+        ("s", "too large or empty"),
+        ("*".join(["s"] * 10), "too large"),
+        ("s*(s*(s*(s*s)))", "too large"),
+    ],
+)
+def test_an_impossible_unit_is_refused(text, message):
+    with pytest.raises(ModelError, match=message):
+        parse_unit(text)
