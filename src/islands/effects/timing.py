@@ -38,7 +38,7 @@ def _delay_starting_points(context: SimulationContext, _residual: Signal) -> tup
 
 DELAY = Effect(
     name="delay",
-    summary="The input acts later than it is recorded: u(t - tau)",
+    summary="The input acts later than it is recorded, or earlier if tau is negative: u(t - tau)",
     family="timing",
     site=Site.INPUT,
     parameters=_delay_parameters,

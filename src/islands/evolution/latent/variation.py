@@ -37,8 +37,8 @@ MOST_STATES, MOST_UNITS = 8, 6
 #: Most operations of a unit that is drawn.
 MOST_OPERATIONS = 3
 
-#: Probability that a function is replaced by a single one, and that one of several operations loses some.
-_ANOTHER_FUNCTION, _PART = 0.6, 0.8
+#: Probability that a function is replaced by a single one, and not by a larger tree or a part of it.
+_ANOTHER_FUNCTION = 0.6
 
 #: Standard deviations of the offset of a new unit, of its first effects, and of a disturbance of arguments.
 _OFFSET, _EFFECT, _DISTURBANCE = 0.7, 1e-3, 0.3
@@ -285,18 +285,16 @@ def _vary_function(function: str, rng: Generator) -> str:
     """Return another function, or a tree about the function or within it."""
     tree, argument = parse_unit(function), UnitFunction(ARGUMENT)
     drawn = UnitFunction(_draw_function(rng), (argument,))
-    inside = [each for each in tree.operands if each.operands]
-    kind = rng.random()
-    if kind < _ANOTHER_FUNCTION:
-        return str(drawn)
-    if inside and (kind < _PART or tree.operations >= MOST_OPERATIONS):
-        return str(inside[int(rng.integers(len(inside)))])
-    larger = (
+    parts = [each for each in tree.operands if each.operands]
+    larger = [
         UnitFunction(drawn.name, (tree,)),
         UnitFunction(PRODUCT, (tree, argument)),
         UnitFunction(PRODUCT, (tree, drawn)),
-    )
-    return str(larger[int(rng.integers(len(larger)))]) if tree.operations < MOST_OPERATIONS else str(drawn)
+    ]
+    trees = [*parts, *(each for each in larger if each.operations <= MOST_OPERATIONS)]
+    if rng.random() < _ANOTHER_FUNCTION or not trees:
+        return str(drawn)
+    return str(trees[int(rng.integers(len(trees)))])
 
 
 #: Relative frequency of each mutation, and its function, which returns None if it does not apply.

@@ -120,3 +120,14 @@ def test_equal_seeds_give_equal_drafts(system):
     one, other = (mutate(system, "auto", np.random.default_rng(7)) for _ in range(2))
     assert np.array_equal(one.theta, other.theta)
     assert one.units == other.units
+
+
+def test_functions_grow_to_trees_and_shrink_again():
+    rng, seen = np.random.default_rng(0), set()
+    function = "abs"
+    for _ in range(400):
+        function = variation._vary_function(function, rng)
+        tree = parse_unit(function)
+        assert 1 <= tree.operations <= variation.MOST_OPERATIONS
+        seen.add((tree.name == "*", tree.operations))
+    assert seen == {(False, 1), (False, 2), (False, 3), (True, 2), (True, 3)}
