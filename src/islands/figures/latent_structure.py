@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from islands.figures.style import MEASURED, REMARK, SIMULATED, WIDTH, blank, finish, house_style
 from islands.models.latent import LatentModel
-from islands.models.unit_functions import evaluate_curve
 from islands.models.signal_statement import symbols
+from islands.models.unit_functions import evaluate_curve
 
 #: Horizontal places in inches: end of the names of inputs, their bus, bus of the states, bus to the states,
 #: sum of the output, begin of its name.

@@ -3,9 +3,9 @@
     x(k+1) = A x(k) + B u(k) + E h(k) + o,    h(k) = f(W x(k) + V u(k) + s)
     y(k)   = C x(k) + D u(k) + F h(k) + level
 
-A unit is a function of one argument (see `unit_functions`). Parameters that are zero are not part of a model, so that Wiener,
-Hammerstein and feedback systems are structures of one class (nonlinear linear-fractional representation:
-Schoukens and Toth, Automatica 113 (2020) 108731).
+A unit is a function of one argument (see `unit_functions`). Parameters that are zero are not part of a model,
+so that Wiener, Hammerstein and feedback systems are structures of one class (nonlinear linear-fractional
+representation: Schoukens and Toth, Automatica 113 (2020) 108731).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,7 @@
 """Functions of the units of a state space: trees of functions and products of one argument.
 
-The text of a unit is the name of a function, as ``tanh``, a function of another one, as ``tanh(square)``, or a
-product, as ``s*abs`` for s |s|, where ``s`` is the argument.
+The text of a unit is the name of a function, as ``tanh``, a function of another one, as ``tanh(square)``, or
+a product, as ``s*abs`` for s |s|, where ``s`` is the argument.
 """
 
 import re
@@ -128,8 +128,8 @@ def parse_unit(text: str) -> UnitFunction:
     digits = len(list(found.list_digits()))
     if not 0 < digits <= _MOST_DIGITS or found.values > _MOST_VALUES:
         raise ModelError(
-            f"the unit {text!r} is too large or empty: at least one operation, at most {_MOST_DIGITS}, and at "
-            f"most {_MOST_VALUES - 1} products in the second operands of each other"
+            f"the unit {text!r} is too large or empty: at least one operation, at most {_MOST_DIGITS}, and "
+            f"at most {_MOST_VALUES - 1} products in the second operands of each other"
         )
     return found
 

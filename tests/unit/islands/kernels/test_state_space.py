@@ -13,7 +13,7 @@ from islands.kernels.state_space import (
     evaluate_unit,
     simulate_state_space,
 )
-from islands.models.unit_functions import FUNCTIONS, find_codes, parse_unit
+from islands.models.unit_functions import FUNCTIONS, find_codes
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = pytest.mark.ci
