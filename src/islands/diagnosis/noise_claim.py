@@ -9,6 +9,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.diagnosis.inference.coloured_remainder import limit_confidences
 from islands.diagnosis.inference.hidden_structure import find_hidden_structure
 from islands.diagnosis.inference.noise_detectors import COLOURED_NOISE
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
@@ -68,7 +69,7 @@ def complete_findings(
         As for `judge_noise`.
     """
     closed_loop = find_closed_loop(fit, target, found.record.input_names[0])
-    found = judge_noise(found, target, noise_level, rng)
+    found = limit_confidences(judge_noise(found, target, noise_level, rng), target)
     return replace(found, record_findings=(*record_findings, *closed_loop, *found.record_findings))
 
 

@@ -1,0 +1,36 @@
+"""Certainty of a name beside a coloured remainder, which may have another cause."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.diagnosis.inference.coloured_remainder import MAX_CONFIDENCE
+
+LAG = tuple(each for each in islands.EFFECTS if each.name == "sensor-lag")
+DT, PROCESS, SENSOR = 0.1, 2.0, 0.6
+
+
+def make_sensor_record(growth, samples=800):
+    """Return a process behind a sensor whose lag grows with its error, with white noise."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.standard_normal(samples // 10), 10)
+    y, level, shown = np.zeros(samples), 0.0, 0.0
+    for k in range(samples):
+        y[k] = shown
+        for _ in range(10):
+            error = level - shown
+            level += DT / 10.0 * (u[k] - level) / PROCESS
+            shown += DT / 10.0 * error / (SENSOR * (1.0 + growth * abs(error)))
+    return islands.Dataset(u, y + 0.002 * rng.standard_normal(samples), DT)
+
+
+@pytest.mark.ci
+def test_a_name_that_leaves_a_coloured_error_is_no_more_than_probable():
+    right, near = (
+        islands.diagnose(make_sensor_record(growth), "linear:1", effects=LAG) for growth in (0.0, 8.0)
+    )
+    assert [each.claimed_names for each in (right, near)] == [("sensor-lag",)] * 2
+    assert right.causes[0].confidence > 0.95
+    assert near.causes[0].confidence <= MAX_CONFIDENCE
+    assert near.noise_claim.correlation_time > 0.0
+    assert "probably lacks" in near.summary
