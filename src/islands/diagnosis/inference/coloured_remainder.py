@@ -1,9 +1,9 @@
 """Coloured remainder: what causes leave of a misfit beside white noise, and how certain their names are.
 
 What remains may be coloured noise, or an error of the simulation that has another cause. A record of one
-input does not tell these apart. In trials, a cause that leaves a coloured part of more than a twentieth of the
-misfit is named right in about 87 % of the records with coloured noise, and in none of the records with a law
-that is not in the catalogue.
+input does not tell these apart. In trials, a cause that leaves a coloured part of more than a twentieth of
+the misfit is named right in about 87 % of the records with coloured noise, and in none of the records with a
+law that is not in the catalogue.
 """
 
 from dataclasses import replace
@@ -19,8 +19,8 @@ from islands.estimation.noise_model import fit_noise
 #: Coloured part of the misfit up to which a cause explains it.
 MAX_COLOURED_FRACTION = 0.05
 
-#: Largest confidence of a cause that leaves more, and of one that has no significant gain on the hold-out part
-#: in addition.
+#: Largest confidence of a cause that leaves more, and of one that has in addition no significant gain on the
+#: hold-out part.
 MAX_CONFIDENCE, MAX_CONFIDENCE_WITHOUT_GAIN = 0.85, 0.5
 
 
