@@ -34,7 +34,11 @@ from islands.models.linear_system import (
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
+from islands.models.state_space_rest import find_rest, linearise
 from islands.models.unit_functions import find_codes, parse_unit
+
+#: Units that are odd functions of their arguments.
+ODD_UNITS = frozenset({"tanh", "cube", "root", "dead zone", "saturation"})
 
 #: Blocks of parameters that are zero in the structure of a system: effects of the units on the states or on
 #: the output, or weights of the states in the arguments of the units.
@@ -56,9 +60,6 @@ _Entry = TypeVar("_Entry", bound=np.generic)
 
 #: Writes the product of a parameter, given by name, and the text of a factor; the parameter for no factor.
 Factor = Callable[[str, str], str]
-
-#: Newton steps that find the states at rest, and the step that ends them.
-_REST_STEPS, _STILL = 50, 1e-12
 
 #: Significant digits of the numbers in the text of an equation.
 _DIGITS = 6
@@ -129,6 +130,16 @@ class StateSpaceLayout:
             found[name] = values[at : at + size].reshape(shape)
             at += size
         return found
+
+    def find_matrices(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Return views of the parameters by name, as in the equations, with the weights W and V apart.
+
+        The shapes are (states, states) of A, (states, inputs) of B, (states, units) of E, (units, states) of
+        W, (units, inputs) of V, and one dimension for C, D, F, s, o and level.
+        """
+        blocks = self.split(theta)
+        weights = blocks["W"]
+        return {**blocks, "W": weights[:, : self.order], "V": weights[:, self.order :]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,19 +229,7 @@ class LatentModel(ParametricModel):
 
     @cached_property
     def _rest(self) -> NDArray[np.float64] | None:
-        x = np.zeros(self.order)
-        for _ in range(_REST_STEPS):
-            after, system = self._linearise(x)
-            try:
-                step = np.linalg.solve(np.eye(self.order) - system.a, after - x)
-            except np.linalg.LinAlgError:
-                return None
-            x = x + step
-            if not np.isfinite(x).all():
-                return None
-            if np.abs(step).max() <= _STILL * max(1.0, np.abs(x).max()):
-                return x
-        return None
+        return find_rest(self.matrices, self.codes, np.array(self.operating_inputs), np.zeros(self.order))
 
     @property
     def operating_point(self) -> str:
@@ -244,36 +243,12 @@ class LatentModel(ParametricModel):
 
     @cached_property
     def matrices(self) -> Mapping[str, NDArray[np.float64]]:
-        """Blocks of the parameters by name, as in the equations, with the weights W and V apart.
-
-        The shapes are (states, states) of A, (states, inputs) of B, (states, units) of E, (units, states) of
-        W, (units, inputs) of V, and one dimension for C, D, F, s, o and level.
-        """
-        blocks = self.layout.split(self.theta)
-        weights = blocks["W"]
-        return {**blocks, "W": weights[:, : self.order], "V": weights[:, self.order :]}
+        """Blocks of the parameters by name, as in the equations; see `StateSpaceLayout.find_matrices`."""
+        return self.layout.find_matrices(self.theta)
 
     def linearise(self, x: NDArray[np.float64]) -> LinearSystem:
         """Return the linear system of small deviations from the operating point with the states ``x``."""
-        return self._linearise(x)[1]
-
-    def _linearise(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], LinearSystem]:
-        """Return the next states at the operating point, and the linear system there."""
-        # A command that does not simulate loads no kernels.
-        from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415
-
-        of, u = self.matrices, np.array(self.operating_inputs)
-        arguments = of["W"] @ x + of["V"] @ u + of["s"]
-        pairs = [evaluate_unit(code, s) for code, s in zip(self.codes, arguments, strict=True)]
-        values, slopes = np.array(pairs).reshape(-1, 2).T
-        on_states, on_output = of["E"] * slopes, of["F"] * slopes
-        system = LinearSystem(
-            a=of["A"] + on_states @ of["W"],
-            b=of["B"] + on_states @ of["V"],
-            c=of["C"] + on_output @ of["W"],
-            d=of["D"] + on_output @ of["V"],
-        )
-        return of["A"] @ x + of["B"] @ u + of["E"] @ values + of["o"], system
+        return linearise(self.matrices, self.codes, x, np.array(self.operating_inputs)).system
 
     @property
     def reads_at_once(self) -> bool:
