@@ -44,6 +44,11 @@ class SensorLimits(NamedTuple):
         lower = -np.inf if self.lower is None else self.lower
         return lower, np.inf if self.upper is None else self.upper
 
+    def mirror(self, values: NDArray[np.float64]) -> "SensorLimits":
+        """Return limits that are symmetric about zero; none if the values of the signal exceed them."""
+        largest = max((abs(each) for each in self if each is not None), default=0.0)
+        return NO_LIMITS if np.nanmax(np.abs(values)) > largest else SensorLimits(-largest, largest)
+
     def write(self, text: str, number: Callable[[float], str] = repr) -> str:
         """Return the expression of a signal within the limits, with these as ``number`` writes them."""
         if self.lower is not None:

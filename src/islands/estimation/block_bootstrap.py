@@ -23,10 +23,13 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from islands.data.coupled_record import AnyRecord
+from islands.estimation.constraints.conditions import Constrained
+from islands.estimation.constraints.state_space import linearise_constraints, meet_constraints
 from islands.estimation.damped_least_squares import find_directions, inner_products
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
 from islands.models.coupled_narx import AnyModel
+from islands.models.latent import LatentModel
 from islands.simulation.initial_outputs import estimate_initial_outputs
 from islands.simulation.outcome import EvaluationOutcome
 
@@ -71,7 +74,11 @@ def draw_parameters(
     """
     theta = np.array(model.parameters)
     repeated = np.tile(theta, (draws, 1))
-    constrained = constrain_model(model, constraints)
+    constrained: Constrained | EvaluationOutcome
+    if isinstance(model, LatentModel):
+        constrained = linearise_constraints(model, constraints)
+    else:
+        constrained = constrain_model(model, constraints)
     if isinstance(constrained, EvaluationOutcome):
         yield repeated
         return
@@ -93,6 +100,8 @@ def draw_parameters(
     for basis in _list_bases(np.add.reduce(normal)):
         steps = np.array([_solve(normal, gradient, each, basis) for each in weights])
         drawn = repeated - np.einsum("tf,df->dt", directions, steps)
+        if isinstance(model, LatentModel):
+            drawn = meet_constraints(model, drawn, constraints)
         signed = [draw for draw in drawn if constrained.has_signs(draw)]
         yield np.array(signed or [theta])
 

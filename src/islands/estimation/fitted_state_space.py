@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
 from islands.estimation.latent_data import LatentData, measure_held_out
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import StateSpaceLayout, read_at_once
@@ -135,14 +136,16 @@ class Draft:
             self.states[:, kept],
         )
 
-    def begin(self, segments: SegmentLanes) -> StateSpaceFit:
+    def begin(
+        self, segments: SegmentLanes, conditions: StateSpaceConditions = NO_CONDITIONS
+    ) -> StateSpaceFit:
         """Return the fit of the free parameters to segments, without any step."""
-        theta = np.where(self.free, self.theta, 0.0)
-        return StateSpaceFit(theta, number(self.free), find_codes(self.units), segments, self.states)
+        theta, codes = np.where(self.free, self.theta, 0.0), find_codes(self.units)
+        return StateSpaceFit(theta, number(self.free), codes, segments, self.states, conditions)
 
     def estimate(self, data: LatentData) -> "FittedStateSpace | EvaluationOutcome":
         """Estimate the parameters and measure the error of the held-out rows."""
-        fit = self.begin(data.used)
+        fit = self.begin(data.used, data.conditions)
         try:
             if self.effect_steps:
                 effects = self.free.copy()
@@ -155,6 +158,8 @@ class Draft:
             error = measure_held_out(fit, data)
         except np.linalg.LinAlgError:
             return EvaluationOutcome(Status.SINGULAR, "the parameters depend on each other")
+        if not fit.meets_conditions:
+            return EvaluationOutcome(Status.INFEASIBLE, "the state space cannot meet the constraints")
         if not np.isfinite([error, fit.mean_square]).all():
             return EvaluationOutcome(Status.DIVERGED, "a free run of the state space diverges")
         return self.describe(fit, error)

@@ -17,6 +17,11 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.flat_extremes import SensorLimits, find_limits
 from islands.data.input_lead import advance_all_inputs
+from islands.estimation.constraints.state_space import (
+    NO_CONDITIONS,
+    StateSpaceConditions,
+    find_conditions,
+)
 from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import StateSpaceLayout
@@ -65,10 +70,23 @@ class SignalScales:
     height: float
 
     @classmethod
-    def measure(cls, record: Dataset) -> Self:
-        """Measure those of a record."""
-        height = _deviation(record.y[~np.isnan(record.y)])
-        return cls(record.u.mean(axis=0), _deviation(record.u), float(np.nanmean(record.y)), float(height))
+    def measure(cls, record: Dataset, *, offsets: bool = True, level: bool = True) -> Self:
+        """Measure those of a record.
+
+        Parameters
+        ----------
+        record : Dataset
+        offsets, level : bool
+            Whether the model has offsets of its states and units, and a level of its output. Without them,
+            the mean of the inputs, or of the output, is zero here, and the scale a root mean square.
+        """
+        y = record.y[~np.isnan(record.y)]
+        return cls(
+            record.u.mean(axis=0) if offsets else np.zeros(record.inputs),
+            _deviation(record.u) if offsets else _root_mean_square(record.u),
+            float(np.nanmean(record.y)) if level else 0.0,
+            float(_deviation(y) if level else _root_mean_square(y)),
+        )
 
     def scale_inputs(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return inputs of the mean 0 and the standard deviation 1."""
@@ -82,6 +100,10 @@ class SignalScales:
         """Return the limits of scaled outputs, infinite without one."""
         lower, upper = self.scale_outputs(np.array(limits.range)).tolist()
         return lower, upper
+
+    def scale_conditions(self, conditions: StateSpaceConditions) -> StateSpaceConditions:
+        """Return the conditions for scaled signals."""
+        return conditions.scale(self.mean, self.deviation, self.level, self.height)
 
     def use_record_units(self, layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the parameters for signals of the record, of those for scaled ones."""
@@ -130,6 +152,8 @@ class LatentData:
         Of the record.
     limits : SensorLimits
         Of the output of the record.
+    stated : StateSpaceConditions
+        Conditions on the parameters, in the units of the signals.
     """
 
     record: Dataset
@@ -139,20 +163,38 @@ class LatentData:
     held_out: "HeldOutRows"
     scales: SignalScales
     limits: SensorLimits
+    stated: StateSpaceConditions = NO_CONDITIONS
+
+    @property
+    def conditions(self) -> StateSpaceConditions:
+        """Conditions on the parameters, for scaled signals."""
+        return self.scales.scale_conditions(self.stated)
+
+    def without_statics(self) -> "LatentData":
+        """Return the same data without the static conditions, which a search does not impose."""
+        return replace(self, stated=replace(self.stated, statics=()))
 
 
 # The islands of a process share the blocks of a record.
 @lru_cache(maxsize=2)
-def make_latent_data(record: Dataset) -> LatentData:
+def make_latent_data(record: Dataset, constraints: str = "none") -> LatentData:
     """Scale a record and cut blocks out of it.
 
     All inputs are read one sample early, so that the first row of a segment lacks them.
+
+    Parameters
+    ----------
+    record : Dataset
+    constraints : str
+        Statements about the models; see `find_conditions`.
     """
     record = advance_all_inputs(record)
-    scales = SignalScales.measure(record)
+    stated = find_conditions(constraints, record.inputs)
+    scales = SignalScales.measure(record, offsets=not stated.is_odd, level=not stated.is_odd)
     u, y = scales.scale_inputs(record.u), scales.scale_outputs(record.y)
     scaled = replace(record, u=u, y=y)
     limits = find_limits(record.y, record.bounds)
+    limits = limits.mirror(record.y) if stated.is_odd else limits
     scaled_limits = scales.scale_limits(limits)
     used: list[Segment] = []
     final: list[Segment] = []
@@ -163,12 +205,18 @@ def make_latent_data(record: Dataset) -> LatentData:
         final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), scaled_limits))
         whole.append(_take(scaled, begin, end, scaled_limits))
     blocks = SegmentLanes(used), SegmentLanes(final), _hold_out(whole, used)
-    return LatentData(record, scaled, *blocks, scales, limits)
+    return LatentData(record, scaled, *blocks, scales, limits, stated)
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviation of each column, 1 for a constant."""
     found = values.std(axis=0)
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _root_mean_square(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the root mean square of each column, 1 for a column of zeros."""
+    found = np.sqrt(np.mean(values**2, axis=0))
     return np.where(found > 0.0, found, 1.0)
 
 

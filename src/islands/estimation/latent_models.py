@@ -4,17 +4,21 @@ Of the systems that no other one exceeds in size and held-out error, blocks of p
 not need are removed. The others are estimated on longer blocks and written in the units of the record.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import log
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from islands.data.dataset import Dataset
+from islands.estimation.constraints.state_space import take_system
+from islands.estimation.constraints.static_state import StateSpace
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
     LARGEST_MEMORY,
@@ -52,6 +56,11 @@ _NEGLIGIBLE, _LARGEST_INCREASE, _LARGEST_FINAL_INCREASE = 0.01, 0.02, 0.5
 
 #: Largest part of a segment that gives the initial states of a free run of the result.
 _LARGEST_PART = 0.05
+
+#: Odd unit that takes the place of another one.
+_ODD: Mapping[str, str] = MappingProxyType(
+    {"square": "cube", "abs": "root", "hinge": "dead zone", "bell": "tanh"}
+)
 
 #: Part to which a mode decays in the warm-up.
 _DECAY = 0.01
@@ -99,12 +108,37 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
             free = _free_modes(model.layout, theta)
         states = np.array([estimate_start(theta, find_codes(()), each, order) for each in data.used])
         draft = Draft(model.layout, (), theta, free, states, steps=_LINEAR_STEPS)
-        system = draft.estimate(data)
+        system = make_odd(draft, data).estimate(data)
         if order in MODAL_ORDERS and not _gains_much(system, found, data):
             break
         if not isinstance(system, EvaluationOutcome):
             found.append(system)
     return found
+
+
+def meet_conditions(
+    systems: Sequence[FittedStateSpace], data: LatentData, steps: Steps
+) -> list[FittedStateSpace]:
+    """Return the systems that can meet the static conditions, estimated under them."""
+    if not data.stated.statics:
+        return list(systems)
+    steps.report("estimation of state spaces under the constraints", 0.65)
+    drafts = [replace(each.draft(), steps=_REDUCED_STEPS) for each in systems]
+    # The sums of a matrix product depend on the number of threads of the library.
+    with threadpool_limits(1), ThreadPoolExecutor() as threads:
+        found = list(threads.map(lambda draft: draft.estimate(data), drafts))
+    return [each for each in found if isinstance(each, FittedStateSpace)]
+
+
+def make_odd(draft: Draft, data: LatentData) -> Draft:
+    """Return a draft of an odd system without offsets if the models are to be odd."""
+    if not data.stated.is_odd:
+        return draft
+    free = draft.free.copy()
+    blocks = draft.layout.split(free)
+    for name in ("s", "o", "level"):
+        blocks[name][...] = False
+    return replace(draft, units=tuple(_ODD.get(unit, unit) for unit in draft.units), free=free)
 
 
 def _gains_much(
@@ -134,7 +168,9 @@ def find_front(systems: Sequence[FittedStateSpace], gain: float = _NEGLIGIBLE) -
     return front
 
 
-def estimate_models(front: Sequence[FittedStateSpace], record: Dataset, steps: Steps) -> list[LatentModel]:
+def estimate_models(
+    front: Sequence[FittedStateSpace], record: Dataset, steps: Steps, constraints: str = "none"
+) -> list[LatentModel]:
     """Reduce the systems of a front, estimate them on longer blocks, and return the models.
 
     If the output of the system with the least error reads an input at sample k, the inputs of all models are
@@ -146,11 +182,13 @@ def estimate_models(front: Sequence[FittedStateSpace], record: Dataset, steps: S
         The smallest first. No models if it is empty.
     record : Dataset
     steps : Steps
+    constraints : str
+        Statements about the models; see `find_conditions`. Systems that cannot meet them are left out.
     """
     if not front:
         return []
     steps.report("final estimation of state spaces", 0.7)
-    data = make_latent_data(record)
+    data = make_latent_data(record, constraints)
     with ThreadPoolExecutor() as threads:
         best = _remove_blocks(front[-1], data, direct=True)
         direct = best.reads_at_once
@@ -161,7 +199,8 @@ def estimate_models(front: Sequence[FittedStateSpace], record: Dataset, steps: S
         different = {each.key: each for each in map(_remove_idle_units, reduced)}
         # The largest ones take the longest time: the others use the other threads in the meantime.
         finished = threads.map(partial(_finish, data=data, steps=steps), list(different.values())[::-1])
-        models = [make_latent_model(each, data) for each in finished][::-1]
+        models = [make_latent_model(each, data) for each in finished if each is not None][::-1]
+    models = [each for each in models if data.stated.are_met(take_system(each))]
     return models if direct else [replace(each, input_names=record.input_names) for each in models]
 
 
@@ -216,11 +255,16 @@ def _remove_idle_units(system: FittedStateSpace) -> FittedStateSpace:
     return replace(system, units=taken.units, theta=theta, free=used)
 
 
-def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedStateSpace:
-    """Estimate on longer blocks, unless the error of other rows or of disturbed states increases much."""
+def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedStateSpace | None:
+    """Estimate on longer blocks, unless the error of other rows or of disturbed states increases much.
+
+    None if the system cannot meet the conditions.
+    """
     draft = system.draft()
-    fit = draft.begin(data.final)
+    fit = draft.begin(data.final, data.conditions)
     fit.advance(_FINAL_STEPS, lambda: steps.skip("refinement of parameters"))
+    if not fit.meets_conditions:
+        return None
     error = measure_held_out(fit, data)
     if not error <= (1.0 + _LARGEST_FINAL_INCREASE) * system.fitness:
         return system
@@ -291,7 +335,10 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
         layout, np.array(system.theta), system.units, data.used[0].u, np.array(system.states[0])
     )
     radius = float(np.abs(np.linalg.eigvals(layout.split(theta)["A"])).max())
-    theta = data.scales.use_record_units(layout, theta)
+    # Changes of units and coordinates round: the corrections restore the last digits.
+    theta = data.stated.polish(
+        StateSpace(layout, data.scales.use_record_units(layout, theta), find_codes(system.units))
+    )
     wiring = tuple(name for name, value in zip(layout.names, theta, strict=True) if value != 0.0)
     decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
     shortest = min(record.segments) * _LARGEST_PART

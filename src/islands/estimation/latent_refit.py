@@ -7,6 +7,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.flat_extremes import find_limits
+from islands.estimation.constraints.state_space import find_conditions
 from islands.estimation.fitted_state_space import number
 from islands.estimation.latent_data import SignalScales, estimate_start
 from islands.estimation.state_space_fit import StateSpaceFit
@@ -17,7 +18,11 @@ from islands.simulation.segment_lanes import SegmentLanes
 
 
 def refit_latent(
-    model: LatentModel, record: Dataset, max_steps: int, stop: Callable[[], bool]
+    model: LatentModel,
+    record: Dataset,
+    max_steps: int,
+    stop: Callable[[], bool],
+    constraints: str = "none",
 ) -> LatentModel | EvaluationOutcome:
     """Estimate the parameters of a model by the error of the free run of each recording of a record.
 
@@ -32,10 +37,16 @@ def refit_latent(
         Largest number of steps.
     stop : callable
         Whether to end the estimation with the parameters so far.
+    constraints : str
+        Statements that the parameters meet; see `find_conditions`.
     """
-    scales, layout = SignalScales.measure(record), model.layout
+    stated, layout = find_conditions(constraints, record.inputs), model.layout
+    # Means that are subtracted need the parameters that restore them.
+    offsets = {*layout.blocks["o"], *layout.blocks["s"]} <= {*model.wiring}
+    scales = SignalScales.measure(record, offsets=offsets, level="level" in model.wiring)
     theta = scales.use_scaled_units(layout, model.theta)
     limits = find_limits(record.y, record.bounds)
+    limits = limits.mirror(record.y) if stated.is_odd else limits
     scaled_limits = scales.scale_limits(limits)
     segments = []
     for begin, end in record.bounds:
@@ -44,9 +55,12 @@ def refit_latent(
         segments.append(Segment(scales.scale_inputs(u), y, *scaled_limits))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
-    fit = StateSpaceFit(theta, number(free), model.codes, SegmentLanes(segments), states)
+    conditions = scales.scale_conditions(stated)
+    fit = StateSpaceFit(theta, number(free), model.codes, SegmentLanes(segments), states, conditions)
+    fit.advance(max_steps, stop)
+    if not fit.meets_conditions:
+        return EvaluationOutcome(Status.INFEASIBLE, "the state space does not meet the constraints")
     if not np.isfinite(fit.mean_square):
         return EvaluationOutcome(Status.DIVERGED, "a free run of the state space diverges")
-    fit.advance(max_steps, stop)
-    found = scales.use_record_units(layout, fit.theta)
+    found = stated.polish(fit.system.with_theta(scales.use_record_units(layout, fit.theta)))
     return replace(model.with_parameters(found[free].tolist()), limits=limits)

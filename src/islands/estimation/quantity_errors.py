@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.estimation.constraints.state_space import linearise_constraints
 from islands.estimation.covariance import sandwich
 from islands.estimation.damped_least_squares import inner_products
 from islands.kernels.state_space import accumulate_products
@@ -27,11 +28,16 @@ from islands.simulation.layout import find_intervals
 #: coordinates, it is the rounding error of the sums, 1e-17 to 1e-15.
 _NO_EFFECT = 1e-13
 
+#: Part of the derivatives of a quantity along the constraints up to which these determine it.
+_DETERMINED = 1e-5
+
 #: Step of a difference of parameters in units of their magnitudes.
 _STEP = 1e-6
 
 
-def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | None = None) -> LatentModel:
+def with_quantity_errors(
+    model: LatentModel, record: Dataset, warm_up: int | None = None, constraints: str = "none"
+) -> LatentModel:
     """Return a model with the standard errors of its quantities.
 
     Parameters
@@ -42,6 +48,8 @@ def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | Non
         Data of the estimation, with all outputs.
     warm_up : int or None
         Number of samples before the first prediction. None is the memory of the model.
+    constraints : str
+        Statements that the parameters meet. A quantity that they determine has the standard error 0.
 
     Returns
     -------
@@ -63,11 +71,18 @@ def with_quantity_errors(model: LatentModel, record: Dataset, warm_up: int | Non
     norms[norms == 0.0] = 1.0
     jacobian /= norms[:, None]
     # Sums in a written order have the same bits on every number of threads.
-    values, vectors = np.linalg.eigh(inner_products(jacobian, error, 0, error.size)[0])
+    information = inner_products(jacobian, error, 0, error.size)[0]
+    scaled = slopes * (unit / norms)
+    admissible = _find_admissible(linearise_constraints(model, constraints).S * (unit / norms))
+    within = np.einsum("fa,fb->ab", admissible, np.einsum("fg,gb->fb", information, admissible))
+    values, vectors = np.linalg.eigh(within)
     kept = values > _NO_EFFECT * values[-1]
-    basis = vectors[:, kept] / np.sqrt(values[kept])
+    basis = np.einsum("fa,ai->fi", admissible, vectors[:, kept]) / np.sqrt(values[kept])
+    # The differences of a quantity that the constraints determine have no exact zero.
+    determined = np.linalg.norm(scaled @ admissible, axis=1) <= _DETERMINED * np.linalg.norm(scaled, axis=1)
+    scaled[determined] = 0.0
     # Effect of the residual of every row on a quantity, which no change of the coordinates alters.
-    effects = np.einsum("qf,fi,gi->qg", slopes * (unit / norms), basis, basis)
+    effects = np.einsum("qf,fi,gi->qg", scaled, basis, basis)
     influences = np.einsum("qg,gk->qk", effects, jacobian)
     variances = np.array([sandwich(each[None], error)[0, 0] for each in influences])
     variances *= (error.size - 1) / max(1, error.size - int(np.count_nonzero(kept)))
@@ -103,6 +118,13 @@ def _differentiate_errors(
         found.append(rows[:, 1:])
     joined = np.concatenate(found, axis=1)
     return joined[:columns], joined[-1]
+
+
+def _find_admissible(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an orthonormal basis of the directions along which linearised constraints hold, as columns."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    return np.asarray(np.linalg.svd(rows)[2][len(rows) :].T, np.float64)
 
 
 def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:

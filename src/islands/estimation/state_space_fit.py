@@ -2,6 +2,9 @@
 
 Every segment has its initial states, which are eliminated from the normal equations: their block is
 small and separate for each segment (Schur complement). Steps are damped (Levenberg 1944, Marquardt 1963).
+
+Under conditions on the parameters, a step is projected onto them in the metric of the normal equations, by
+Newton corrections. In the limit of small steps, it is that of the Lagrangian of the linearised conditions.
 """
 
 from collections.abc import Callable
@@ -10,7 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
+from islands.estimation.constraints.static_state import StateSpace
 from islands.kernels.state_space import NO_DERIVATIVES, accumulate_products
+from islands.models.latent import StateSpaceLayout
 from islands.simulation.segment_lanes import SegmentLanes
 
 #: Initial damping, its factors after a failed and a successful step, its limits.
@@ -37,8 +43,11 @@ class StateSpaceFit:
     segments : SegmentLanes
     states : ndarray, shape (segments, states)
         States at the first rows.
+    conditions : StateSpaceConditions
+        Conditions on the parameters.
     mean_square : float
-        Of the error over all measured outputs.
+        Of the error over all measured outputs; infinite if the parameters do not meet the conditions, which
+        the first step then reaches.
     gain : float
         Part by which the last accepted step reduced it.
     """
@@ -48,12 +57,24 @@ class StateSpaceFit:
     codes: NDArray[np.int64]
     segments: SegmentLanes
     states: NDArray[np.float64]
+    conditions: StateSpaceConditions = NO_CONDITIONS
     mean_square: float = field(init=False)
     gain: float = field(init=False, default=np.inf)
     _damping: float = field(init=False, default=_DAMPING)
 
     def __post_init__(self) -> None:
-        self.mean_square = self._measure(self.theta, self.states)
+        self.mean_square = self._measure(self.theta, self.states) if self.meets_conditions else np.inf
+
+    @property
+    def system(self) -> StateSpace:
+        """State space with the parameters so far."""
+        layout = StateSpaceLayout(self.states.shape[1], self.segments[0].u.shape[1], len(self.codes))
+        return StateSpace(layout, self.theta, self.codes)
+
+    @property
+    def meets_conditions(self) -> bool:
+        """Whether the parameters meet the conditions."""
+        return self.conditions.are_met(self.system)
 
     def advance(self, steps: int, stop: Callable[[], bool] = lambda: False) -> None:
         """Take a number of steps, fewer if they no longer reduce the error noticeably."""
@@ -74,14 +95,16 @@ class StateSpaceFit:
         if products is None:
             return False
         while self._damping <= _MAX_DAMPING:
-            theta, states = self._move(products)
-            found = self._measure(theta, states)
+            moved = self._move(products)
+            theta, states = moved or (self.theta, self.states)
+            found = self._measure(theta, states) if moved else np.inf
             if found < self.mean_square:
                 self.gain = 1.0 - found / self.mean_square
                 self.theta, self.states, self.mean_square = theta, states, found
                 self._damping = max(_LEAST_DAMPING, self._damping * _DECREASE)
                 return True
-            self._damping *= _INCREASE
+            # Corrections that fail are costly, and need a clearly smaller step.
+            self._damping *= _INCREASE if moved else _INCREASE**4
         return False
 
     def _measure(self, theta: NDArray[np.float64], states: NDArray[np.float64]) -> float:
@@ -101,8 +124,10 @@ class StateSpaceFit:
                 return None
         return found if np.isfinite(found).all() else None
 
-    def _move(self, products: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the parameters and states after a damped step."""
+    def _move(
+        self, products: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the parameters and states after a damped step; None if it cannot meet the conditions."""
         order = self.states.shape[1]
         columns = products.shape[1] - order - 1
         own, shared = slice(columns, columns + order), slice(0, columns)
@@ -117,10 +142,19 @@ class StateSpaceFit:
         coupled = np.linalg.solve(blocks, others)
         reduced = (products[:, shared, own] @ coupled).sum(axis=0)
         right = products[:, shared, -1].sum(axis=0) - reduced[:, -1]
-        normal -= reduced[:, :-1]
-        step = np.linalg.solve(normal / np.outer(scale, scale), right / scale) / scale
-        theta = self.theta.copy()
-        theta[self.places >= 0] += step[self.places[self.places >= 0]]
+        scaled = (normal - reduced[:, :-1]) / np.outer(scale, scale)
+        step = np.linalg.solve(scaled, right / scale) / scale
+        theta, free = self.theta.copy(), self.places >= 0
+        theta[free] += step[self.places[free]]
+        if self.conditions.statics:
+
+            def invert(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+                return np.linalg.solve(scaled, columns / scale[:, None]) / scale[:, None]
+
+            corrected = self.conditions.correct(self.system.with_theta(theta), free, invert)
+            if corrected is None:
+                return None
+            theta, step = corrected, (corrected - self.theta)[free]
         return theta, self.states + coupled[:, :, -1] - coupled[:, :, :-1] @ step
 
 

@@ -12,8 +12,10 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
+from islands.estimation.constraints.state_space import linearise_constraints
 from islands.estimation.estimator_table import Criterion
 from islands.estimation.parameter_constraints import count_free_parameters
+from islands.models.latent import LatentModel
 from islands.models.protocol import DynamicModel
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
@@ -246,7 +248,10 @@ def assess(
         runs[part] = found
     first = model.maximum_lag if warm_up is None else warm_up
     _find_longest_recording(split.validation, first)  # before the checks are read
-    free = count_free_parameters(model, constraints)
+    if isinstance(model, LatentModel):
+        free = model.size - len(linearise_constraints(model, constraints).c)
+    else:
+        free = count_free_parameters(model, constraints)
     return Assessment(
         model,
         errors,

@@ -3,16 +3,22 @@
 from dataclasses import dataclass
 from math import fsum, nan
 
+import numpy as np
+
 from islands.estimation.constraints.parts import (
     ClusterSums,
     Equality,
+    FixedPoint,
     ParameterSign,
     Part,
     StaticGain,
     Symmetry,
 )
+from islands.estimation.constraints.state_space import check_latent_constraints, take_system
+from islands.estimation.constraints.static_state import find_static_state
 from islands.estimation.parameter_constraints import constrain_model, constraint
 from islands.models.clusters import clusters
+from islands.models.latent import ODD_UNITS, LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 
@@ -32,7 +38,7 @@ class ConstraintCheck:
     value : float
         Value of the model: the static gain, the next output at the fixed point, the weighted sum or the
         parameter. For cluster sums, the largest deviation from a target. For a symmetry, the number of terms
-        without it. NaN if it is not defined.
+        without it, of a latent model of parameters, units and limits. NaN if it is not defined.
     met : bool
     """
 
@@ -47,7 +53,7 @@ def check_constraints(model: DynamicModel, constraints: str) -> tuple[Constraint
 
     Parameters
     ----------
-    model : Model
+    model : DynamicModel
     constraints : str
         Statements that are separated by semicolons.
 
@@ -56,8 +62,10 @@ def check_constraints(model: DynamicModel, constraints: str) -> tuple[Constraint
     ModelError
         The model has no parameters.
     SettingsError
-        A statement cannot be read, or there is one for a model that is not a NARX model.
+        A statement cannot be read, or makes no sense for the class of the model.
     """
+    if isinstance(model, LatentModel):
+        return _check_latent(model, constraints)
     if not isinstance(model, Model):
         constrain_model(model, constraints)
         return ()
@@ -76,6 +84,39 @@ def _check(part: Part, model: Model) -> ConstraintCheck:
             theta = parameters.get(part.regressor, 0.0)
             return ConstraintCheck(part.text, 0.0, theta, part.sign * theta >= 0.0)
     return _check_equality(part, model)
+
+
+def _check_latent(model: LatentModel, constraints: str) -> tuple[ConstraintCheck, ...]:
+    check_latent_constraints(constraints)
+    return tuple(
+        _check_odd(part, model) if isinstance(part, Symmetry) else _check_static(part, model)
+        for part in constraint(constraints).parts
+    )
+
+
+def _check_odd(part: Symmetry, model: LatentModel) -> ConstraintCheck:
+    offsets = [name for name in model.names if name[0] in "os" or name == "level"]
+    others = len(offsets) + sum(unit not in ODD_UNITS for unit in model.units)
+    lower, upper = model.limits.range
+    others += lower != -upper
+    return ConstraintCheck(part.text, 0.0, float(others), not others)
+
+
+def _check_static(part: Part, model: LatentModel) -> ConstraintCheck:
+    """Check the output at rest, or its slope, which is that of the linear system there."""
+    assert isinstance(part, FixedPoint | StaticGain)
+    near, inputs = (part.point[0], part.point[1:]) if part.point else (None, (0.0,) * model.inputs)
+    rest = find_static_state(take_system(model), np.array(inputs), near)
+    if rest is None:
+        return ConstraintCheck(part.text, part.target, nan, met=False)
+    (total, largest), (lower, upper) = rest.output, model.limits.range
+    value = min(max(total, lower), upper)
+    if isinstance(part, StaticGain):
+        slope, largest = rest.measure_slope(part.channel)
+        # An output at a limit of the sensor does not follow the input.
+        value = slope if lower < total < upper else 0.0
+    met = abs(value - part.target) <= TOLERANCE * max(largest, abs(part.target))
+    return ConstraintCheck(part.text, part.target, value, met)
 
 
 def _check_sums(part: ClusterSums, model: Model) -> ConstraintCheck:

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from islands.data.dataset import Dataset
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData, make_latent_data
-from islands.estimation.latent_models import fit_linear_systems, make_latent_model
+from islands.estimation.latent_models import fit_linear_systems, make_latent_model, make_odd
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.island import Island, StepInfo
@@ -60,6 +60,11 @@ class LatentProblem:
     settings: Settings
     linear: tuple[FittedStateSpace, ...]
 
+    @property
+    def data(self) -> LatentData:
+        """Blocks of the record. The static conditions are those of the final estimation."""
+        return make_latent_data(self.record, self.settings.constraints).without_statics()
+
     def settings_of(self, _island: int) -> Settings:
         """Return the settings of an island."""
         return self.settings
@@ -75,7 +80,7 @@ class LatentProblem:
 
     def make_model(self, individual: AnyIndividual) -> LatentModel:
         """Return the model of a system before the final estimation."""
-        return make_latent_model(cast("FittedStateSpace", individual), make_latent_data(self.record))
+        return make_latent_model(cast("FittedStateSpace", individual), self.data)
 
 
 def make_latent_problem(record: Dataset, settings: Settings, steps: Steps) -> LatentProblem:
@@ -86,8 +91,8 @@ def make_latent_problem(record: Dataset, settings: Settings, steps: Steps) -> La
     StoppedError
         A stop is requested before the first linear system.
     """
-    linear = fit_linear_systems(make_latent_data(record), steps)
-    return LatentProblem(record, settings, tuple(linear))
+    data = make_latent_data(record, settings.constraints)
+    return LatentProblem(record, settings, tuple(fit_linear_systems(data.without_statics(), steps)))
 
 
 class LatentEvolution:
@@ -102,7 +107,7 @@ class LatentEvolution:
 
     def __init__(self, problem: LatentProblem, threads: int) -> None:
         self.problem, self._threads = problem, threads
-        self._data: LatentData = make_latent_data(problem.record)
+        self._data = problem.data
         self._rows = min(problem.record.samples, _MOST_ROWS)
 
     @property
@@ -151,11 +156,14 @@ class LatentEvolution:
                 return crossed
         return mutate(parent, settings.structure, rng)
 
+    def _estimate(self, draft: Draft) -> FittedStateSpace | EvaluationOutcome:
+        return make_odd(draft, self._data).estimate(self._data)
+
     def _evaluate(self, island: Island, drafts: Sequence[Draft]) -> tuple[Island, StepInfo]:
         """Estimate the drafts of a generation and select the elite among them and the elite before."""
         # The sums of a matrix product depend on the number of threads of the library.
         with threadpool_limits(1), ThreadPoolExecutor(self._threads) as threads:
-            estimated = list(threads.map(lambda draft: draft.estimate(self._data), drafts))
+            estimated = list(threads.map(self._estimate, drafts))
         population = tuple(each for each in estimated if not isinstance(each, EvaluationOutcome))
         hall = with_entries(island.hall_of_fame, population)
         known = {each.key for each in island.elite}

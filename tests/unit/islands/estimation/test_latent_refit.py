@@ -8,8 +8,9 @@ import pytest
 from islands.data.dataset import join
 from islands.data.flat_extremes import NO_LIMITS, SensorLimits, find_limits
 from islands.data.input_lead import advance_all_inputs
+from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.latent_refit import refit_latent
-from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 
@@ -72,3 +73,48 @@ def test_the_limits_become_those_of_the_record():
 def test_a_model_that_diverges_is_not_estimated():
     model = make_model({**SPRING, "a1_1": 1.6})
     assert isinstance(refit(model, spring_record(300)), EvaluationOutcome)
+
+
+@pytest.mark.parametrize("offset", [0.0, 500.0])
+def test_constraints_hold_to_nine_digits_after_a_refit(offset):
+    record, text = spring_record(600, noise=0.02), f"fixed-point = 0, {0.3 + offset}; gain = 0.5"
+    record = replace(record, y=record.y + offset)
+    model = make_model({**SPRING, "level": SPRING["level"] + offset})
+    found = refit_latent(model, record, 40, lambda: False, text)
+    for check in check_constraints(found, text):
+        assert check.met
+        assert check.value == pytest.approx(check.target, rel=1e-9)
+    assert found.wiring == model.wiring
+
+
+def test_correct_knowledge_reduces_the_error_of_a_short_noisy_record():
+    clean, text = spring_record(2000, seed=50), "fixed-point = 0, 0.3; gain = 0.564"
+    errors = {"none": 0.0, text: 0.0}
+    gains = {"none": 0.0, text: 0.0}
+    for seed in range(6):
+        record = spring_record(150, noise=0.15, seed=seed)
+        for constraints in errors:
+            found = refit_latent(make_model(), record, 40, lambda: False, constraints)
+            errors[constraints] += free_run(found, clean, 60).mean_squared_error
+            # The slope at another input than the stated one.
+            elsewhere = replace(found, operating_inputs=(1.0,))
+            true = replace(make_model(), operating_inputs=(1.0,))
+            gain, target = (each.linearise(each.rest).static_gains[0] for each in (elsewhere, true))
+            gains[constraints] += abs(gain - target)
+    assert errors[text] < 0.7 * errors["none"]
+    assert gains[text] < 0.7 * gains["none"]
+
+
+def test_an_odd_model_remains_odd():
+    names = {name: value for name, value in SPRING.items() if name != "level"}
+    record = spring_record(400, noise=0.02)
+    found = refit_latent(make_model(names), replace(record, y=record.y - 0.3), 20, lambda: False, "odd")
+    (check,) = check_constraints(found, "odd")
+    assert check.met
+
+
+def test_constraints_that_exclude_each_other_are_infeasible():
+    linear = {name: value for name, value in SPRING.items() if name[0] not in "ew"}
+    text = "gain = 0.5 at 0, 0; gain = 0.6 at 1, 1"
+    found = refit_latent(make_model(linear, ()), spring_record(300), 10, lambda: False, text)
+    assert found.verdict is Status.INFEASIBLE

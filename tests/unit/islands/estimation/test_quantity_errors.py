@@ -110,3 +110,19 @@ def test_a_model_without_a_time_or_with_few_samples_has_none():
     assert with_quantity_errors(SPRING, data[:25]).quantity_errors is None
     unstable = SPRING.with_parameters([1.5, *SPRING.parameters[1:]])
     assert with_quantity_errors(unstable, data) is unstable
+
+
+def test_constraints_determine_quantities():
+    model, data = replace(SPRING, operating_inputs=(0.0,)), make_record(SPRING, 3)
+    free = with_quantity_errors(model, data)
+    text = "gain = 0.564"
+    constrained = with_quantity_errors(model, data, None, text)
+    assert [each.name for each in model.quantities] == ["frequency", "damping ratio", "static gain"]
+    assert constrained.quantity_errors[2] == 0.0
+    assert 0.0 < constrained.quantity_errors[0] <= free.quantity_errors[0]
+    # At another operating point, the gain is only partly determined.
+    moved = [
+        with_quantity_errors(replace(SPRING, operating_inputs=(1.0,)), data, None, each).quantity_errors[2]
+        for each in ("none", text)
+    ]
+    assert 0.0 < moved[1] < moved[0]

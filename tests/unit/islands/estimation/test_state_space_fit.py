@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from islands.estimation.constraints.state_space import find_conditions
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.simulation.initial_states import Segment
 from islands.simulation.segment_lanes import SegmentLanes
@@ -82,3 +83,53 @@ def test_no_step_is_taken_once_a_stop_is_requested():
     before = fit.mean_square
     fit.advance(5, lambda: True)
     assert fit.mean_square == before
+
+
+def begin_under(text, segments, theta=MODEL.theta, free=None):
+    known = MODEL.theta != 0.0 if free is None else free
+    places = np.where(known, np.cumsum(known) - 1, -1)
+    start = np.zeros((len(segments), 2))
+    return StateSpaceFit(theta.copy(), places, MODEL.codes, segments, start, find_conditions(text, 1))
+
+
+@pytest.mark.parametrize("text", ["gain = 0.5", "fixed-point = 1, 0.7; gain = 0.45 at 1, 0.7"])
+def test_conditions_are_met_after_every_step(text):
+    fit = begin_under(text, cut(spring_record(600, noise=0.02), 300))
+    assert not fit.meets_conditions
+    assert fit.mean_square == np.inf
+    errors = []
+    for _ in range(15):
+        fit.advance(1)
+        assert fit.meets_conditions
+        errors.append(fit.mean_square)
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_no_admissible_change_reduces_the_error_after_the_last_step():
+    fit = begin_under("gain = 0.5", cut(spring_record(600, noise=0.02)))
+    fit.advance(100)
+    least, free, rng = fit.mean_square, MODEL.theta != 0.0, np.random.default_rng(0)
+    for _ in range(20):
+        moved = fit.theta.copy()
+        moved[free] *= 1.0 + 0.01 * rng.standard_normal(np.count_nonzero(free))
+        squares = fit.theta[free, None] ** 2
+        theta = fit.conditions.correct(fit.system.with_theta(moved), free, lambda each, by=squares: by * each)
+        other = StateSpaceFit(theta, fit.places, fit.codes, fit.segments, fit.states, fit.conditions)
+        assert other.mean_square > least
+
+
+def test_correct_conditions_cost_no_error():
+    text = "fixed-point = 0, 0.3; gain = 0.564"
+    fit = begin_under(text, cut(spring_record(600)), 0.97 * MODEL.theta)
+    fit.advance(100)
+    assert fit.meets_conditions
+    assert fit.mean_square < 1e-10
+
+
+def test_conditions_that_exclude_each_other_are_not_met():
+    linear = np.where(np.arange(MODEL.theta.size) == MODEL.layout.names.index("e2_1"), 0.0, MODEL.theta)
+    text, segments = "gain = 0.5 at 0, 0; gain = 0.6 at 1, 1", cut(spring_record(300, noise=0.02))
+    fit = begin_under(text, segments, linear, linear != 0.0)
+    fit.advance(20)
+    assert not fit.meets_conditions
+    assert fit.mean_square == np.inf

@@ -1,0 +1,54 @@
+"""Output and slope of a state space at rest, and their derivatives."""
+
+import numpy as np
+import pytest
+
+from islands.estimation.constraints.static_state import StateSpace, find_static_state
+from islands.models.latent import UNITS, StateSpaceLayout, find_codes
+from support.latent_systems import make_model
+
+LAYOUT = StateSpaceLayout(3, 2, 3)
+
+
+def make_system(units, seed=0):
+    theta = 0.3 * np.random.default_rng(seed).standard_normal(len(LAYOUT.names))
+    return StateSpace(LAYOUT, theta, find_codes(units))
+
+
+def measure(system, u, channel):
+    return find_static_state(system, u).measure(channel).total
+
+
+@pytest.mark.parametrize("channel", [0, 1, 2])
+@pytest.mark.parametrize("unit", UNITS)
+def test_the_derivatives_are_those_of_differences(unit, channel):
+    system, u, step = make_system((unit, "tanh", unit)), np.array([0.4, -0.7]), 1e-6
+    found = find_static_state(system, u).differentiate(channel)
+    for place, slope in enumerate(found):
+        above, below = (
+            measure(system.with_theta(system.theta + sign * step * np.eye(len(found))[place]), u, channel)
+            for sign in (1.0, -1.0)
+        )
+        assert slope == pytest.approx((above - below) / (2.0 * step), rel=1e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize("channel", [1, 2])
+def test_the_slope_is_that_of_the_output_at_rest(channel):
+    system, u, step = make_system(("cube", "bell", "tanh")), np.array([0.4, -0.7]), 1e-5
+    moved = step * np.eye(2)[channel - 1]
+    slope = (measure(system, u + moved, 0) - measure(system, u - moved, 0)) / (2.0 * step)
+    assert measure(system, u, channel) == pytest.approx(slope, rel=1e-8)
+
+
+def test_the_rest_nearest_to_an_output_is_found():
+    # x + 0.1 * (x - x^3): rest at -1, 0 and 1.
+    model = make_model({"a1_1": 1.1, "c1": 2.0, "e1_1": -0.1, "w1_1": 1.0, "level": 5.0}, ("cube",), 1)
+    system = StateSpace(model.layout, model.theta, model.codes)
+    rests = [find_static_state(system, np.zeros(1), near) for near in (None, 5.1, 6.8, 3.3)]
+    assert [each.output.total for each in rests] == pytest.approx([5.0, 5.0, 7.0, 3.0])
+
+
+def test_an_integrator_has_neither_rest_nor_derivatives():
+    model = make_model({"a1_1": 1.0, "b1": 1.0, "c1": 1.0}, (), 1)
+    system = StateSpace(model.layout, model.theta, model.codes)
+    assert find_static_state(system, np.ones(1)) is None
