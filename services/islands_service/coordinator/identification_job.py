@@ -159,6 +159,7 @@ def _identify(
             model=spec.model,
             seed=spec.seed,
             refit=spec.changes.get("refit", "none"),
+            constraints=spec.changes.get("constraints"),
             progress=reporter.report_stage,
             stop=stop,
         )

@@ -133,7 +133,8 @@ class Identification(BaseModel):
     preset: str = Field(default=AUTO, json_schema_extra={"enum": list(PRESET_NAMES)})
     model: str = Field(
         default=NARX,
-        description="Class of the models; others than narx are fitted without a search (setting: refit).",
+        description="Class of the models; others than narx are fitted without a search (settings: refit, and "
+        "constraints of the model latent).",
         json_schema_extra={"enum": [NARX, *MODEL_CLASSES]},
     )
     seed: Seed = 0

@@ -11,6 +11,7 @@ from typing import Any
 from islands.data.compatibility import check_dt
 from islands.data.coupled_record import check_outputs
 from islands.errors import RecordError, SettingsError, lookup, suggest
+from islands.estimation.constraints.state_space import find_conditions
 from islands.estimation.estimator_table import REFITS
 from islands.evolution.settings import LATENT
 from islands.io.models import MODEL_CLASSES, NARX, model_from_json
@@ -100,10 +101,12 @@ def _check_spec(spec: Identification | Discrepancy, settings: ServiceSettings) -
                 f"a fit of models {spec.model} has one output: name one, or take the model {NARX} with the "
                 f"preset {LATENT}"
             )
-        if others := spec.changes.keys() - {"refit"}:
+        is_latent = spec.model == LATENT
+        if others := spec.changes.keys() - {"refit", *(["constraints"] if is_latent else [])}:
             listed = ", ".join(sorted(others))
             raise SettingsError(f"{listed}: settings are those of a search for models {NARX}, leave them out")
         lookup(REFITS, spec.changes.get("refit", "none"), "refit")
+        find_conditions(spec.changes.get("constraints", "none"), len(spec.columns[0]))
         return 1
     resolved = resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
     limit = settings.max_job_memory or int(DEFAULT_SHARE * machine_memory())

@@ -117,7 +117,7 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 #: Settings of latent models. Any other one has no effect on them, and cannot be changed.
 LATENT_SETTINGS = frozenset(
     {
-        *("model_class", "structure", "population", "generations", "elite", "crossover"),
+        *("model_class", "structure", "constraints", "population", "generations", "elite", "crossover"),
         *("tournament", "islands", "topology", "migrate_every", "migrants", "emigrants"),
         *("replaced", "max_evaluations", "target_error", "refit"),
     }
@@ -212,9 +212,9 @@ def resolve_kinds(changes: Mapping[str, Any]) -> Mapping[str, Settings]:
 def resolve_latent(changes: Mapping[str, Any]) -> Settings | None:
     """Return the settings of latent models with changes of NARX models; None if one has no effect on them.
 
-    A structure of NARX models is none of latent models.
+    A structure of NARX models is none of latent models, and a constraint may be about their terms.
     """
-    common = LATENT_SETTINGS - {"structure"}
+    common = LATENT_SETTINGS - {"structure", "constraints"}
     return resolve_settings(LATENT, changes) if common.issuperset(changes) else None
 
 

@@ -19,6 +19,7 @@ from islands.errors import (
     lookup,
 )
 from islands.estimation.constraints.parser import FORMS
+from islands.estimation.constraints.state_space import check_latent_constraints
 from islands.estimation.estimator_table import ESTIMATORS, REFITS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.estimation.structure_selection.input_delays import check_delays
@@ -121,7 +122,8 @@ class Settings:
         ``ZERO_BLOCKS``: the blocks of parameters that are zero.
     constraints : str
         Constraints on the parameters: ``hysteresis``, ``none``, or statements with semicolons between them,
-        such as ``odd; fixed-point = 0, 0; gain = 2.5; [u(k-1)] >= 0``.
+        such as ``odd; fixed-point = 0, 0; gain = 2.5; [u(k-1)] >= 0``. Latent models have ``gain``,
+        ``fixed-point`` and ``odd``.
     fitness : str
         An entry of ``FITNESSES``.
     shooting : int
@@ -197,7 +199,8 @@ class Settings:
         output; 0 for no target.
     model_class : str
         Class of the models: ``narx`` or ``latent``. Latent models have the settings of the populations, of
-        the islands and of the end of a search, and `structure`; all others are those of NARX models.
+        the islands and of the end of a search, `structure` and `constraints`; all others are those of NARX
+        models.
     """
 
     population: int = _option(500, "Individuals of an island.")
@@ -315,6 +318,8 @@ class Settings:
         lookup(structures, self.structure, f"structure of {self.model_class} models")
         check_texts(constraints=self.constraints)
         constraint(self.constraints)
+        if self.model_class == LATENT:
+            check_latent_constraints(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")
         lookup(OVERLONG, self.overlong, "overlong")
         lookup(ERR_TARGETS, self.err_target, "err_target")

@@ -39,7 +39,13 @@ _CRITERION = refinement_criterion(None)
 
 
 def fit_class(
-    record: Dataset, split: Split, kind: str, structure: str, seed: int, steps: Steps
+    record: Dataset,
+    split: Split,
+    kind: str,
+    structure: str,
+    constraints: str,
+    seed: int,
+    steps: Steps,
 ) -> SearchResult:
     """Fit the models of a class.
 
@@ -56,6 +62,8 @@ def fit_class(
         An entry of ``MODEL_CLASSES``.
     structure : str
         An entry of ``ZERO_BLOCKS``, which latent models have.
+    constraints : str
+        Statements about latent models.
     seed : int
         Stored in the result, and seed of its prediction bands.
     steps : Steps
@@ -69,7 +77,7 @@ def fit_class(
     entry = MODEL_CLASSES[kind]
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
     if issubclass(entry, LatentModel):
-        searched = resolve_settings(LATENT, {"structure": structure})
+        searched = resolve_settings(LATENT, {"structure": structure, "constraints": constraints})
 
         def report(state: SearchState, settings: Settings) -> None:
             done, whole = state.archipelago.generation, settings.generations

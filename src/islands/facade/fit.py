@@ -66,7 +66,7 @@ def fit(
 
     With another ``model`` than ``narx``, fit the model of a class with named parameters by the error of its
     free run; all settings from ``library`` to ``certificate`` except ``refit`` are those of NARX
-    models.
+    models. Latent models have ``constraints`` as well.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def fit(
         Size of the largest model.
     constraints : str, optional
         ``hysteresis``, ``none`` or statements such as ``odd; gain = 2.5``; None takes the default of the
-        library.
+        library. Those of latent models are ``gain``, ``fixed-point`` and ``odd``.
     estimator : str
         An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures. By default,
         they are those of least squares or, if the validation data prefer it, of the error of the free run.
@@ -214,13 +214,15 @@ def fit_record(
     split = split_data(record, validation)
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if model != NARX:
-        given = library, degree, lags, delays, constraints, settings
+        stated = None if model == LatentModel.kind else constraints
+        given = library, degree, lags, delays, stated, settings
         if given != (AUTO, None, None, None, None, FitSettings(refit=settings.refit)):
             raise SettingsError(
                 f"library, max_terms and so on are settings of NARX models, not for the model {model}: "
                 "leave them out"
             )
-        found = fit_class(record, split, model, structure, seed, Steps(progress, stop))
+        stated = "none" if constraints is None else constraints
+        found = fit_class(record, split, model, structure, stated, seed, Steps(progress, stop))
         found = replace(found, settings={**found.settings, "refit": settings.refit, "validation": held_out})
         return Result.from_search(refit_models(found, validation, Steps(progress, stop)))
     try:

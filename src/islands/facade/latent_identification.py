@@ -1,5 +1,6 @@
 """Identification of latent models: state spaces with static units, evolved on the islands."""
 
+from collections import Counter
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -10,7 +11,8 @@ from islands.data.split import Split
 from islands.errors import SettingsError
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.fitted_state_space import FittedStateSpace
-from islands.estimation.latent_models import estimate_models, find_front
+from islands.estimation.latent_data import make_latent_data
+from islands.estimation.latent_models import estimate_models, find_front, meet_conditions
 from islands.estimation.quantity_errors import with_quantity_errors
 from islands.evolution.engine import Engine
 from islands.evolution.latent.problem import LatentProblem, make_latent_problem
@@ -91,17 +93,25 @@ def search_latent(
     state = begin_search(start, settings.islands, seed)
     with open_engine(engine, steps.report) as opened:
         state = evolve(problem, state, settings, opened, steps, on_epoch)
-    models = _estimate(problem, state, steps)
+    models, infeasible = _estimate(problem, state, steps)
+    if not models:
+        raise SettingsError(
+            f"no latent model meets the constraints {settings.constraints!r}: the statements exclude each "
+            "other, or need a nonlinear model that was not found; correct them, or take more generations"
+        )
     if any(each.reads_at_once for each in models):
         split = Split(advance_all_inputs(split.estimation), advance_all_inputs(split.validation))
     steps.report("assessment of the models", 0.9)
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
-    assessed = [assess(model, split, interval, criterion=_CRITERION) for model in models]
+    assessed = [
+        assess(model, split, interval, constraints=settings.constraints, criterion=_CRITERION)
+        for model in models
+    ]
     described |= {name: getattr(settings, name) for name in sorted(LATENT_SETTINGS)}
-    described |= {"constraints": "none", "average": 1, "shooting": interval}
+    described |= {"average": 1, "shooting": interval}
     search = SearchStatistics(
         state.evaluations,
-        dict(state.outcomes),
+        dict(Counter(state.outcomes) + Counter(infeasible=infeasible)),
         {"candidates": state.evaluations, "bytes": 0},
         None,
         state.archipelago.generation,
@@ -118,24 +128,31 @@ def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
     """Return the result of a search with standard errors, a linear model for comparison and bands."""
     if not steps.skip(_ERRORS):
         data = found.split.estimation
-        models = map_over_record(partial(_add_errors, record=data), found.models, data.samples)
+        add = partial(_add_errors, record=data, constraints=str(found.settings["constraints"]))
+        models = map_over_record(add, found.models, data.samples)
         found = replace(found, models=tuple(models))
     found = with_linear_comparison(found, (), found.shooting_interval, steps)
     validated = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
     warm_up = max(entry.model.maximum_lag for entry in found.models)
-    return with_bands(found, validated, "none", warm_up, steps)
+    return with_bands(found, validated, str(found.settings["constraints"]), warm_up, steps)
 
 
-def _add_errors(entry: Assessment, record: Dataset) -> Assessment:
+def _add_errors(entry: Assessment, record: Dataset, constraints: str) -> Assessment:
     model = entry.model
     if not isinstance(model, LatentModel):
         return entry
-    return replace(entry, model=with_quantity_errors(model, record, entry.warm_up))
+    return replace(entry, model=with_quantity_errors(model, record, entry.warm_up, constraints))
 
 
-def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> list[LatentModel]:
-    """Estimate the models of the front of size and held-out error."""
+def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> tuple[list[LatentModel], int]:
+    """Estimate the models of the front of size and held-out error, under the constraints.
+
+    Return also the number of systems that cannot meet the constraints.
+    """
     entries = state.archipelago.hall_of_fame.entries
     evolved = [each for each in entries if isinstance(each, FittedStateSpace)]
-    front = find_front([*problem.linear, *evolved], _GAIN)[-_MOST_MODELS:]
-    return estimate_models(front, problem.record, steps)
+    # The linear systems may be part of the hall of fame.
+    found, constraints = list(dict.fromkeys([*problem.linear, *evolved])), problem.settings.constraints
+    feasible = meet_conditions(found, make_latent_data(problem.record, constraints), steps)
+    models = estimate_models(find_front(feasible, _GAIN)[-_MOST_MODELS:], problem.record, steps, constraints)
+    return models, len(found) - len(feasible)

@@ -80,7 +80,9 @@ def refit_models(found: SearchResult, validation: Dataset | float, steps: Steps)
             changed, reason = entry.model, estimated
         elif isinstance(estimated, LatentModel):
             reason = _find_fault(entry, estimated, data, constraints)
-            changed = estimated if reason else with_quantity_errors(estimated, data, entry.warm_up)
+            changed = estimated
+            if not reason:
+                changed = with_quantity_errors(estimated, data, entry.warm_up, constraints)
         else:
             changed = entry.model.with_parameters(estimated.parameters, estimated.standard_errors)
             reason = _find_fault(entry, changed, data, constraints)
@@ -121,7 +123,7 @@ def _estimate(
     model, limits = entry.model, (constraints, entry.warm_up)
     stop = partial(steps.skip, _REFIT)
     if isinstance(model, LatentModel):
-        refitted = refit_latent(model, data, _STEPS, stop)
+        refitted = refit_latent(model, data, _STEPS, stop, constraints)
         return refitted if isinstance(refitted, LatentModel) else f"the estimation fails ({refitted.reason})"
     found: FittedStructure | RefinedModel[DynamicModel] | EvaluationOutcome | None
     if criterion in (OUTPUT_ERROR, BOX_JENKINS):
@@ -144,7 +146,8 @@ def _estimate(
 
 def _find_fault(entry: Assessment, changed: DynamicModel, data: Dataset, constraints: str) -> str:
     """Return why changed parameters are not kept; empty if they are."""
-    if isinstance(changed, Model) and not all(each.met for each in check_constraints(changed, constraints)):
+    is_checked = isinstance(changed, Model | LatentModel)
+    if is_checked and not all(each.met for each in check_constraints(changed, constraints)):
         return "the constraints would not be met"
     before, after = (simulate_freely(each, data, entry.warm_up) for each in (entry.model, changed))
     if not after.outcome:

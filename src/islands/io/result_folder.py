@@ -21,10 +21,11 @@ from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import model_json, terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
 from islands.models.coupled_narx import AnyModel
-from islands.models.equations import named_signals, named_statement
+from islands.models.equations import name_gains, named_signals, named_statement
 from islands.models.latent import LatentModel
-from islands.models.narx import Model, require_narx
+from islands.models.narx import Model
 from islands.models.parametric import ParametricModel
+from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
 from islands.validation.assessment import PARTS, Assessment
@@ -152,11 +153,15 @@ def _model_document(
         "refit": _refit_document(assessment),
         "information": asdict(assessment.information),
         "constraints": [
-            {**asdict(entry), "named": named_statement(entry.text, require_narx(model))}
+            {**asdict(entry), "named": _name_statement(entry.text, model)}
             for entry in assessment.final_constraints
         ],
         **_assessment_document(assessment),
     }
+
+
+def _name_statement(text: str, model: DynamicModel) -> str:
+    return named_statement(text, model) if isinstance(model, Model) else name_gains(text, model)
 
 
 def _refit_document(assessment: Assessment) -> dict[str, Any] | None:

@@ -134,10 +134,16 @@ def named_statement(text: str, model: NarxTerms) -> str:
         written = _delay(parse(term[1]), model.leads)
         return f"[{_name_signals(reader_text(written, model.inputs), model)}]"
 
+    return name_gains(re.sub(r"\[([^\[\]]+)\]", name_term, text), model)
+
+
+def name_gains(text: str, model: SignalReference) -> str:
+    """Write a statement without terms with the column names of a record, as `named_statement`."""
+
     def name_gain(gain: re.Match[str]) -> str:
         return f"gain({signal_names(model)[int(gain[1] or 1)]})"
 
-    return re.sub(r"gain\(u(\d*)\)", name_gain, re.sub(r"\[([^\[\]]+)\]", name_term, text))
+    return re.sub(r"gain\(u(\d*)\)", name_gain, text)
 
 
 def _name_signals(text: str, model: NarxTerms) -> str:

@@ -193,7 +193,7 @@ def fit_coupled_data(
     kind = options.get("model", NARX)
     lookup(dict.fromkeys((NARX, LATENT)), kind, "class of models")
     if kind == LATENT:
-        check_coupled_settings(None, "no", options.get("refit", "none"))
+        check_coupled_settings(options.get("constraints"), "no", options.get("refit", "none"))
         return _couple_latent(data, dict(options), steps, find)
     chosen: dict[str, Any] = {"library": "polynomial", "feedthrough": "no", **options}
     check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"], chosen.get("refit", "none"))

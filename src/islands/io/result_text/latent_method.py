@@ -59,7 +59,23 @@ def describe_latent_search(settings: Mapping[str, Any], generations: int) -> Ite
             f"{settings['migrants']} systems at most on each way (emigrants: {settings['emigrants']}, "
             f"replaced: {settings['replaced']})."
         )
+    if settings.get("constraints", "none") != "none":
+        yield from _describe_constraints(settings["constraints"])
     yield (
         "In the end, the systems of the front lose blocks of parameters that the held-out error does not "
         "need, and are estimated on longer blocks."
     )
+
+
+def _describe_constraints(constraints: str) -> Iterator[str]:
+    """Yield the paragraph about the constraints of a search."""
+    found = [each.strip() for each in constraints.split(";")]
+    if "odd" in found:
+        yield "Constraint odd: every system of the search has odd units only, without offsets."
+    if statics := [each for each in found if each not in {"odd", "none"}]:
+        yield (
+            f"Constraints: the systems of every size are estimated again so that they meet "
+            f"{'; '.join(statics)}. The errors after that select the front. Each step of the damped least "
+            "squares is projected onto the constraints. Systems that cannot meet them are infeasible, and "
+            "left out."
+        )

@@ -1,0 +1,123 @@
+"""Constraints of latent models: they hold in every model of a result, which states them."""
+
+from dataclasses import replace
+
+import pytest
+
+import islands
+from islands.errors import SettingsError
+from islands.facade.identify import identify_record
+from islands.simulation.predictors import free_run
+from support.latent_systems import spring_record
+
+#: A search that takes a second.
+SHORT = {"population": 8, "generations": 2, "migrate_every": 2, "islands": 2}
+
+#: What is known about the spring.
+KNOWN = "fixed-point = 0, 0.3; gain = 0.564 at 0, 0.3"
+
+
+def identify(record, **changes):
+    return identify_record(record, preset="latent", **{**SHORT, **changes})
+
+
+@pytest.fixture(scope="module")
+def result():
+    return identify(spring_record(300, noise=0.05), constraints=KNOWN, refit="all")
+
+
+@pytest.mark.ci
+def test_every_model_meets_the_constraints_before_and_after_a_refit(result):
+    assert len(result.models) > 1
+    assert any(each.is_refitted for each in result.models)
+    for each in result.models:
+        for checks in (each.assessment.constraints, each.constraints):
+            assert [check.text for check in checks] == KNOWN.split("; ")
+            assert all(check.met for check in checks)
+            assert [check.value for check in checks] == pytest.approx([0.3, 0.564], rel=1e-9)
+
+
+@pytest.mark.ci
+def test_a_saved_result_states_the_constraints(result, tmp_path):
+    result.save(tmp_path, figures=())
+    saved = islands.load(tmp_path)
+    assert saved.settings["constraints"] == KNOWN
+    assert all(check["met"] for check in saved.best.document["constraints"])
+    summary = (tmp_path / "summary.txt").read_text("utf-8")
+    assert f"Constraints that the model meets: {KNOWN}." in summary
+    assert "under constraints" in summary
+    assert f"so that they meet {KNOWN}." in " ".join((tmp_path / "method.txt").read_text("utf-8").split())
+
+
+@pytest.mark.ci
+def test_members_of_the_ensemble_meet_the_constraints(result):
+    drawn = 0
+    for structure in result.search_result.ensemble.structures:
+        for parameters in structure.parameters:
+            member = replace(structure.model.with_parameters(parameters.tolist()), operating_inputs=(0.0,))
+            assert member.linearise(member.rest).static_gains == pytest.approx([0.564], rel=1e-9)
+        drawn += len(structure.parameters)
+    assert drawn > 10
+
+
+@pytest.mark.ci
+def test_an_odd_model_gives_the_reversed_output():
+    record = spring_record(400, noise=0.02)
+    record = replace(record, y=record.y - 0.3)
+    result = identify(record, constraints="odd", generations=4)
+    other = spring_record(300, seed=3)
+    assert any(each.model.units for each in result.models)
+    for each in result.models:
+        assert all(check.met for check in each.constraints)
+        reversed_record = replace(other, u=-other.u, y=-other.y)
+        runs = [free_run(each.model, data, each.model.memory).y for data in (other, reversed_record)]
+        assert runs[1] == pytest.approx(-runs[0], nan_ok=True)
+
+
+@pytest.mark.ci
+def test_a_fit_has_the_constraints_of_the_preset():
+    calls = iter(range(10_000))
+    found = islands.fit(
+        spring_record(160, noise=0.05),
+        model="latent",
+        structure="wiener",
+        constraints="gain = 0.5",
+        stop=lambda: next(calls) > 8,
+    )
+    assert found.settings["constraints"] == "gain = 0.5"
+    assert all(check.met for each in found.models for check in each.constraints)
+
+
+@pytest.mark.ci
+def test_statements_that_no_model_meets_are_an_error():
+    with pytest.raises(SettingsError, match="no latent model meets the constraints 'gain = 1; gain = 2'"):
+        identify(spring_record(200, noise=0.05), constraints="gain = 1; gain = 2")
+
+
+@pytest.mark.ci
+def test_models_that_cannot_meet_the_constraints_are_left_out_and_counted():
+    # The slopes of a linear model are equal.
+    text = "gain = 0.564 at 0, 0.3; gain = 0.4 at 1, 0.75"
+    found = identify(spring_record(300, noise=0.02), constraints=text, generations=1)
+    assert all(each.model.units for each in found.models)
+    assert all(check.met for each in found.models for check in each.constraints)
+    assert found.search_result.search.outcomes["infeasible"] >= 3
+
+
+@pytest.mark.parametrize("text", ["[u(k-1)] = 0.5", "hysteresis", "even"])
+def test_statements_that_make_no_sense_are_refused(text):
+    record, message = spring_record(100), "Statements about latent models are gain, fixed-point and odd"
+    with pytest.raises(SettingsError, match=message):
+        islands.fit(record, model="latent", constraints=text)
+    with pytest.raises(SettingsError, match=message):
+        identify(record, constraints=text)
+
+
+def test_a_statement_refers_to_inputs_of_the_record():
+    with pytest.raises(SettingsError, match="2 inputs, but the record has 1"):
+        identify(spring_record(100), constraints="gain(u2) = 1")
+
+
+def test_other_classes_have_no_constraints():
+    with pytest.raises(SettingsError, match="are settings of NARX models, not for the model gain-scheduled"):
+        islands.fit(spring_record(100), model="gain-scheduled", constraints="gain = 1")
