@@ -19,6 +19,10 @@ from islands.models.state_space_rest import Linearised, find_rest, linearise
 #: Least argument of the root, below which its slope is constant; see `islands.kernels.state_space`.
 _LEAST_ROOT = 1e-6
 
+#: Distance of an output at rest from a stated one, relative to its largest term, at which no other rest is
+#: searched for.
+_NEAR = 0.01
+
 #: Second derivatives of the units that are curved.
 _CURVATURES: Mapping[str, Callable[[float], float]] = MappingProxyType(
     {
@@ -159,16 +163,22 @@ def find_static_state(
     """
     of = system.layout.find_matrices(system.theta)
     c = of["C"]
-    if start is not None:
-        starts = [start]
-    else:
-        starts = [np.zeros(len(c))]
-        if near is not None:
-            change = near - float(of["level"][0] + of["D"] @ u)
-            starts.append(c * change / (float(c @ c) or 1.0))
-    rests = [find_rest(of, system.codes, u, each) for each in starts]
-    found = [StaticState(system, x, u, linearise(of, system.codes, x, u)) for x in rests if x is not None]
-    return min(found, key=lambda each: abs(each.output.total - (near or 0.0)), default=None)
+
+    def find(begin: NDArray[np.float64]) -> StaticState | None:
+        x = find_rest(of, system.codes, u, begin)
+        return None if x is None else StaticState(system, x, u, linearise(of, system.codes, x, u))
+
+    def measure_distance(rest: StaticState) -> float:
+        return abs(rest.output.total - near) if near is not None else 0.0
+
+    first = find(np.zeros(len(c)) if start is None else start)
+    if start is not None or near is None:
+        return first
+    if first is not None and measure_distance(first) <= _NEAR * first.output.largest:
+        return first
+    change = near - float(of["level"][0] + of["D"] @ u)
+    other = find(c * change / (float(c @ c) or 1.0))
+    return min(filter(None, (first, other)), key=measure_distance, default=None)
 
 
 def _set(
