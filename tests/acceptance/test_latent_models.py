@@ -86,6 +86,30 @@ def test_settings_of_narx_models_are_refused(folder):
     assert "settings of NARX models" in text
 
 
+def test_constraints_of_an_option_hold_and_are_stated(folder, tmp_path):
+    search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
+    budget = ("--preset", "latent", "--islands", "1", "--population", "6", "--generations", "1")
+    text = "fixed-point = 0, 0.3; gain = 0.564"
+    succeed(*search, *budget, "--constraints", text, "--out", tmp_path / "out")
+    found = islands.load(tmp_path / "out")
+    assert found.settings["constraints"] == text
+    assert all(check["met"] for entry in found.models for check in entry.document["constraints"])
+    assert f"Constraints that the model meets: {text}." in (tmp_path / "out" / "summary.txt").read_text()
+    refused = fail(*search, *budget, "--constraints", "[u(k-1)] = 1", "--out", tmp_path / "refused")
+    assert "Statements about latent models are gain, fixed-point and odd" in " ".join(refused.split())
+    fitted = (
+        "fit",
+        *search[1:6],
+        "--model",
+        "latent",
+        "--constraints",
+        "even",
+        "--out",
+        tmp_path / "refused",
+    )
+    assert "its states read the inputs linearly" in " ".join(fail(*fitted).split())
+
+
 def test_a_structure_is_that_of_latent_models(folder):
     columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused", "--structure")
     text = fail("fit", folder / "spring.csv", *columns, "wiener")

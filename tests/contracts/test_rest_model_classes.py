@@ -8,6 +8,7 @@ import pytest
 import islands
 from islands.figures.names import LATENT_FIGURES
 from islands_api.client import Client
+from islands_api.client.errors import ServiceError
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import REPORT, JobState
@@ -57,6 +58,33 @@ def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
         # The model is a simulation of a diagnosis.
         simulation = {"kind": "model", "model": document}
         assert client.diagnose(dataset, "u_V", "y_K", simulation).state == JobState.QUEUED
+
+
+def test_a_latent_model_has_the_constraints_of_its_job(service, tmp_path):
+    islands.write_record(spring_record(300, noise=0.02), tmp_path / "spring.csv")
+    with Client(service.url) as client:
+        dataset = client.upload(tmp_path / "spring.csv")
+        job = client.submit(dataset, "u_V", "y_mm", model="latent", constraints="gain = 0.564")
+        searched = {"preset": "latent", "population": 6, "generations": 1, "islands": 1}
+        other = client.submit(dataset, "u_V", "y_mm", **searched, constraints="fixed-point = 0, 0.3")
+        blobs = Blobs(service.settings.blobs)
+        for each, value in ((job, 0.564), (other, 0.3)):
+            lease = taken(service.store, each.id)
+            outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
+            service.store.leases.finish(lease, outcome)
+            for model in client.models(each):
+                (check,) = model.constraints
+                assert check["met"]
+                assert check["value"] == pytest.approx(value, rel=1e-9)
+            rebuilt = read_search_result(
+                service.store.jobs.get(LOCAL_OWNER, each.id), service.store, blobs, 1
+            )
+            assert all(check.met for check in rebuilt.models[0].constraints)
+        for given in ({"model": "latent"}, {"preset": "latent"}):
+            with pytest.raises(ServiceError, match="Statements about latent models are gain"):
+                client.submit(dataset, "u_V", "y_mm", **given, constraints="[u(k-1)] = 1")
+            with pytest.raises(ServiceError, match="2 inputs, but the record has 1"):
+                client.submit(dataset, "u_V", "y_mm", **given, constraints="gain(u2) = 1")
 
 
 def test_a_latent_model_has_figures_of_its_parts(service, tmp_path):
