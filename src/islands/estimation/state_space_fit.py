@@ -9,6 +9,7 @@ Newton corrections. In the limit of small steps, it is that of the Lagrangian of
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,14 @@ _PATIENCE, _MIN_GAIN = 4, 1e-5
 
 #: Least norm of the derivatives for a parameter, relative to the median, by which the parameter is scaled.
 _LEAST_SCALE = 1e-3
+
+
+class _Move(NamedTuple):
+    """Parameters, initial states, and states at rest of the conditions after a step."""
+
+    theta: NDArray[np.float64]
+    states: NDArray[np.float64]
+    rests: list[NDArray[np.float64]] | None
 
 
 @dataclass(slots=True, eq=False)
@@ -61,6 +70,7 @@ class StateSpaceFit:
     mean_square: float = field(init=False)
     gain: float = field(init=False, default=np.inf)
     _damping: float = field(init=False, default=_DAMPING)
+    _rests: list[NDArray[np.float64]] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.mean_square = self._measure(self.theta, self.states) if self.meets_conditions else np.inf
@@ -96,11 +106,11 @@ class StateSpaceFit:
             return False
         while self._damping <= _MAX_DAMPING:
             moved = self._move(products)
-            theta, states = moved or (self.theta, self.states)
-            found = self._measure(theta, states) if moved else np.inf
-            if found < self.mean_square:
+            found = np.inf if moved is None else self._measure(moved.theta, moved.states)
+            if moved is not None and found < self.mean_square:
                 self.gain = 1.0 - found / self.mean_square
-                self.theta, self.states, self.mean_square = theta, states, found
+                self.theta, self.states, self._rests = moved
+                self.mean_square = found
                 self._damping = max(_LEAST_DAMPING, self._damping * _DECREASE)
                 return True
             # Corrections that fail are costly, and need a clearly smaller step.
@@ -124,9 +134,7 @@ class StateSpaceFit:
                 return None
         return found if np.isfinite(found).all() else None
 
-    def _move(
-        self, products: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def _move(self, products: NDArray[np.float64]) -> _Move | None:
         """Return the parameters and states after a damped step; None if it cannot meet the conditions."""
         order = self.states.shape[1]
         columns = products.shape[1] - order - 1
@@ -144,18 +152,20 @@ class StateSpaceFit:
         right = products[:, shared, -1].sum(axis=0) - reduced[:, -1]
         scaled = (normal - reduced[:, :-1]) / np.outer(scale, scale)
         step = np.linalg.solve(scaled, right / scale) / scale
-        theta, free = self.theta.copy(), self.places >= 0
+        theta, free, rests = self.theta.copy(), self.places >= 0, self._rests
         theta[free] += step[self.places[free]]
         if self.conditions.statics:
 
             def invert(columns: NDArray[np.float64]) -> NDArray[np.float64]:
                 return np.linalg.solve(scaled, columns / scale[:, None]) / scale[:, None]
 
-            corrected = self.conditions.correct(self.system.with_theta(theta), free, invert)
+            started = self.system.with_theta(theta)
+            corrected = self.conditions.correct(started, free, invert, starts=rests)
             if corrected is None:
                 return None
-            theta, step = corrected, (corrected - self.theta)[free]
-        return theta, self.states + coupled[:, :, -1] - coupled[:, :, :-1] @ step
+            theta, rests = corrected[0].theta, corrected[1].states
+            step = (theta - self.theta)[free]
+        return _Move(theta, self.states + coupled[:, :, -1] - coupled[:, :, :-1] @ step, rests)
 
 
 def _scale(squares: NDArray[np.float64]) -> NDArray[np.float64]:

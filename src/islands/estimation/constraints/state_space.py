@@ -145,8 +145,9 @@ class StateSpaceConditions:
         free: NDArray[np.bool_],
         invert: Invert,
         tolerance: float = _LARGEST_ERROR,
-    ) -> NDArray[np.float64] | None:
-        """Return parameters that meet the static conditions, after the smallest corrections in a metric.
+        starts: Sequence[NDArray[np.float64]] | None = None,
+    ) -> tuple[StateSpace, StaticErrors] | None:
+        """Return a system that meets the static conditions, after the smallest corrections in a metric.
 
         Parameters
         ----------
@@ -157,13 +158,15 @@ class StateSpaceConditions:
             Metric of the changes.
         tolerance : float
             Relative error at which the corrections end.
+        starts : sequence of ndarray, optional
+            As of `evaluate`.
 
         Returns
         -------
-        ndarray, shape (parameters,), or None
+        (StateSpace, StaticErrors) or None
             None if the corrections do not meet the conditions.
         """
-        found = self.evaluate(system)
+        found = self.evaluate(system, starts)
         scales = np.ones(0) if found is None else found.scales
         for _ in range(_CORRECTIONS):
             if found is None or found.measure() <= tolerance:
@@ -182,7 +185,7 @@ class StateSpaceConditions:
             else:
                 break
             system, found = moved, later
-        return system.theta if found is not None and found.measure() <= _LARGEST_ERROR else None
+        return (system, found) if found is not None and found.measure() <= _LARGEST_ERROR else None
 
     def correct_slightly(
         self, system: StateSpace, tolerance: float = _LARGEST_ERROR
@@ -190,7 +193,8 @@ class StateSpaceConditions:
         """Return parameters after the smallest relative corrections; those that are zero remain so."""
         free = system.theta != 0.0
         squares = system.theta[free, None] ** 2
-        return self.correct(system, free, lambda columns: squares * columns, tolerance)
+        found = self.correct(system, free, lambda columns: squares * columns, tolerance)
+        return None if found is None else found[0].theta
 
     def polish(self, system: StateSpace) -> NDArray[np.float64]:
         """Return parameters that meet the static conditions up to rounding.

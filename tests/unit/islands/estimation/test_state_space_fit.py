@@ -113,7 +113,9 @@ def test_no_admissible_change_reduces_the_error_after_the_last_step():
         moved = fit.theta.copy()
         moved[free] *= 1.0 + 0.01 * rng.standard_normal(np.count_nonzero(free))
         squares = fit.theta[free, None] ** 2
-        theta = fit.conditions.correct(fit.system.with_theta(moved), free, lambda each, by=squares: by * each)
+        theta = fit.conditions.correct(
+            fit.system.with_theta(moved), free, lambda each, by=squares: by * each
+        )[0].theta
         other = StateSpaceFit(theta, fit.places, fit.codes, fit.segments, fit.states, fit.conditions)
         assert other.mean_square > least
 
