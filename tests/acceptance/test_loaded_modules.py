@@ -22,11 +22,11 @@ finally:
 LIMITS = {
     "--version": (280, ""),
     "benchmark list": (470, ""),
-    "fit --help": (710, ""),
+    "fit --help": (715, ""),
     "inspect {record}": (545, ""),
-    "jobs --help": (885, ""),
+    "jobs --help": (890, ""),
     "jobs list --url http://127.0.0.1:9": (840, ""),
-    "show {model}": (560, ""),
+    "show {model}": (565, ""),
     "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
     # Other processes draw the report.

@@ -13,7 +13,7 @@ import numpy as np
 from islands.errors import SettingsError
 from islands.estimation.constraints.conditions import Constrained, Constraint
 from islands.estimation.constraints.parser import parse_statements
-from islands.estimation.constraints.parts import ClusterSums, StaticGain, Symmetry
+from islands.estimation.constraints.parts import ClusterSums, FixedPoint, StaticGain, Symmetry
 from islands.expressions.tree import Expression
 from islands.models.clusters import OUTPUT_AT_REST, steady_state
 from islands.models.coupled_narx import AnyModel, CoupledModel
@@ -54,6 +54,36 @@ def constraint(text: str) -> Constraint:
     if {ClusterSums, StaticGain} <= kinds:
         raise SettingsError("a model with hysteresis has no static gain: every output is an equilibrium")
     return Constraint(parts)
+
+
+def check_latent_constraints(constraints: str) -> None:
+    """Check that statements are about latent models.
+
+    Raises
+    ------
+    SettingsError
+        A statement cannot be read, or makes no sense for a latent model.
+    """
+    for part in constraint(constraints).parts:
+        match part:
+            case FixedPoint() | StaticGain() | Symmetry(parity=-1):
+                continue
+            case ClusterSums():
+                reason = (
+                    "its states would have to stay where the units leave them, which needs a pole of exactly "
+                    "1 that no input moves; take the preset hysteresis"
+                )
+            case Symmetry():
+                reason = "its states read the inputs linearly, which is odd"
+            case _:
+                reason = (
+                    "it has no terms, and the parameters of a state space are not unique: other coordinates "
+                    "of the states change them without an effect on the output"
+                )
+        raise SettingsError(
+            f"the constraint {part.text!r} is none of a latent model: {reason}. "
+            "Statements about latent models are gain, fixed-point and odd"
+        )
 
 
 def constrain_model(model: AnyModel, text: str) -> Constrained | EvaluationOutcome:

@@ -19,9 +19,8 @@ from islands.errors import (
     lookup,
 )
 from islands.estimation.constraints.parser import FORMS
-from islands.estimation.constraints.state_space import check_latent_constraints
 from islands.estimation.estimator_table import ESTIMATORS, REFITS
-from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
+from islands.estimation.parameter_constraints import CONSTRAINTS, check_latent_constraints, constraint
 from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.err_targets import ERR_TARGETS
 from islands.evolution.fitness import FITNESSES

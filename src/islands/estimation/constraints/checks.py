@@ -14,9 +14,9 @@ from islands.estimation.constraints.parts import (
     StaticGain,
     Symmetry,
 )
-from islands.estimation.constraints.state_space import check_latent_constraints, take_system
+from islands.estimation.constraints.state_space import take_system
 from islands.estimation.constraints.static_state import find_static_state
-from islands.estimation.parameter_constraints import constrain_model, constraint
+from islands.estimation.parameter_constraints import check_latent_constraints, constrain_model, constraint
 from islands.models.clusters import clusters
 from islands.models.latent import ODD_UNITS, LatentModel
 from islands.models.narx import Model

@@ -12,16 +12,15 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import SettingsError
 from islands.estimation.constraints.conditions import Constrained
 from islands.estimation.constraints.elimination import eliminate
-from islands.estimation.constraints.parts import ClusterSums, FixedPoint, StaticGain, Symmetry
+from islands.estimation.constraints.parts import FixedPoint, StaticGain
 from islands.estimation.constraints.static_state import StateSpace, find_static_state
-from islands.estimation.parameter_constraints import constraint
+from islands.estimation.parameter_constraints import check_latent_constraints, constraint
 from islands.models.latent import LatentModel
 
-#: Relative error of an equation up to which it is met, and at which the last corrections end.
-_LARGEST_ERROR, _EXACT = 1e-10, 1e-13
+#: Relative error of an equation up to which it is met, and at which corrections and the last ones end.
+_LARGEST_ERROR, _CLOSE, _EXACT = 1e-10, 1e-11, 1e-13
 
 #: Newton corrections of the parameters, and halvings of each, at most.
 _CORRECTIONS, _HALVINGS = 12, 4
@@ -104,6 +103,8 @@ class StateSpaceConditions:
 
         return replace(self, statics=tuple(map(change, self.statics)))
 
+    # The parameters of a trial step may overflow.
+    @np.errstate(over="ignore", invalid="ignore")
     def evaluate(
         self, system: StateSpace, starts: Sequence[NDArray[np.float64]] | None = None
     ) -> StaticErrors | None:
@@ -144,7 +145,7 @@ class StateSpaceConditions:
         system: StateSpace,
         free: NDArray[np.bool_],
         invert: Invert,
-        tolerance: float = _LARGEST_ERROR,
+        tolerance: float = _CLOSE,
         starts: Sequence[NDArray[np.float64]] | None = None,
     ) -> tuple[StateSpace, StaticErrors] | None:
         """Return a system that meets the static conditions, after the smallest corrections in a metric.
@@ -187,9 +188,7 @@ class StateSpaceConditions:
             system, found = moved, later
         return (system, found) if found is not None and found.measure() <= _LARGEST_ERROR else None
 
-    def correct_slightly(
-        self, system: StateSpace, tolerance: float = _LARGEST_ERROR
-    ) -> NDArray[np.float64] | None:
+    def correct_slightly(self, system: StateSpace, tolerance: float = _CLOSE) -> NDArray[np.float64] | None:
         """Return parameters after the smallest relative corrections; those that are zero remain so."""
         free = system.theta != 0.0
         squares = system.theta[free, None] ** 2
@@ -235,36 +234,6 @@ def find_conditions(constraints: str, inputs: int) -> StateSpaceConditions:
             case _:
                 is_odd = True
     return StateSpaceConditions(tuple(statics), is_odd)
-
-
-def check_latent_constraints(constraints: str) -> None:
-    """Check that statements are about latent models.
-
-    Raises
-    ------
-    SettingsError
-        A statement cannot be read, or makes no sense for a latent model.
-    """
-    for part in constraint(constraints).parts:
-        match part:
-            case FixedPoint() | StaticGain() | Symmetry(parity=-1):
-                continue
-            case ClusterSums():
-                reason = (
-                    "its states would have to stay where the units leave them, which needs a pole of exactly "
-                    "1 that no input moves; take the preset hysteresis"
-                )
-            case Symmetry():
-                reason = "its states read the inputs linearly, which is odd"
-            case _:
-                reason = (
-                    "it has no terms, and the parameters of a state space are not unique: other coordinates "
-                    "of the states change them without an effect on the output"
-                )
-        raise SettingsError(
-            f"the constraint {part.text!r} is none of a latent model: {reason}. "
-            "Statements about latent models are gain, fixed-point and odd"
-        )
 
 
 def linearise_constraints(model: LatentModel, constraints: str) -> Constrained:

@@ -9,12 +9,12 @@ from islands.data.flat_extremes import SensorLimits
 from islands.errors import SettingsError
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.state_space import (
-    check_latent_constraints,
     find_conditions,
     linearise_constraints,
     meet_constraints,
     take_system,
 )
+from islands.estimation.parameter_constraints import check_latent_constraints
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 
