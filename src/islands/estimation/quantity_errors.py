@@ -71,16 +71,19 @@ def with_quantity_errors(
     norms[norms == 0.0] = 1.0
     jacobian /= norms[:, None]
     # Sums in a written order have the same bits on every number of threads.
-    information = inner_products(jacobian, error, 0, error.size)[0]
-    scaled = slopes * (unit / norms)
-    admissible = _find_admissible(linearise_constraints(model, constraints).S * (unit / norms))
-    within = np.einsum("fa,fb->ab", admissible, np.einsum("fg,gb->fb", information, admissible))
-    values, vectors = np.linalg.eigh(within)
+    information, scaled = inner_products(jacobian, error, 0, error.size)[0], slopes * (unit / norms)
+    rows = linearise_constraints(model, constraints).S * (unit / norms)
+    if len(rows):
+        admissible = _find_admissible(rows)
+        information = np.einsum("fa,fb->ab", admissible, np.einsum("fg,gb->fb", information, admissible))
+    values, vectors = np.linalg.eigh(information)
     kept = values > _NO_EFFECT * values[-1]
-    basis = np.einsum("fa,ai->fi", admissible, vectors[:, kept]) / np.sqrt(values[kept])
-    # The differences of a quantity that the constraints determine have no exact zero.
-    determined = np.linalg.norm(scaled @ admissible, axis=1) <= _DETERMINED * np.linalg.norm(scaled, axis=1)
-    scaled[determined] = 0.0
+    basis = vectors[:, kept] / np.sqrt(values[kept])
+    if len(rows):
+        basis = np.einsum("fa,ai->fi", admissible, basis)
+        # The differences of a quantity that the constraints determine have no exact zero.
+        left = np.linalg.norm(np.einsum("qf,fa->qa", scaled, admissible), axis=1)
+        scaled[left <= _DETERMINED * np.linalg.norm(scaled, axis=1)] = 0.0
     # Effect of the residual of every row on a quantity, which no change of the coordinates alters.
     effects = np.einsum("qf,fi,gi->qg", scaled, basis, basis)
     influences = np.einsum("qg,gk->qk", effects, jacobian)
@@ -122,8 +125,6 @@ def _differentiate_errors(
 
 def _find_admissible(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return an orthonormal basis of the directions along which linearised constraints hold, as columns."""
-    if not len(rows):
-        return np.eye(rows.shape[1])
     return np.asarray(np.linalg.svd(rows)[2][len(rows) :].T, np.float64)
 
 
