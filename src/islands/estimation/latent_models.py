@@ -4,13 +4,12 @@ Of the systems that no other one exceeds in size and held-out error, blocks of p
 not need are removed. The others are estimated on longer blocks and written in the units of the record.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import log
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,7 @@ from islands.estimation.linear_state_space import fit_linear_state_space, measur
 from islands.estimation.modal_form import find_modal_form
 from islands.kernels.state_space import evaluate_unit
 from islands.models.latent import LatentModel, StateSpaceLayout
-from islands.models.unit_functions import find_codes
+from islands.models.unit_functions import find_codes, make_odd_unit
 from islands.progress import Steps
 from islands.simulation.outcome import EvaluationOutcome
 
@@ -56,11 +55,6 @@ _NEGLIGIBLE, _LARGEST_INCREASE, _LARGEST_FINAL_INCREASE = 0.01, 0.02, 0.5
 
 #: Largest part of a segment that gives the initial states of a free run of the result.
 _LARGEST_PART = 0.05
-
-#: Odd unit that takes the place of another one.
-_ODD: Mapping[str, str] = MappingProxyType(
-    {"square": "cube", "abs": "root", "hinge": "dead zone", "bell": "tanh"}
-)
 
 #: Part to which a mode decays in the warm-up.
 _DECAY = 0.01
@@ -138,7 +132,7 @@ def make_odd(draft: Draft, data: LatentData) -> Draft:
     blocks = draft.layout.split(free)
     for name in ("s", "o", "level"):
         blocks[name][...] = False
-    return replace(draft, units=tuple(_ODD.get(unit, unit) for unit in draft.units), free=free)
+    return replace(draft, units=tuple(map(make_odd_unit, draft.units)), free=free)
 
 
 def _gains_much(

@@ -37,9 +37,6 @@ from islands.models.signal_statement import symbols
 from islands.models.state_space_rest import find_rest, linearise
 from islands.models.unit_functions import find_codes, parse_unit
 
-#: Units that are odd functions of their arguments.
-ODD_UNITS = frozenset({"tanh", "cube", "root", "dead zone", "saturation"})
-
 #: Blocks of parameters that are zero in the structure of a system: effects of the units on the states or on
 #: the output, or weights of the states in the arguments of the units.
 ZERO_BLOCKS: Mapping[str, tuple[str, ...]] = MappingProxyType(

@@ -34,6 +34,10 @@ FUNCTIONS: Mapping[str, str] = MappingProxyType(
 #: Text of functions in equations for readers, if it is another one.
 _NAMED_POWERS: Mapping[str, str] = MappingProxyType({"square": "square({0})", "cube": "cube({0})"})
 
+#: Functions that are odd, and even.
+_ODD = frozenset({"tanh", "cube", "root", "dead zone", "saturation"})
+_EVEN = frozenset({"square", "abs", "bell"})
+
 #: Names of the argument and of a product, which are no functions.
 ARGUMENT, PRODUCT = "s", "*"
 
@@ -74,6 +78,18 @@ class UnitFunction:
         """Number of functions and products."""
         return bool(self.operands) + sum(each.operations for each in self.operands)
 
+    @property
+    def parity(self) -> int:
+        """1 of an even function, -1 of an odd one, 0 of others."""
+        if not self.operands:
+            return -1
+        first = self.operands[0].parity
+        if self.name == PRODUCT:
+            return first * self.operands[1].parity
+        if first == 1 or self.name in _EVEN:
+            return abs(first)
+        return first if self.name in _ODD else 0
+
     def write(self, argument: str, functions: Mapping[str, str] = FUNCTIONS) -> str:
         """Return the text of an equation with an argument."""
         if self.name == ARGUMENT:
@@ -107,6 +123,10 @@ class UnitFunction:
         """Number of values that an evaluation keeps at the same time."""
         return max((place + each.values for place, each in enumerate(self.operands)), default=1)
 
+
+#: Odd functions in place of single ones, and of trees that are neither odd nor even.
+_SIMILAR_ODD = {"square": "cube", "abs": "root", "hinge": "dead zone", "bell": "tanh"}
+_OTHER_ODD = "tanh"
 
 #: Digits of the operations: see the kernel.
 _DIGITS = {**{name: code for code, name in enumerate(FUNCTIONS, start=1)}, ARGUMENT: 10, PRODUCT: 11}
@@ -162,6 +182,16 @@ def _refuse(text: str) -> NoReturn:
         f"unknown unit {text!r}; units are {', '.join(FUNCTIONS)}, functions of each other such as "
         "tanh(square), and products such as s*abs, where s is the argument"
     )
+
+
+def make_odd_unit(text: str) -> str:
+    """Return an odd unit in place of another one: an even function has its product with the argument."""
+    tree = parse_unit(text)
+    if tree.parity == -1:
+        return text
+    if text in _SIMILAR_ODD:
+        return _SIMILAR_ODD[text]
+    return str(UnitFunction(PRODUCT, (tree, UnitFunction(ARGUMENT)))) if tree.parity == 1 else _OTHER_ODD
 
 
 def find_codes(units: Sequence[str]) -> NDArray[np.int64]:

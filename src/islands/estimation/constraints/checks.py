@@ -18,9 +18,10 @@ from islands.estimation.constraints.state_space import take_system
 from islands.estimation.constraints.static_state import find_static_state
 from islands.estimation.parameter_constraints import check_latent_constraints, constrain_model, constraint
 from islands.models.clusters import clusters
-from islands.models.latent import ODD_UNITS, LatentModel
+from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.models.unit_functions import parse_unit
 
 #: Tolerance of an equality, relative to its largest term and to its target.
 TOLERANCE = 1e-9
@@ -96,7 +97,7 @@ def _check_latent(model: LatentModel, constraints: str) -> tuple[ConstraintCheck
 
 def _check_odd(part: Symmetry, model: LatentModel) -> ConstraintCheck:
     offsets = [name for name in model.names if name[0] in "os" or name == "level"]
-    others = len(offsets) + sum(unit not in ODD_UNITS for unit in model.units)
+    others = len(offsets) + sum(parse_unit(unit).parity != -1 for unit in model.units)
     lower, upper = model.limits.range
     others += lower != -upper
     return ConstraintCheck(part.text, 0.0, float(others), not others)

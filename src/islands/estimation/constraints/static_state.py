@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.models.latent import UNITS, StateSpaceLayout
+from islands.models.latent import StateSpaceLayout
 from islands.models.state_space_rest import Linearised, find_rest, linearise
+from islands.models.unit_functions import FUNCTIONS
 
 #: Least argument of the root, below which its slope is constant; see `islands.kernels.state_space`.
 _LEAST_ROOT = 1e-6
@@ -22,6 +23,9 @@ _LEAST_ROOT = 1e-6
 #: Distance of an output at rest from a stated one, relative to its largest term, at which no other rest is
 #: searched for.
 _NEAR = 0.01
+
+#: Step of the argument in a difference of the slopes of a unit.
+_STEP = 1e-5
 
 #: Second derivatives of the units that are curved.
 _CURVATURES: Mapping[str, Callable[[float], float]] = MappingProxyType(
@@ -204,6 +208,19 @@ def _add_products(
 
 def _find_curvatures(codes: NDArray[np.int64], arguments: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the second derivatives of the units."""
-    names = list(UNITS)
     pairs = zip(codes.tolist(), arguments.tolist(), strict=True)
-    return np.array([_CURVATURES[names[code]](s) if names[code] in _CURVATURES else 0.0 for code, s in pairs])
+    return np.array([_find_curvature(code, s) for code, s in pairs])
+
+
+def _find_curvature(code: int, s: float) -> float:
+    """Return the second derivative of a unit; a difference of the slopes of a tree."""
+    # A command that does not simulate loads no kernels.
+    from islands.kernels.state_space import evaluate_unit  # noqa: PLC0415
+
+    names = list(FUNCTIONS)
+    if code <= len(names):
+        curve = _CURVATURES.get(names[code - 1])
+        return curve(s) if curve else 0.0
+    ahead, behind = (evaluate_unit(code, s + step)[1] for step in (_STEP, -_STEP))
+    curvature: float = (ahead - behind) / (2.0 * _STEP)
+    return curvature

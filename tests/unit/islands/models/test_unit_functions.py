@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from islands.errors import ModelError
-from islands.models.unit_functions import FUNCTIONS, evaluate_curve, find_codes, parse_unit
+from islands.models.unit_functions import FUNCTIONS, evaluate_curve, find_codes, make_odd_unit, parse_unit
 
 TREES = {
     "tanh": np.tanh,
@@ -56,3 +56,17 @@ def test_redundant_parentheses_are_left_out():
 def test_an_impossible_unit_is_refused(text, message):
     with pytest.raises(ModelError, match=message):
         parse_unit(text)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    "text", [*FUNCTIONS, *TREES, "hinge*abs", "tanh(hinge)", "bell(root)", "abs*root(bell)"]
+)
+def test_the_parity_is_that_of_the_values(text):
+    s = np.linspace(0.1, 1.5, 8)
+    ahead, behind = evaluate_curve(text, s), evaluate_curve(text, -s)
+    parity = 1 if np.allclose(ahead, behind) else -1 if np.allclose(ahead, -behind) else 0
+    assert parse_unit(text).parity == parity
+    odd = make_odd_unit(text)
+    assert parse_unit(odd).parity == -1
+    assert (odd == text) == (parity == -1)

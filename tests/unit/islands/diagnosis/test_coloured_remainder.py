@@ -1,10 +1,10 @@
-"""Certainty of a name beside a coloured remainder, which may have another cause."""
+"""Certainty of a name next to a coloured remainder, which may have another cause."""
 
 import numpy as np
 import pytest
 
 import islands
-from islands.diagnosis.inference.coloured_remainder import MAX_CONFIDENCE
+from islands.diagnosis.coloured_remainder import MAX_CONFIDENCE
 
 LAG = tuple(each for each in islands.EFFECTS if each.name == "sensor-lag")
 DT, PROCESS, SENSOR = 0.1, 2.0, 0.6

@@ -1,4 +1,4 @@
-"""Coloured remainder: what causes leave of a misfit beside white noise, and how certain their names are.
+"""Coloured remainder: what causes leave of a misfit next to white noise, and how certain their names are.
 
 What remains may be coloured noise, or an error of the simulation that has another cause. A record of one
 input does not tell these apart. In trials, a cause that leaves a coloured part of more than a twentieth of
