@@ -1,0 +1,96 @@
+"""Differential equations of a linear model: they have its simulation, and only stable processes have them."""
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.effects.interface.effect import Signal
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.linear import LinearSimulator
+from islands.simulators.linear_states import Cascade, list_cascades
+from islands.simulators.ode.simulator import OdeSimulator
+
+DT = 0.1
+
+#: Coefficients of models with a direct term and with zeros.
+MODELS = {
+    "first-order": ([0.1, 0.05], [0.9]),
+    "second-order": ([0.02, 0.06, 0.04], [1.5, -0.56]),
+    "nearly equal poles": ([0.0, 0.01, 0.01], [1.81, -0.819]),
+}
+
+
+def make_linear(numerator: list[float], denominator: list[float], delay: int = 0) -> LinearSimulator:
+    return LinearSimulator(np.array(numerator), np.array(denominator), 0.7, 0.3, delay, "V")
+
+
+def get_values(linear: LinearSimulator) -> Signal:
+    """Return the parameters of a model that does not begin at rest."""
+    values = np.array([each.nominal for each in linear.parameters])
+    values[-1] = 0.2
+    return values
+
+
+def simulate_equations(cascade: Cascade, u: Signal, y: Signal) -> Signal:
+    system = cascade.make_system("linear", "V", "V", float(np.max(np.abs(y))))
+    initial = cascade.find_states(u, y)
+    sizes = dict.fromkeys((*initial, *(f"d{name}/dt" for name in initial)), 1.0)
+    simulator = ResampledSimulator(OdeSimulator(system, initial, sizes, {}), InterSample.ZOH, 8)
+    context = make_context(Dataset(u, y, DT, ("u",)), simulator, u.size)
+    simulation = ExtendedSimulator(simulator, (), context)
+    return simulation.simulate(simulation.nominal)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", MODELS)
+def test_equations_have_the_simulation_of_the_model(name: str) -> None:
+    linear = make_linear(*MODELS[name])
+    values, u = get_values(linear), np.random.default_rng(0).standard_normal(300)
+    context = make_context(Dataset(u, u, DT, ("u",)), linear, u.size)
+    y = ExtendedSimulator(linear, (), context).simulate(values)
+    cascades = list_cascades(linear, values, DT)
+    assert len(cascades) == linear.denominator.size
+    for cascade in cascades:
+        np.testing.assert_allclose(simulate_equations(cascade, u, y), y, atol=1e-6)
+
+
+def test_processes_in_series_have_their_time_constants_and_one_gain() -> None:
+    slow, fast = np.exp(-DT / np.array([1.5, 0.5]))
+    # Zero-order hold of 2 / ((1.5 s + 1) (0.5 s + 1)), by partial fractions.
+    parts = 2.0 * np.array([1.5, -0.5]) / (1.5 - 0.5) * (1.0 - np.array([slow, fast]))
+    numerator = [0.0, parts.sum(), -(parts[0] * fast + parts[1] * slow)]
+    linear = make_linear(numerator, [slow + fast, -slow * fast])
+    for cascade in list_cascades(linear, get_values(linear), DT):
+        assert sorted(cascade.times) == pytest.approx([0.5, 1.5])
+        assert cascade.values["K1"] == pytest.approx(2.0)
+        assert cascade.values["K2"] == pytest.approx(0.0, abs=1e-9)
+        assert cascade.values["D"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator", "delay"),
+    [
+        pytest.param([0.1, 0.05], [0.9], 2, id="delay"),
+        pytest.param([0.3], [], 0, id="gain"),
+        pytest.param([0.0, 0.1, 0.1], [1.8, -0.9], 0, id="oscillator"),
+        pytest.param([0.1, 0.05], [-0.5], 0, id="alternating"),
+        pytest.param([0.0, 0.1], [1.0], 0, id="integrator"),
+        pytest.param([0.0, 0.1, 0.0, 0.0], [0.9, 0.0, 0.0], 0, id="third order"),
+    ],
+)
+def test_other_models_have_no_such_equations(
+    numerator: list[float], denominator: list[float], delay: int
+) -> None:
+    linear = make_linear(numerator, denominator, delay)
+    assert list_cascades(linear, get_values(linear), DT) == []
+
+
+def test_equations_of_a_model_without_direct_term_have_none() -> None:
+    linear = LinearSimulator(np.array([0.0, 0.1]), np.array([0.9]), 0.0, 0.0, 0, "V", has_direct_term=False)
+    (cascade,) = list_cascades(linear, get_values(linear), DT)
+    assert "D" not in cascade.values
+    assert cascade.make_system("linear", "V", "V", 1.0).write_equations() == (
+        "dx/dt = (K*u + level - x)/T; output = x"
+    )
