@@ -24,12 +24,16 @@ class DiagnosisRun:
     parallel_map : ParallelMap
         Calibrates and simulates; results do not depend on it.
     progress : ProgressCallback
+    has_inner_terms_only : bool
+        Whether terms are searched for in the equations of states only, and in the whole record: those at the
+        output, and those that begin or end, have been searched for.
     """
 
     effects: Sequence[Effect] = ()
     rng: np.random.Generator = field(default_factory=partial(np.random.default_rng, 0))
     parallel_map: ParallelMap = map
     progress: ProgressCallback = ignore_progress
+    has_inner_terms_only: bool = False
 
     def with_effects(self, effects: Sequence[Effect]) -> "DiagnosisRun":
         """Return the run with other effects to search for."""

@@ -16,7 +16,7 @@ from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.expressions.printing import render
 from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, substitute
-from islands.simulators.ode.equation_parser import TIME
+from islands.simulators.ode.equation_parser import FORCE, TIME
 from islands.simulators.ode.system import OUTPUT, OdeSystem
 from islands.simulators.ode.system_parts import OdeParameter
 
@@ -65,6 +65,9 @@ SCALED_FORMS = (
 
 #: A parameter that settles as the machine warms up or runs in: the argument of the scale is the time.
 FADING_FORM = ScaledForm(f"{{signal}}*exp(-{TIME}/{{scale}})", 0.3, f"{TIME}*{{signal}}")
+
+#: Radiation: the argument of the scale is a temperature, and the scale its distance from the absolute zero.
+RADIATION_FORM = ScaledForm("({signal} + {scale})**4", 2.0, "{signal}**4")
 
 #: Further scales from which a fit starts, relative to the nominal one.
 STARTING_SCALES = (0.3, 3.0)
@@ -290,7 +293,8 @@ def list_candidate_terms(
     Parameters
     ----------
     sizes : mapping
-        Largest absolute values of the states, of the input, and of its rate (``rate(u)``).
+        Largest absolute values of the states, of their derivatives (``dx/dt``), of the input, and of its rate
+        (``rate(u)``).
     duration : float
         Duration of the record in seconds.
     units : mapping
@@ -315,6 +319,8 @@ def list_candidate_terms(
                 continue
             size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
             terms.append(CandidateTerm(target, text, size, unit=own_unit))
+        if _is_process(target, system):
+            terms += _list_process_terms(target, own, unit, sizes, units)
         for signal in signals:
             scale_unit = find_expression_unit(parse_expression(signal), units)
             own_unit = find_factor_unit(unit, parse_expression(signal), units)
@@ -324,6 +330,39 @@ def list_candidate_terms(
             ]
             terms.append(_make_scaled(target, FADING_FORM, signal, sizes[signal], duration, (own_unit, "s")))
     return tuple(terms)
+
+
+def write_rate_size(own: Expression) -> str:
+    """Write the size of a rate, given the right-hand side of its equation."""
+    return f"abs({render(own)})"
+
+
+def _is_process(target: str, system: OdeSystem) -> bool:
+    """Return whether a state is a level, a temperature or the like.
+
+    It is no rate of another state, as a velocity, and nothing that forces act on or that an FMU computes.
+    """
+    if target == OUTPUT or target in system.of_fmu:
+        return False
+    own = dict(system.derivatives)[target]
+    is_rate = any(right == Symbol(target) for _, right in system.derivatives)
+    return not is_rate and FORCE not in find_symbols(own)
+
+
+def _list_process_terms(
+    target: str, own: Expression, unit: str, sizes: Mapping[str, float], units: Mapping[str, str]
+) -> list[CandidateTerm]:
+    """Return the laws of a process with a right-hand side: another rate in one direction, and radiation."""
+    power, largest = parse_expression(f"{target}**4"), sizes[target]
+    scale = RADIATION_FORM.scale * largest
+    return [
+        CandidateTerm(target, write_rate_size(own), sizes[f"d{target}/dt"]),
+        CandidateTerm(target, render(power), largest**4, unit=find_factor_unit(unit, power, units)),
+        _make_scaled(
+            *(target, RADIATION_FORM, target, (largest + scale) ** 4, largest),
+            (find_factor_unit(unit, power, units), units.get(target, "")),
+        ),
+    ]
 
 
 def _make_scaled(

@@ -1,7 +1,7 @@
 """Discovery of missing terms: equations with more terms that explain a record better than the catalogue."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.equation_simulator import get_system
 from islands.diagnosis.discovery.joint_search import JointResult, assess_effects, search_jointly
+from islands.diagnosis.discovery.process_laws import describe_law
+from islands.diagnosis.discovery.state_equations import calibrate_states, list_state_fits
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
 from islands.diagnosis.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN, Finding, Rival, Value
@@ -117,6 +120,7 @@ def find_missing_terms(
     """Search for missing terms, and compare them with the effects of the catalogue.
 
     Effects in addition to the terms are searched for if a single effect does not explain the record as well.
+    Terms of a linear simulation act at its output, or in its differential equations.
 
     Parameters
     ----------
@@ -133,6 +137,28 @@ def find_missing_terms(
     MissingTerms or None
         None if no term gains enough.
     """
+    first = _find_terms(base, alone, target, run)
+    if alone.leaves_white_noise and not (first is not None and first.is_better(alone)):
+        return first
+    inner = _list_inner_searches(base, target, run)
+    found = [first, *(_find_terms(start, alone, target, own) for start, own in inner)]
+    known = [each for each in found if each is not None]
+    return max(known, key=lambda each: (each.is_better(alone), -each.search.cost), default=None)
+
+
+def _list_inner_searches(
+    base: CalibrationResult, target: Target, run: DiagnosisRun
+) -> list[tuple[CalibrationResult, DiagnosisRun]]:
+    """Return the differential equations of a linear simulation, and the run of the search in them."""
+    # The search moves the time constants, so that one order of the processes is enough.
+    states = [calibrate_states(each, target) for each in list_state_fits(base, target)[:1]]
+    return [(each, replace(run, has_inner_terms_only=True)) for each in states]
+
+
+def _find_terms(
+    base: CalibrationResult, alone: SearchOutcome, target: Target, run: DiagnosisRun
+) -> MissingTerms | None:
+    """Search for missing terms in one simulation."""
     effects_alone = _score_effects(alone, base, target)
     found = search_terms(base, target, run, effects_alone.cost)
     tested = None
@@ -157,10 +183,10 @@ def find_missing_terms(
 
 
 def explain_all(base: CalibrationResult, target: Target, run: DiagnosisRun, seed: int) -> bool:
-    """Return whether missing terms at the output of a simulation leave nothing but noise.
+    """Return whether missing terms of a simulation without equations leave nothing but noise.
 
-    It is for simulations without equations, whose terms are found in a tenth of the time that the search with
-    model error takes. Of other simulations it returns False.
+    Its terms are found in a tenth of the time that the search with model error takes. Of other simulations it
+    returns False.
 
     Parameters
     ----------
@@ -171,10 +197,13 @@ def explain_all(base: CalibrationResult, target: Target, run: DiagnosisRun, seed
     """
     if not isinstance(base.simulation.simulator, OutputEquation):
         return False
-    found = search_terms(base, target, run)
-    if found is None:
-        return False
-    return not analyse_residual(found.fit, target, np.random.default_rng(seed)).is_structured
+    for start, own in [(base, run), *_list_inner_searches(base, target, run)]:
+        found = search_terms(start, target, own)
+        if found is None:
+            continue
+        if not analyse_residual(found.fit, target, np.random.default_rng(seed)).is_structured:
+            return True
+    return False
 
 
 def _is_contradicted(
@@ -249,6 +278,7 @@ def describe_terms(
     deviations = estimate_deviations(fit, target)
     places = {parameter.name: index for index, parameter in enumerate(fit.simulation.parameters)}
     confidence = 1.0 / (1.0 + float(np.exp(-discovery.worse_by / (2 * CONFIDENCE_TEMPERATURE))))
+    system, fitted = get_system(found.base), dict(zip(places, fit.values.tolist(), strict=True))
     findings = []
     for each in found.terms:
         values = {}
@@ -263,6 +293,7 @@ def describe_terms(
                 error_fraction=explained_fraction(base, fit, 0.0),
                 noise_fraction=noise_fraction(base, floor),
                 term=each.describe(),
+                summary=describe_law(each.term, each.number, system, fitted),
                 depends_on_time=each.term.depends_on_time,
             )
         )

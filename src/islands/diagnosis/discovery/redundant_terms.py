@@ -51,13 +51,15 @@ def drop_redundant_terms(
     fixed : set of str
         Names of parameters that are not free.
     """
-    signals = _RandomSignals()
+    signals, parameters = _RandomSignals(), {each.name for each in system.parameters}
     right_sides = _substitute_variables(system)
     spans = {target: _span_changes(target, right_sides, system, fixed, signals) for target in right_sides}
     return [
         each
         for each in candidates
         if each.scale is not None
+        # A law of the equation itself: random signals may not change the sign of its rate.
+        or not parameters.isdisjoint(find_symbols(parse_expression(each.text)))
         or not _is_in_span(evaluate(parse_expression(each.text), signals), spans[each.target])
     ]
 

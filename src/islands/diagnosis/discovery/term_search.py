@@ -199,6 +199,8 @@ def search_terms(
     candidates = list_candidate_terms(system, sizes, context.duration, units)
     if target.has_feedback:
         candidates = tuple(each for each in candidates if not acts_on_output(each, system.input))
+    if run.has_inner_terms_only:
+        candidates = tuple(each for each in candidates if each.target != OUTPUT)
     target_sizes = {
         OUTPUT: context.output_peak,
         **{name: sizes[f"d{name}/dt"] for name, _ in system.derivatives},
@@ -417,7 +419,7 @@ def _find_best_term(
         rank_terms, fit, [target, unweighted], target_sizes=target_sizes, parallel_map=run.parallel_map
     )
     ranked = rank(free)[:FITTED_TERMS]
-    if all(each.term.gate is None for each in found.terms):
+    if not run.has_inner_terms_only and all(each.term.gate is None for each in found.terms):
         # A step of the input's gain is an effect of the catalogue.
         ranked += _rank_gates([each for each in free if each.text != equations.input], fit, rank)
     tasks = []

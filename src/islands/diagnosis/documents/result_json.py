@@ -134,7 +134,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
     return {
         "name": finding.name,
         "family": finding.family,
-        "summary": "" if entry is None else entry.summary,
+        "summary": finding.summary if entry is None else entry.summary,
         "distinguished_by": "" if entry is None else entry.distinguished_by,
         "occurs_in": "" if entry is None else entry.occurs_in,
         "confidence": finding.confidence,

@@ -79,6 +79,8 @@ class Finding:
         Fraction of that error that is noise: the noise floor, which may be an upper bound.
     term : str
         Missing term with its equation, as ``a1*(x*v) in dv/dt``; empty for an effect.
+    summary : str
+        What a missing term means, without a period; empty if it is no known law, and for an effect.
     depends_on_time : bool
         Whether it is a function of the time of the record.
     is_claimed : bool
@@ -99,6 +101,7 @@ class Finding:
     error_fraction: float | None = None
     noise_fraction: float | None = None
     term: str = ""
+    summary: str = ""
     depends_on_time: bool = False
     resembles: Resemblance | None = None
 

@@ -96,6 +96,15 @@ class SearchOutcome:
     form_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
     cancelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def leaves_white_noise(self) -> bool:
+        """Whether a single named effect leaves white noise, so that it is probably the cause.
+
+        Several effects may imitate such a law together.
+        """
+        found = self.hypothesis
+        return self.verdict == Verdict.NAMED and len(found.effects) == 1 and not found.fit.noise.order
+
 
 def search_with_ar_noise(
     base: CalibrationResult,

@@ -213,7 +213,8 @@ class DiagnosisFacts:
     def coordinate(self) -> str:
         """What x is in the formulas of the claimed effects; empty if they have none, or if it is unknown."""
         kind = re.split("[: ]", self.document.get("simulation", ""))[0]
-        if not any(re.search(r"\bx('|\b)", each.get("summary", "")) for each in self.claimed):
+        formulas = [each.get("summary", "") for each in self.claimed if each["family"] != _TERM]
+        if not any(re.search(r"\bx('|\b)", each) for each in formulas):
             return ""
         names = self.document["record"]["names"]
         if kind in _ON_OUTPUT:

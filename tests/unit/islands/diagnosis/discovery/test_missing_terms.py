@@ -310,7 +310,8 @@ def test_many_signals_have_no_products() -> None:
     equations = "".join(f"d{name}/dt = F - c*{name}\n" for name in names)
     document = {**DOCUMENT, "equations": equations, "parameters": {"c": 1.0}, "states": {}, "output": "x0"}
     system = OdeSpec.model_validate({"kind": "ode", **document, "force": None}).make_system()
-    sizes = {**dict.fromkeys([*names, "F"], 1.0), "rate(F)": 1.0}
+    rates = [f"d{name}/dt" for name in names]
+    sizes = dict.fromkeys([*names, *rates, "F", "rate(F)"], 1.0)
     texts = {each.text for each in list_candidate_terms(system, sizes, 10.0, {})}
     assert {"x0**2", "t*x7", "rate(F)*x3"} < texts
     assert not any("x0*x1" in text for text in texts)

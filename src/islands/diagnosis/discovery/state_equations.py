@@ -1,0 +1,82 @@
+"""Differential equations in place of a linear simulation: terms and limits then act inside of the plant."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from islands.diagnosis.calibration.intersample_selection import select_intersample
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
+from islands.diagnosis.calibration.target import Target
+from islands.effects.interface.context import Signal, SimulationContext
+from islands.expressions.tree import Symbol
+from islands.simulators.coordinates import peak_amplitude
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.linear import LinearSimulator
+from islands.simulators.linear_states import Cascade, list_cascades
+from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.output_equation import OutputEquation
+
+
+def list_state_fits(fit: CalibrationResult, target: Target) -> list[CalibrationResult]:
+    """Return the differential equations that simulate what a linear simulation does, without its effects.
+
+    Parameters
+    ----------
+    fit : CalibrationResult
+        A calibrated simulation.
+    target : Target
+
+    Returns
+    -------
+    list of CalibrationResult
+        One for each order of its processes, not calibrated; none if it is another simulation, or has no such
+        equations.
+    """
+    equation = fit.simulation.simulator
+    linear = equation.simulator if isinstance(equation, OutputEquation) else None
+    if not isinstance(linear, LinearSimulator):
+        return []
+    bare, values = fit.simulation.with_effects(()), fit.values[fit.simulation.simulator_slice]
+    output, dt = bare.simulate(values), bare.context.dt
+    cascades = list_cascades(linear, values[: len(linear.parameters)], dt)
+    return [_make_fit(each, linear.name, output, bare.context, target) for each in cascades]
+
+
+def calibrate_states(fit: CalibrationResult, target: Target) -> CalibrationResult:
+    """Calibrate equations with the step size and the intersample behaviour that suit them."""
+    fit = calibrate(fit.simulation, target, fit.values)
+    simulator = select_intersample(fit, target)
+    if simulator is fit.simulation.simulator:
+        return fit
+    return calibrate(replace(fit.simulation, simulator=simulator), target, fit.values)
+
+
+def _make_fit(
+    cascade: Cascade, name: str, output: Signal, context: SimulationContext, target: Target
+) -> CalibrationResult:
+    """Return equations with the initial states of an output of the linear simulation."""
+    states = [
+        cascade.find_states(context.u[first:last], output[first:last]) for first, last in context.bounds
+    ]
+    simulator = _make_simulator(cascade, name, states[0], context)
+    simulation = ExtendedSimulator(ResampledSimulator(simulator, InterSample.ZOH, 1), (), context)
+    start: Signal = simulation.nominal
+    for place, parameter in enumerate(simulation.parameters):
+        if parameter.initial:
+            state = parameter.name.removeprefix("initial ").partition(" ")[0]
+            start[place] = states[simulation.recordings[place]][state]
+    return evaluate_fit(simulation, target, start)
+
+
+def _make_simulator(
+    cascade: Cascade, name: str, initial: dict[str, float], context: SimulationContext
+) -> OdeSimulator:
+    """Make the simulator of the equations, whose sizes are those of a simulation of each recording."""
+    system = cascade.make_system(name, context.input_unit, context.output_unit, context.output_peak)
+    names = [*cascade.states, *(f"d{each}/dt" for each in cascade.states)]
+    rough = OdeSimulator(system, initial, dict.fromkeys(names, 1.0), {})
+    expressions = (*map(Symbol, cascade.states), *(right for _, right in system.derivatives))
+    parts = [rough.simulate_nominal(part, expressions) for part in context.split()]
+    sizes = [peak_amplitude(signal) for signal in np.concatenate(parts, axis=1)]
+    return replace(rough, sizes=dict(zip(names, sizes, strict=True)))

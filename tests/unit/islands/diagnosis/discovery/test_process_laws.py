@@ -1,0 +1,190 @@
+"""Laws inside of a linear simulation: terms and limits of its states are found, and stated in words."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import scipy
+
+import islands
+from islands.data.dataset import Dataset
+from islands.diagnosis.discovery.candidate_terms import list_candidate_terms, write_rate_size
+from islands.diagnosis.discovery.process_laws import describe_law
+from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
+from islands.diagnosis.documents.extension_json import extended_json
+from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.result import Diagnosis
+from islands.effects.interface.effect import Signal
+from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.specification.equations import OdeSpec
+from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import LinearSpec, LocalExtendedSpec
+
+DT, STEPS, SAMPLES = 0.1, 10, 1200
+
+#: Right-hand side of a process of one or two states: ``(states, input) -> derivatives``.
+Equation = Callable[[Signal, float], list[float]]
+
+
+def follow_unevenly(x: Signal, u: float) -> list[float]:
+    error = (1.5 * u - x[0]) / 2.0
+    return [error * (1.4 if error > 0.0 else 1.0)]
+
+
+def radiate(x: Signal, u: float) -> list[float]:
+    return [(1.5 * u - x[0] - 1.2 * ((1.0 + x[0] / 3.0) ** 4 - 1.0)) / 2.0]
+
+
+def stop(x: Signal, u: float) -> list[float]:
+    inner = min(max(x[0], -1.8), 1.8)
+    rate = (1.5 * u - inner) / 1.5
+    return [0.0 if abs(inner) == 1.8 and rate * inner > 0.0 else rate, (inner - x[1]) / 0.5]
+
+
+#: Processes, with the order of the simulation.
+PROCESSES: dict[str, tuple[Equation, int]] = {
+    "uneven": (follow_unevenly, 1),
+    "radiation": (radiate, 1),
+    "limit": (stop, 2),
+}
+
+
+def make_record(name: str, seed: int = 0) -> Dataset:
+    """Simulate a process by Heun's method, with levels of the input that are held."""
+    equation, order = PROCESSES[name]
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-2.0, 2.0, SAMPLES // 15), 15)
+    state, outputs, step = np.zeros(order), [], DT / STEPS
+    for level in u.tolist():
+        outputs.append(state[-1])
+        for _ in range(STEPS):
+            slope = np.array(equation(state, level))
+            state = state + step / 2.0 * (slope + np.array(equation(state + step * slope, level)))
+    y = np.array(outputs) + 0.01 * rng.standard_normal(u.size)
+    return Dataset(u, y, DT, ("u_V",), "T_K", ("V",), "K")
+
+
+@cache
+def find(name: str) -> tuple[Dataset, Diagnosis]:
+    record = make_record(name)
+    return record, diagnose(record, make_simulator(f"linear:{PROCESSES[name][1]}", record))
+
+
+@pytest.mark.ci
+def test_process_that_is_slower_in_one_direction_is_found() -> None:
+    _, found = find("uneven")
+    assert found.verdict == "discovered"
+    (cause,) = found.causes
+    assert cause.term == "a1*(abs((K*u + level - x)/T)) in dx/dt"
+    assert cause.parameters["a1"].value == pytest.approx(0.2 / 1.2, rel=0.05)
+    summary = " ".join(DiagnosisResult.from_diagnosis(found).summary.split())
+    assert "the time constant T is 1.43 s while x rises, and 2 s while it falls" in summary
+
+
+@pytest.mark.ci
+def test_loss_by_radiation_is_found_with_the_absolute_zero() -> None:
+    _, found = find("radiation")
+    (cause,) = found.causes
+    assert cause.term == "a1*((x + s1)**4) in dx/dt"
+    assert cause.parameters["s1"].value == pytest.approx(3.0, rel=0.1)
+    assert cause.parameters["s1"].unit == "K"
+    assert "as by radiation of heat: x = -s1 is the absolute zero" in cause.summary
+
+
+@pytest.mark.ci
+def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
+    _, found = find("limit")
+    assert [each.name for each in found.causes] == ["state-clip"]
+    assert found.causes[0].parameters["state-clip:x1"].value == pytest.approx(1.8, rel=0.02)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", PROCESSES)
+def test_extension_holds_for_another_record(name: str) -> None:
+    record, found = find(name)
+    spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))
+    other = make_record(name, seed=1)
+    error = islands.simulate(spec, other).y - other.y
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(0.01, rel=0.15)
+
+
+@pytest.mark.ci
+def test_coloured_noise_of_a_process_is_no_law() -> None:
+    rng, record = np.random.default_rng(2), make_record("limit")
+    process = make_simulator(
+        LinearSpec(kind="linear", order=1, numerator=(0.0, 0.1), denominator=(0.9,)), record
+    )
+    context = make_context(record, process, SAMPLES)
+    clean = ExtendedSimulator(process, (), context)
+    noise = scipy.signal.lfilter([1.0], [1.0, -0.9], 0.02 * rng.standard_normal(SAMPLES))
+    noisy = replace(record, y=clean.simulate(clean.nominal) + noise)
+    found = diagnose(noisy, make_simulator("linear:1", noisy))
+    assert found.verdict == "noise"
+    assert not found.causes
+
+
+@pytest.mark.ci
+def test_extension_of_a_process_is_right_in_a_second_diagnosis() -> None:
+    record, found = find("uneven")
+    spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))
+    assert islands.diagnose(record, spec).verdict == "nothing"
+
+
+PROCESS = {
+    "kind": "ode",
+    "name": "process",
+    "input": "u",
+    "output": "x",
+    "equations": "dx/dt = (u - x)/T",
+    "parameters": {"T": {"value": 2.0}},
+}
+
+OSCILLATOR = {
+    "kind": "ode",
+    "name": "oscillator",
+    "input": "u",
+    "output": "x",
+    "equations": "dx/dt = v\ndv/dt = u - x - v",
+}
+
+
+def list_texts(document: dict[str, object]) -> set[str]:
+    system = OdeSpec.model_validate(document).make_system()
+    names = [name for name, _ in system.derivatives]
+    signals = [*names, *(f"d{name}/dt" for name in names), "u", "rate(u)"]
+    return {each.text for each in list_candidate_terms(system, dict.fromkeys(signals, 2.0), 10.0, {})}
+
+
+def test_a_process_has_laws_that_a_velocity_has_not() -> None:
+    laws = {"abs((u - x)/T)", "x**4", "(x + {scale})**4"}
+    assert laws <= list_texts(PROCESS)
+    of_velocity = list_texts(OSCILLATOR)
+    assert not {"abs(u - x - v)", "v**4", "(v + {scale})**4"} & of_velocity
+
+
+def test_another_rate_in_one_direction_is_a_candidate_far_from_zero() -> None:
+    document = {**PROCESS, "equations": "dx/dt = (u + level - x)/T", "parameters": {"T": 2.0, "level": 300.0}}
+    system = OdeSpec.model_validate(document).make_system()
+    sizes = dict.fromkeys(("x", "dx/dt", "u", "rate(u)"), 2.0)
+    kept = drop_redundant_terms(list_candidate_terms(system, sizes, 10.0, {}), system)
+    assert "abs((u + level - x)/T)" in {each.text for each in kept}
+
+
+def test_laws_are_stated_in_words_and_other_terms_are_not() -> None:
+    system = OdeSpec.model_validate(PROCESS).make_system()
+    sizes = dict.fromkeys(("x", "dx/dt", "u", "rate(u)"), 2.0)
+    values = {"T": 2.0, "a1": -0.2, "s1": 270.0}
+    stated = {
+        each.text: describe_law(each, 1, system, values)
+        for each in list_candidate_terms(system, sizes, 10.0, {})
+        if each.target == "x"
+    }
+    (_, own), *_ = system.derivatives
+    assert "T is 2.5 s while x rises, and 1.67 s while it falls" in stated[write_rate_size(own)]
+    assert "fourth power of x, as by radiation" in stated["x**4"]
+    assert "fourth power of x + s1, as by radiation" in stated["(x + {scale})**4"]
+    assert sum(map(bool, stated.values())) == 3
