@@ -209,7 +209,7 @@ def _cause(
     )
 
 
-#: Causes in a process. The simulation has no states of equations: terms are of input and simulated output.
+#: Causes in a process. Terms are of the input and the simulated output, or of the states of its equations.
 PROCESS_CAUSES = (
     _cause(
         "quantised-valve",
@@ -273,7 +273,7 @@ PROCESS_CAUSES = (
         "linear:1",
         _uneven_process,
         "input-lag-curve output-lag-curve uneven-lag",
-        "",
+        r"abs\(\(.*- x\)/T\)\) in dx/dt",
         "timing",
     ),
     _cause(
@@ -282,9 +282,9 @@ PROCESS_CAUSES = (
         "linear:1",
         _radiation,
         "output-curve even-nonlinearity",
-        r"y_sim\*\*[234]",
+        r"(x|y_sim)\*\*[234]|\(x \+ s\d\)\*\*4",
         "shape",
-        r"y_sim\*\*|(abs|max)\(y_sim",
+        r"(x|y_sim)\*\*|(abs|max)\((x|y_sim)\b",
     ),
     _cause(
         "day-wave",
