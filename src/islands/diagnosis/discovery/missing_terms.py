@@ -278,7 +278,9 @@ def describe_terms(
     deviations = estimate_deviations(fit, target)
     places = {parameter.name: index for index, parameter in enumerate(fit.simulation.parameters)}
     confidence = 1.0 / (1.0 + float(np.exp(-discovery.worse_by / (2 * CONFIDENCE_TEMPERATURE))))
-    system, fitted = get_system(found.base), dict(zip(places, fit.values.tolist(), strict=True))
+    system = get_system(found.base)
+    # Parameters of effects may have the names of others.
+    fitted = {name: float(fit.values[place]) for name, place in places.items()}
     findings = []
     for each in found.terms:
         values = {}
