@@ -16,6 +16,9 @@ from islands.models.latent import LatentModel
 #: Weight of the measurement of the initial states, relative to the variance of the output of the states.
 _RIDGE = 1e-3
 
+#: Distance from rest at which an estimation also starts; the states have the magnitude 1.
+_DISTANCE = 2.0
+
 #: Rows from which each state is first estimated if the model diverges in the whole of them.
 _FIRST_ROWS = 3
 
@@ -90,12 +93,16 @@ def estimate_states(
     -------
     ndarray, shape (states,)
         The states move about those at rest with the magnitude 1, which is a weak measurement of each of them:
-        a state that the rows do not show rests. If the model diverges from rest, the states are estimated
-        from the first rows, and then from more and more of them. All states rest if it still diverges.
+        a state that the rows do not show rests. The estimation starts at rest, and from another state that
+        has a smaller error. If the model diverges from both, the states are estimated from the first rows,
+        and then from more and more of them. All states rest if it still diverges.
     """
-    found = _minimise(theta, codes, segment, rest, rest)
+    fits = [
+        _minimise(theta, codes, segment, start, rest) for start in _find_starts(theta, codes, segment, rest)
+    ]
+    found = min((fit for fit in fits if fit is not None), key=lambda fit: fit[0], default=None)
     if found is not None:
-        return found
+        return found[1]
     states, rows = rest, _FIRST_ROWS * len(rest)
     while rows < len(segment.y):
         part = segment.take(0, rows)
@@ -104,8 +111,27 @@ def estimate_states(
     return _choose(_minimise(theta, codes, segment, states, rest), rest).copy()
 
 
-def _choose(found: NDArray[np.float64] | None, other: NDArray[np.float64]) -> NDArray[np.float64]:
-    return other if found is None else found
+def _find_starts(
+    theta: NDArray[np.float64], codes: NDArray[np.int64], segment: Segment, rest: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """Return the states at rest, and those about them that have the least error, if it is smaller.
+
+    With units that read states, the error may have several minima.
+    """
+    if not codes.size:
+        return [rest]
+    moved = [rest + sign * _DISTANCE * row for row in np.eye(len(rest)) for sign in (1.0, -1.0)]
+    starts = [rest, *moved]
+    runs = [simulate_errors(theta, codes, segment, each) for each in starts]
+    errors = [np.inf if run is None else float(np.nansum(run**2)) for run in runs]
+    best = int(np.argmin(errors))
+    return [rest, starts[best]] if best else [rest]
+
+
+def _choose(
+    found: tuple[float, NDArray[np.float64]] | None, other: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return other if found is None else found[1]
 
 
 def _minimise(
@@ -114,8 +140,8 @@ def _minimise(
     segment: Segment,
     start: NDArray[np.float64],
     rest: NDArray[np.float64],
-) -> NDArray[np.float64] | None:
-    """Return the states of the least error by Gauss-Newton steps; None if the model diverges from the start.
+) -> tuple[float, NDArray[np.float64]] | None:
+    """Return the least error and its states by Gauss-Newton steps; None if the model diverges from the start.
 
     A step that increases the error is halved.
     """
@@ -143,7 +169,7 @@ def _minimise(
             step = step / 2.0
         if np.abs(step).max() < _NEGLIGIBLE_STEP:
             break
-    return best
+    return least, best
 
 
 def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tuple[NDArray[np.float64], int]:

@@ -109,3 +109,13 @@ def test_estimated_states_never_have_a_larger_error_than_the_states_at_rest(unit
             for states in (found, 2.0 * rest)
         ]
         assert errors[0] < errors[1]
+
+
+def test_a_minimum_away_from_rest_is_found():
+    # The output does not show the sign of the state, and at rest its slope is zero.
+    model = make_model({"a1_1": 0.9, "b1": 0.1, "f1": 2.0, "w1_1": 1.0}, ("bell",), 1, input_names=("u+1",))
+    states = 1.8 * 0.9 ** np.arange(60)
+    record = Segment(np.zeros((60, 1)), 2.0 * np.exp(-(states**2)))
+    assert model.rest == pytest.approx([0.0])
+    found = estimate_states(model.theta, model.codes, record, model.rest)
+    assert np.abs(found) == pytest.approx([1.8], abs=0.01)
