@@ -23,9 +23,17 @@ MAX_COLOURED_FRACTION = 0.05
 #: hold-out part.
 MAX_CONFIDENCE, MAX_CONFIDENCE_WITHOUT_GAIN = 0.85, 0.5
 
+#: Why such an extension is not offered.
+_REFUSAL = (
+    "The extended simulation is not offered: it does not reduce the error on the hold-out part "
+    "significantly, and leaves a coloured error."
+)
+
 
 def limit_confidences(found: Diagnosis, target: Target) -> Diagnosis:
     """Return a diagnosis without a larger confidence than a coloured remainder allows.
+
+    An extension that has no significant gain on the hold-out part either is not offered.
 
     Parameters
     ----------
@@ -40,7 +48,10 @@ def limit_confidences(found: Diagnosis, target: Target) -> Diagnosis:
         each if each.explained_fraction is None else replace(each, confidence=min(each.confidence, limit))
         for each in found.effects
     )
-    return replace(found, effects=effects)
+    found = replace(found, effects=effects)
+    if has_gain or found.trial is None or found.trial.refusal:
+        return found
+    return replace(found, trial=replace(found.trial, refusal=_REFUSAL))
 
 
 def measure_coloured_fraction(found: Diagnosis, target: Target) -> float:

@@ -1,10 +1,17 @@
 """Certainty of a name next to a coloured remainder, which may have another cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import islands
-from islands.diagnosis.coloured_remainder import MAX_CONFIDENCE
+from islands.diagnosis.calibration.preparation import make_target
+from islands.diagnosis.coloured_remainder import (
+    MAX_CONFIDENCE,
+    MAX_CONFIDENCE_WITHOUT_GAIN,
+    limit_confidences,
+)
 
 LAG = tuple(each for each in islands.EFFECTS if each.name == "sensor-lag")
 DT, PROCESS, SENSOR = 0.1, 2.0, 0.6
@@ -34,3 +41,13 @@ def test_a_name_that_leaves_a_coloured_error_is_no_more_than_probable():
     assert near.causes[0].confidence <= MAX_CONFIDENCE
     assert near.noise_claim.correlation_time > 0.0
     assert "probably lacks" in near.summary
+    assert right.refusal is near.refusal is None
+
+
+@pytest.mark.ci
+def test_an_extension_without_a_gain_that_leaves_a_coloured_error_is_not_offered():
+    found = islands.diagnose(make_sensor_record(8.0), "linear:1", effects=LAG)
+    lost = replace(found, gain=replace(found.gain, ci95=(-5.0, 20.0)))
+    limited = limit_confidences(lost, make_target(lost.record, lost.estimation_samples, {}))
+    assert [each.confidence for each in limited.causes] == [MAX_CONFIDENCE_WITHOUT_GAIN]
+    assert "not reduce the error on the hold-out part" in limited.refusal
