@@ -96,6 +96,7 @@ def test_loss_by_radiation_is_found_with_the_absolute_zero() -> None:
 
 
 @pytest.mark.ci
+@pytest.mark.nightly
 def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
     _, found = find("limit")
     assert [each.name for each in found.causes] == ["state-clip"]
