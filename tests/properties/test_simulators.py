@@ -54,6 +54,7 @@ SHARED_MODULES = {
     "coordinates",
     "extended",
     "interface",
+    "linear_states",
     "mapped_input",
     "model_form",
     "second_order",
