@@ -230,6 +230,17 @@ def _start_run(seed: int, parallel_map: ParallelMap, progress: ProgressCallback)
     return DiagnosisRun((), np.random.default_rng(seed), phased.count(parallel_map), phased)
 
 
+def _calibrate_again(
+    simulation: ExtendedSimulator, target: Target, fit: CalibrationResult
+) -> CalibrationResult:
+    """Calibrate a simulation with another step from the values of a fit, or from the nominal ones.
+
+    With a larger step it may diverge at the values of the smaller one.
+    """
+    found = calibrate(simulation, target, fit.values)
+    return found if np.isfinite(found.mean_square) else calibrate(simulation, target, simulation.nominal)
+
+
 def _search(
     base: CalibrationResult,
     target: Target,
@@ -250,7 +261,7 @@ def _search(
     while True:
         current = get_discretisation(simulator)
         tried.add(current)
-        base = calibrate(replace(simulation, simulator=simulator), target, base.values)
+        base = _calibrate_again(replace(simulation, simulator=simulator), target, base)
         if target.is_matched(base.output):
             return base, make_exact_outcome(base, target)
         run.progress(f"screening each of {len(run.effects)} effects")

@@ -93,3 +93,12 @@ def test_an_extension_is_measured_on_a_fresh_record() -> None:
     assert not outcome.fresh.is_worse
     assert outcome.claims[0].loss is not None
     assert outcome.claims[0].loss > 3.0
+
+
+@pytest.mark.ci
+@pytest.mark.nightly
+def test_a_simulation_that_diverges_with_a_larger_step_is_calibrated_again() -> None:
+    """A mass that sticks and slips: its damping alone is determined, and too large for the first step."""
+    outcome = run_unusual_trial(UnusualTrial("stick-slip", 8_600_000))
+    assert outcome.error == ""
+    assert outcome.claims[0].name == "coulomb-friction"
