@@ -98,7 +98,7 @@ def test_an_extension_is_measured_on_a_fresh_record() -> None:
 @pytest.mark.ci
 @pytest.mark.nightly
 def test_a_simulation_that_diverges_with_a_larger_step_is_calibrated_again() -> None:
-    """The damping alone of a mass that sticks and slips is determined, and is too large for the first step."""
+    """Of a mass that sticks and slips, the damping alone is determined: too large for the first step."""
     outcome = run_unusual_trial(UnusualTrial("stick-slip", 8_600_000))
     assert outcome.error == ""
     assert outcome.verdict == "named"
