@@ -38,8 +38,8 @@ _USED_ROWS, _FINAL_ROWS = 600, 4_000
 #: Rows of all blocks for the estimation in a search, at most: of many recordings, some are left out.
 _ALL_USED_ROWS = 6_000
 
-#: Samples from which the initial states of a free run are estimated, at least for a state and at most.
-SAMPLES_PER_STATE, LARGEST_MEMORY = 3, 100
+#: Samples from which the initial states of a free run are estimated, at most.
+LARGEST_MEMORY = 100
 
 #: Simulations of held-out rows from disturbed states, the standard deviation of the disturbance relative to
 #: that of the states, and the rows before and after the first held-out one, at most.

@@ -21,7 +21,6 @@ from islands.estimation.constraints.static_state import StateSpace
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
     LARGEST_MEMORY,
-    SAMPLES_PER_STATE,
     LatentData,
     estimate_start,
     make_latent_data,
@@ -55,6 +54,9 @@ _NEGLIGIBLE, _LARGEST_INCREASE, _LARGEST_FINAL_INCREASE = 0.01, 0.02, 0.5
 
 #: Largest part of a segment that gives the initial states of a free run of the result.
 _LARGEST_PART = 0.05
+
+#: Samples for each state from which the initial states of a free run of the result are estimated, at least.
+_SAMPLES_PER_STATE = 3
 
 #: Part to which a mode decays in the warm-up.
 _DECAY = 0.01
@@ -337,7 +339,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
     decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
     shortest = min(record.segments) * _LARGEST_PART
     # The first sample of a segment lacks its input.
-    memory = 1 + round(max(SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
+    memory = 1 + round(max(_SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
     return LatentModel(
         order=layout.order,
         units=system.units,

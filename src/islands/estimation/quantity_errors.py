@@ -18,6 +18,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.constraints.state_space import linearise_constraints
 from islands.estimation.covariance import sandwich
 from islands.estimation.damped_least_squares import inner_products
+from islands.estimation.fitted_state_space import number
 from islands.kernels.state_space import accumulate_products
 from islands.models.latent import LatentModel
 from islands.models.linear_system import Quantity, list_modes, measure_gains, measure_mode
@@ -102,8 +103,7 @@ def _differentiate_errors(
     ndarray, shape (parameters, samples)
     ndarray, shape (samples,)
     """
-    free = np.isin(model.layout.names, model.wiring)
-    places, columns = np.where(free, np.cumsum(free) - 1, -1), int(np.count_nonzero(free))
+    places, columns = number(np.isin(model.layout.names, model.wiring)), len(model.wiring)
     starts, lengths = find_intervals(record, warm_up, None)
     states = estimate_initial_states(model, record, starts, warm_up)
     products = np.empty((columns + model.order + 1,) * 2)
