@@ -116,6 +116,10 @@ def test_a_structure_is_that_of_latent_models(folder):
     assert "a structure is a setting of latent models: leave it out, or --model latent" in text
     text = fail("fit", folder / "spring.csv", *columns, "wienr", "--model", "latent")
     assert "Did you mean 'wiener'?" in text
+
+
+@pytest.mark.nightly
+def test_a_fit_has_the_structure_that_is_given(folder):
     found = islands.fit(read(folder)[:300], model="latent", structure="feedback")
     assert found.settings["structure"] == "feedback"
     assert not any(name.startswith("f") for name in found.best.model.parameter_names)

@@ -64,8 +64,8 @@ def test_a_latent_model_has_the_constraints_of_its_job(service, tmp_path):
     islands.write_record(spring_record(300, noise=0.02), tmp_path / "spring.csv")
     with Client(service.url) as client:
         dataset = client.upload(tmp_path / "spring.csv")
-        job = client.submit(dataset, "u_V", "y_mm", model="latent", constraints="gain = 0.564")
         searched = {"preset": "latent", "population": 6, "generations": 1, "islands": 1}
+        job = client.submit(dataset, "u_V", "y_mm", **searched, constraints="gain = 0.564")
         other = client.submit(dataset, "u_V", "y_mm", **searched, constraints="fixed-point = 0, 0.3")
         blobs = Blobs(service.settings.blobs)
         for each, value in ((job, 0.564), (other, 0.3)):
@@ -87,6 +87,7 @@ def test_a_latent_model_has_the_constraints_of_its_job(service, tmp_path):
                 client.submit(dataset, "u_V", "y_mm", **given, constraints="gain(u2) = 1")
 
 
+@pytest.mark.nightly
 def test_a_latent_model_has_figures_of_its_parts(service, tmp_path):
     islands.write_record(spring_record(500, noise=0.02), tmp_path / "spring.csv")
     with Client(service.url) as client:

@@ -289,7 +289,7 @@ SAMPLE = (
     *(f"first order, {fault}, seed 0" for fault in ("sentinels", "extrapolation")),
     *[name for name in CASES if name.startswith("several outputs")][::5],
     *("diagnosis, portfolio, first order", "diagnosis, portfolio, tank", "diagnosis, wrong parameter"),
-    *("diagnosis, stopped before free forms", "diagnosis, channels", "diagnosis, column, gain, seed 0"),
+    *("diagnosis, channels", "diagnosis, column, gain, seed 0"),
 )
 
 
@@ -297,6 +297,7 @@ SAMPLE = (
 SLOW = (
     *(name for name in PORTFOLIO if name not in SAMPLE),
     *(f"first order, {fault}, seed 0" for fault in ("spikes", "short", "integrator")),
+    "diagnosis, stopped before free forms",
 )
 
 

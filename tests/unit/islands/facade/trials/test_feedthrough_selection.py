@@ -110,6 +110,7 @@ def test_inputs_are_tested_one_by_one():
 
 
 @pytest.mark.ci
+@pytest.mark.nightly
 def test_the_defaults_find_the_static_map_of_two_inputs():
     """Decided for one input only, the other one was read a sample late and dropped: an error of 0.51."""
     rng = np.random.default_rng(1)
