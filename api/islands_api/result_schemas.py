@@ -53,6 +53,7 @@ class FindingView(ResponseModel):
     """Cause of a discrepancy, or property of the noise."""
 
     name: str
+    place: str = Field(default="", description="State or parameter that it acts on.")
     family: str
     confidence: float
     equivalents: tuple[str, ...] = Field(description="Causes that the record cannot distinguish from it.")

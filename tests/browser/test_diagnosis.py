@@ -176,7 +176,7 @@ def test_the_values_of_all_outputs_are_read_with_the_keys(
     page = quiet(desk.url).go(f"#/jobs/{finished}")
     plot = page.get_by_role("slider", name="Record")
     plot.press("ArrowRight")
-    names = r"measured \S+, simulated \S+, extended \S+, residual before \S+, residual after \S+"
+    names = r"measured \S+, simulated \S+, extended \S+, residual simulated \S+, residual extended \S+"
     expect(plot).to_have_attribute("aria-valuetext", re.compile(rf"^0\.04 s: {names}$"))
 
 

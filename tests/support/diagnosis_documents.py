@@ -30,7 +30,7 @@ def make_document(verdict: str, **changes: Any) -> dict[str, Any]:
     names = {"inputs": ["force_N"], "output": "travel_um"}
     terms = {"equations": "output = y_sim + a1*u", "effects": [], "nearest": ["jump"], "worse_by": 30.0}
     return {
-        "record": {"names": names, "units": {"inputs": ["N"], "output": "um"}, "reading": []},
+        "record": {"names": names, "units": {"inputs": ["N"], "output": "um"}, "dt": 0.01, "reading": []},
         "verdict": verdict,
         "discovered": terms if verdict == "discovered" else None,
         "effects": [],

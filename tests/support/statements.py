@@ -46,8 +46,8 @@ EXCLUSIVE = (
 
 #: A claimed cause that others together exceed in probability.
 _UNLIKELY = (
-    r"confidence (below )?0\.[0-4]\d, (explains )?[\d.]+ % of the "
-    r"(misfit above the noise floor|mean squared error without it \([^)]*\))"
+    r"confidence (below )?0\.[0-4]\d(, [\d.]+ % of the misfit above the noise floor|"
+    r"; without it, the RMSE is (not larger|much larger|[\d.e+]+ (times as large|% larger)))"
     r"(?!; improves|; this record does not distinguish [^;]*; improves)"
 )
 
@@ -67,12 +67,15 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"No significant discrepancy", r"(The remaining residual depends|none of which is confirmed)"),
     (
         r"No significant discrepancy",
-        r"confidence (above |below )?\d\.\d\d, (explains )?[\d.]+ % of the (misfit|mean squared error)",
+        r"confidence (above |below )?\d\.\d\d(, [\d.]+ % of the (misfit|mean squared error)|; without it)",
     ),
     (r"No significant discrepancy: ", _FAR),
     (_WHOLE, _FAR),
     (_WHOLE, r"(The remaining residual depends|significant structure remains|none of which is confirmed)"),
-    (r"explains? (most of |a part of )?(the discrepancy|it)[.;]", r"does not fall significantly"),
+    (
+        r"explains? (most of |nearly all of |a part of )?(the discrepancy|it)[.;]",
+        r"does not fall significantly",
+    ),
     (r"explains? [^.]*in the samples used for estimation", r"the RMSE falls from"),
     (r"the RMSE falls from", r"by -[\d.]+ %"),
     (r"the RMSE falls from [^%]*%", r"\((-[\d.]+ to|[\d.]+ to -)[^()]* with 95 % confidence\)"),
@@ -82,11 +85,11 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"(causes are|cause is) uncertain: (?!.*confidence (below )?0\.[0-4])", r""),
     (
         r"no known effect is confirmed",
-        r"(confidence (above |below )?\d\.\d\d, \d+ % of the misfit|the RMSE falls)",
+        r"(confidence (above |below )?\d\.\d\d(, \d+ % of the misfit|; without it)|the RMSE falls)",
     ),
     (
         r"stopped before a verdict",
-        r"(No significant discrepancy|explains? (most of |a part of |)(it|the discrepancy)|the RMSE falls)",
+        r"(No significant discrepancy|explains? ([a-z]+ (all )?of )?(it|the discrepancy)|the RMSE falls)",
     ),
     (r"significant structure remains(?!.*(The remaining residual depends|A flexible model of))", r""),
     (
@@ -107,7 +110,7 @@ REPEATED = (
     r"(\d+) % of (?:the residual of the free run|the free-run residual) is predictable",
     r"RMSE (\S+) ?\S*, mean absolute error",
     r"(?:calibrated, with the effects |the RMSE falls from [^()]*\([^()]*\) to )([\d.e+-]+\d)",
-    r"(?:The noise floor is |noise floor(?: \(upper bound\))? )([\d.]+(?:e[+-]\d+)?)",
+    r"(?:the noise alone, is (?:at most )?|noise floor(?: \(upper bound\))? )([\d.]+(?:e[+-]\d+)?)",
 )
 
 

@@ -24,7 +24,7 @@ _BRACKETED = re.compile(r"(|.*\S)\s*[\[(（]([^\[\]()（）]*)[\])）]")
 _PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
 
 #: Units without a prefix, and symbols that may have one of `_PREFIXES`.
-PLAIN_UNITS = tuple("% min h d deg ° °C degC °F degF rpm psi dB".split())  # noqa: SIM905
+PLAIN_UNITS = tuple("% pct min h d deg ° °C degC °F degF rpm psi dB".split())  # noqa: SIM905
 SYMBOLS = tuple("m g s A K mol cd Hz N Pa J W C V F ohm S Wb T H L l bar eV rad Ah Wh".split())  # noqa: SIM905
 
 _UNIT = re.compile(f"(?:{'|'.join(PLAIN_UNITS)})|([{''.join(_PREFIXES)}]?)({'|'.join(SYMBOLS)})")

@@ -161,6 +161,7 @@ def make_diagnosis(
                 each.effect.cause,
                 each.score_gain(outcome.base),
                 explained_fraction(outcome.base, each.fit, floor),
+                each.effect.place,
             )
             for each in outcome.screened
             if not each.effect.is_free or each.effect in hypothesis.effects

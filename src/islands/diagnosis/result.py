@@ -28,11 +28,14 @@ class Candidate:
         Score gain in minus twice the log-likelihood, less the BIC penalty.
     explained_fraction : float
         Fraction of the explainable misfit that the effect explains.
+    place : str
+        State or parameter that it acts on; empty if it is another kind of effect.
     """
 
     name: str
     score: float
     explained_fraction: float
+    place: str = ""
 
 
 @dataclass(frozen=True, slots=True)

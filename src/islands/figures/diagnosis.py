@@ -7,15 +7,19 @@ from types import MappingProxyType
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
+from islands.data.dataset import Dataset
 from islands.data.segments import fill_gaps, map_segments
 from islands.diagnosis.result import Diagnosis
 from islands.effects.interface.context import Signal
 from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import VERTICES, downsample
 from islands.figures.style import (
+    BAND,
     FRAME,
     MEASURED,
     MEASURED_WIDTH,
@@ -56,27 +60,29 @@ def draw_over_time(diagnosis: Diagnosis) -> Figure:
     """Draw measured and simulated output over time, and below them the residuals before and after.
 
     A record with many loops is shown completely and, below, in a section whose residual is the median of all
-    sections, because the loops of the complete record cannot be distinguished.
+    sections, because the loops of the complete record cannot be distinguished. The last panel is the input.
     """
     record = diagnosis.record
     section = representative_window(record, fill_gaps(record.y - diagnosis.base.output))
     if section is None:
-        figure = blank(4.6, "Measured and simulated output")
-        axes = figure.subplots(2, 1, height_ratios=(2, 1.3))
-        _draw_over_time_panels(axes[0], axes[1], diagnosis, slice(0, record.samples))
+        shown = slice(0, record.samples)
+        figure = blank(5.6, "Measured and simulated output")
+        axes = figure.subplots(3, 1, height_ratios=(2, 1.3, 0.9))
+        _draw_over_time_panels(axes[0], axes[1], diagnosis, shown)
     else:
-        figure = blank(7.4, "Measured and simulated output")
-        axes = figure.subplots(4, 1, height_ratios=(1.6, 1.1, 2.2, 1.3))
+        shown = section
+        figure = blank(8.4, "Measured and simulated output")
+        axes = figure.subplots(5, 1, height_ratios=(1.6, 1.1, 2.2, 1.3, 0.9))
         _draw_over_time_panels(axes[0], axes[1], diagnosis, slice(0, record.samples), 0.6)
         _draw_over_time_panels(axes[2], axes[3], diagnosis, section)
         here = record.time[section]
         for whole in axes[:2]:
             whole.axvspan(float(here[0]), float(here[-1]), facecolor="none", edgecolor=FRAME, lw=0.8)
-        axes[2].set_title(
-            "Framed section; its residual before extension is the median of all sections", fontsize=8.0
-        )
+        axes[1].tick_params(labelbottom=True)
+        axes[2].set_title("The framed section, whose residual is of medium size", fontsize=8.0)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
-    axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    _draw_input(axes[-1], record, shown)
+    axes[-2].tick_params(labelbottom=False)
     axes[-1].set_xlabel("time (s); shaded: excluded from fitting")
     figure.align_ylabels()
     return finish(figure)
@@ -86,7 +92,7 @@ def draw_over_time(diagnosis: Diagnosis) -> Figure:
 def draw_loops(diagnosis: Diagnosis) -> Figure:
     """Draw the last loops of the output, and of the residual before and after, over the input."""
     record = diagnosis.record
-    figure = blank(3.4, "Loops")
+    figure = blank(3.4, f"Output and residual over the input, {_name_part(record, last_loops(record))}")
     left, right = figure.subplots(1, 2)
     loops = last_loops(record)
     shown = record[loops]
@@ -97,10 +103,9 @@ def draw_loops(diagnosis: Diagnosis) -> Figure:
         line = downsample(u, break_line(shown, output[loops]))
         left.plot(*line, color=colour, lw=SIMULATED_WIDTH, label=name)
     left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, columnspacing=1.0)
-    for name, colour, residual in _residuals(diagnosis):
+    for _, colour, residual in _residuals(diagnosis):
         line = downsample(u, break_line(shown, residual[loops]))
-        right.plot(*line, color=colour, lw=SIMULATED_WIDTH, label=name)
-    right.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+        right.plot(*line, color=colour, lw=SIMULATED_WIDTH)
     left.set(xlabel=_input_label(diagnosis), ylabel=label(record.output_name, record.output_unit))
     right.set(xlabel=_input_label(diagnosis), ylabel=label("residual", record.output_unit))
     for axes in (left, right):
@@ -118,14 +123,14 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
     record = diagnosis.record
     u = record.u[:, 0]
     rate = map_segments(lambda part: np.gradient(part, record.dt), u, record.segments)
-    figure = blank(7.0, "Residual structure: mean and standard deviation in cells of equal sample count")
+    figure = blank(7.2, "Structure of the residual")
     axes = figure.subplots(3, 2)
     axes[0, 1].sharey(axes[0, 0])
     unit = record.input_units[0]
     for panel, signal, name in (
         (axes[0, 0], u, _input_label(diagnosis)),
         (axes[1, 0], rate, label("rate of the input", f"{unit}/s" if unit else "")),
-        (axes[1, 1], diagnosis.best.output, label("simulated output", record.output_unit)),
+        (axes[1, 1], diagnosis.best.output, label("output of the best simulation", record.output_unit)),
     ):
         _draw_cells(panel, signal, diagnosis)
         panel.set(xlabel=name, ylabel=label("residual", record.output_unit))
@@ -134,7 +139,10 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
     _draw_autocorrelation(axes[2, 1], diagnosis)
     for panel in axes[:2].flat:
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
-    axes[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    axes[0, 0].set_title("mean and band of one standard deviation")
+    axes[0, 1].set_title("mean by the direction of the input")
+    lines = [Line2D([], [], color=colour, lw=1.2, label=name) for name, colour, _ in _residuals(diagnosis)]
+    figure.legend(handles=lines, loc="outside upper right", ncols=2)
     return finish(figure)
 
 
@@ -142,13 +150,17 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
 def draw_screening(diagnosis: Diagnosis) -> Figure:
     """Draw the score of each screened effect, and the fraction of the misfit that it explains."""
     shown = diagnosis.candidates[:_MAX_EFFECTS][::-1]
-    named = {finding.name for finding in diagnosis.effects}
-    figure = blank(0.9 + 0.26 * len(shown), "Screened effects, each added alone to the calibrated simulation")
+    colour_of = {
+        (finding.name, finding.place): SIMULATED if finding.is_claimed else BAND
+        for finding in diagnosis.effects
+    }
+    figure = blank(1.0 + 0.26 * len(shown), "Screened effects, each added alone to the calibrated simulation")
     axes = figure.subplots()
     places, gains = np.arange(len(shown)), [candidate.score for candidate in shown]
-    colours = [SIMULATED if candidate.name in named else FRAME for candidate in shown]
+    colours = [colour_of.get((candidate.name, candidate.place), FRAME) for candidate in shown]
     axes.barh(places, gains, color=colours, height=0.7)
-    axes.set_yticks(places, [candidate.name for candidate in shown])
+    names = [f"{each.name} of {each.place}" if each.place else each.name for each in shown]
+    axes.set_yticks(places, names)
     axes.axvline(0.0, color=FRAME, lw=0.6)
     for place, candidate in zip(places, shown, strict=True):
         axes.annotate(
@@ -162,9 +174,14 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     axes.margins(x=0.12)
     axes.set_xlim(left=1.05 * min(0.0, *gains))
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel(
-        "score (decrease of the BIC); per cent: share of the misfit above the floor; coloured: named"
-    )
+    axes.set_xlabel("score (decrease of the BIC); per cent: share of the misfit above the noise floor")
+    handles = [
+        Patch(color=colour, label=text)
+        for colour, text in ((SIMULATED, "claimed"), (BAND, "in the extended simulation, not claimed"))
+        if colour in colours
+    ]
+    if handles:
+        axes.legend(handles=handles, loc="lower right")
     return finish(figure)
 
 
@@ -183,12 +200,25 @@ def _outputs(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
 
 def _residuals(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
     """Return name, colour and values of the residual of each simulated output."""
-    outputs = _outputs(diagnosis)
-    names = (("residual", BEFORE),) if len(outputs) == 1 else (("before", BEFORE), ("after", RESIDUAL))
-    return [
-        (name, colour, diagnosis.record.y - output)
-        for (name, colour), (_, _, output) in zip(names, outputs, strict=True)
-    ]
+    return [(name, colour, diagnosis.record.y - output) for name, colour, output in _outputs(diagnosis)]
+
+
+def _name_part(record: Dataset, part: slice) -> str:
+    """Name a part of a record in a title."""
+    if part == slice(0, record.samples):
+        return "whole record"
+    begin, end = record.time[part.start], record.time[part.stop - 1]
+    return f"{begin:.4g} s to {end:.4g} s"
+
+
+def _draw_input(axes: Axes, record: Dataset, part: slice) -> None:
+    """Draw the first input; lines are interrupted between recordings."""
+    shown = record[part]
+    line = downsample(break_line(shown, shown.time), break_line(shown, shown.u[:, 0]))
+    axes.plot(*line, color=RESIDUAL, lw=SIMULATED_WIDTH)
+    axes.set_xlim(float(shown.time[0]), float(shown.time[-1]))
+    axes.set_ylabel(label(record.input_names[0], record.input_units[0]))
+    axes.yaxis.set_major_locator(MaxNLocator(3, steps=STEPS))
 
 
 def _draw_over_time_panels(
@@ -222,7 +252,7 @@ def _draw_cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
     for name, colour, residual in _residuals(diagnosis):
         mean, square = (np.bincount(cell, weights=residual[is_known] ** p) / count for p in (1, 2))
         spread = np.sqrt(np.maximum(square - mean**2, 0.0))
-        axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.15, lw=0)
+        axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.25, lw=0)
         axes.plot(middle, mean, color=colour, lw=1.2, label=name)
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
 
@@ -240,7 +270,7 @@ def _draw_directions(axes: Axes, u: Signal, rate: Signal, diagnosis: Diagnosis) 
         axes.plot([], [], color=FRAME, lw=1.2, ls=line, label=way)
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
     axes.set(xlabel=_input_label(diagnosis), ylabel=label("residual", diagnosis.record.output_unit))
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    axes.legend(loc="best", ncols=2)
 
 
 def _sort_into_cells(signal: Signal) -> tuple[Signal, NDArray[np.int64], NDArray[np.int64]]:
@@ -279,7 +309,7 @@ def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
             subs = (2.0, 5.0) if high > 10.0 * low else (2.0, 3.0, 5.0, 7.0)
             axis.set_minor_locator(LogLocator(subs=subs))
             axis.set_minor_formatter(StrMethodFormatter("{x:g}"))
-    axes.set_ylabel(label("residual", f"{record.output_unit or '1'}/Hz^0.5"))
+    axes.set_ylabel(f"amplitude density ({record.output_unit or '1'}/√Hz)")
 
 
 def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
@@ -290,11 +320,11 @@ def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
         correlation = [
             sum(float(part[lag:] @ part[:-lag]) for part in parts) / float(centred @ centred) for lag in lags
         ]
-        axes.plot(lags, correlation, color=colour, lw=1.2, label=name)
+        axes.plot(diagnosis.record.dt * lags, correlation, color=colour, lw=1.2, label=name)
     bound = 1.96 / np.sqrt(np.count_nonzero(~np.isnan(diagnosis.record.y)))
     axes.axhspan(-bound, bound, color=SHADE, zorder=0.5)
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
-    axes.set(xlabel="lag (samples)", ylabel="autocorrelation")
+    axes.set(xlabel="lag (s); shaded: white noise", ylabel="autocorrelation")
 
 
 #: Figures by name, in the order of a report.

@@ -40,7 +40,7 @@ RESIDUAL = "#0072b2"
 FRAME = "#8c8c8c"
 
 #: Colour of shaded areas.
-SHADE = "#e4e4e4"
+SHADE = "#ebebeb"
 
 #: Width of measured lines in points. They lie under thinner simulated lines, so that both are visible.
 MEASURED_WIDTH = 2.2
@@ -74,7 +74,7 @@ _STYLE = {
     "figure.titlesize": 10.0,
     "font.family": ["DejaVu Sans"],  # the font that matplotlib includes
     "font.size": 8.5,
-    "grid.color": "#ececec",
+    "grid.color": "#dadada",
     "grid.linewidth": 0.6,
     "legend.fontsize": 8.0,
     "legend.frameon": False,

@@ -3,6 +3,7 @@
 from functools import partial
 from math import floor
 
+from islands.data.loops import has_loops
 from islands.diagnosis.detectability import NOTHING, SelfTest
 from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
@@ -13,6 +14,7 @@ from islands.io.result_text.diagnosis_statements import (
     describe_causes,
     describe_details,
     describe_verdict,
+    label_effect,
     name_reference,
 )
 from islands.io.result_text.headlines import write_diagnosis_headline
@@ -24,13 +26,24 @@ from islands.reports.rendering import TEMPLATES, inline_figure
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {
-    "over-time": "Measured and simulated output, and the residual (measured minus simulated)",
+    "over-time": (
+        "Measured output, simulated output without and with the effects (extended), the residual of each "
+        "(measured minus simulated), and the input"
+    ),
     "shape": "Shape of the effect, and of a free curve in its place",
     "free-forms": "Values of the free forms",
-    "loops": "Output over input, and the residual over the input",
-    "residual": "Structure of the residual",
-    "ladder": "Score of each effect alone",
+    "loops": "A simulation that lacks a hysteresis or a curve has another loop than the measured output",
+    "residual": (
+        "A right simulation leaves a residual that depends on nothing: means of zero, a flat spectrum, and "
+        "no autocorrelation"
+    ),
+    "ladder": (
+        "The causes are those of the best combination, in which an effect may have another score than alone"
+    ),
 }
+
+#: Name of the extended simulation in the table of errors.
+_EXTENDED = "calibrated, with the effects"
 
 #: Screened effects in the table of the report.
 _MAX_CANDIDATES = 15
@@ -63,6 +76,7 @@ def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
 def _list_figures(found: Diagnosis) -> list[str]:
     """Return the names of the figures that a diagnosis has, in the order of the report."""
     has = {
+        "loops": has_loops(found.record),
         "shape": found.shape is not None,
         "free-forms": bool(list_free_forms(found.effects)),
         "ladder": bool(found.candidates),
@@ -92,33 +106,32 @@ def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[st
             ("calibrated, record corrected", f"{100 * errors['after']:.3g}"),
         ]
         return columns, rows, "Both are errors over the samples used for estimation."
-    unit, gain = document["record"]["units"]["output"], document["gain"]
-    columns = ("error", f"RMSE ({unit})" if unit else "RMSE")
+    unit, gain, deviation = document["record"]["units"]["output"], document["gain"], document["output_std"]
     # A recorded column has nothing to calibrate.
     given = "as given" if document.get("calibrated") == {} else "before the calibration"
-    rows = [(given, f"{document['as_given_rmse']:.4g}")]
-    if gain:
-        columns += ("mean absolute error, % of the output range",)
-        rows[0] += ("",)
-        rows += [
-            (name, f"{errors['rmse']:.4g}", f"{errors['mape']:.3g}")
-            for name, errors in (
-                (name_reference(document), gain["before"]),
-                ("calibrated, with the effects", gain["after"]),
-            )
-        ]
-    else:
-        rows.append(("calibrated", f"{document['calibrated_rmse']:.4g}"))
     bound = " (upper bound)" if document["noise_floor_is"] == "an upper bound" else ""
-    noise = (f"noise floor{bound}", f"{document['noise_floor_rmse']:.4g}")
-    rows.append((*noise, f"{gain['noise_floor']['mape']:.3g}") if gain else noise)
+    compared = (
+        [(name_reference(document), gain["before"]["rmse"]), (_EXTENDED, gain["after"]["rmse"])]
+        if gain
+        else [("calibrated", document["calibrated_rmse"])]
+    )
+    errors = [
+        (given, document["as_given_rmse"]),
+        *compared,
+        (f"noise floor{bound}", document["noise_floor_rmse"]),
+    ]
+    columns = ("error", f"RMSE ({unit})" if unit else "RMSE", "% of the standard deviation of the output")
+    rows = [
+        (name, f"{error:.4g}", f"{100.0 * error / deviation:.3g}" if deviation else "")
+        for name, error in errors
+    ]
     return columns, rows, f"All but the noise floor are errors over {document['held_out_part']}."
 
 
 def _list_candidates(document: Document) -> list[tuple[str, str, str]]:
     """Return the name, the gain and the share of the misfit of the best screened effects."""
     return [
-        (each["name"], f"{each['score']:.1f}", f"{floor(100 * each['eta'])} %")
+        (label_effect(each), f"{each['score']:.1f}", f"{floor(100 * each['eta'])} %")
         for each in document["candidates"][:_MAX_CANDIDATES]
     ]
 

@@ -266,15 +266,15 @@ def acts_on_output(term: CandidateTerm, name: str) -> bool:
 
 
 def shifts_in_time(term: CandidateTerm, system: OdeSystem) -> bool:
-    """Return whether a term is what a small delay adds: the rate of the input, or that of the output.
+    """Return whether a term may be what a small delay adds: the rate of the input, or that of the output.
 
     For a small tau, ``u(t - tau)`` is ``u - tau*rate(u)``, and an output ``x(t - tau)`` is ``x - tau*dx/dt``.
+    In equations with other terms, a delay may add functions of the rate of the input.
     """
-    rates = {f"rate({system.input})"}
-    derivatives = dict(system.derivatives)
+    derivatives, is_shift = dict(system.derivatives), f"rate({system.input})" in term.text
     if term.target == OUTPUT and isinstance(system.output, Symbol) and system.output.name in derivatives:
-        rates.add(render(derivatives[system.output.name]))
-    return term.gate is None and term.text in rates
+        is_shift = is_shift or term.text == render(derivatives[system.output.name])
+    return term.gate is None and is_shift
 
 
 def find_free_numbers(used: Set[str], count: int) -> list[int]:

@@ -150,6 +150,8 @@ class TermSearchResult:
         system = get_system(self.fit)
         right_sides = {**dict(system.derivatives), OUTPUT: system.output}
         changed = dict.fromkeys(each.term.target for each in self.terms)
+        if not isinstance(system.output, Symbol):
+            changed[OUTPUT] = None
         lines = [f"{name_equation(target)} = {render(right_sides[target])}" for target in changed]
         values = {
             parameter.name: f"{parameter.name} = {value:.4g} {parameter.unit}".rstrip()

@@ -31,8 +31,14 @@ def describe_next_experiment(experiment: NextExperiment) -> dict[str, Any]:
 
 def write_advice(experiment: NextExperiment) -> str:
     """Describe the next experiment in words: its input, and the separation of each pair."""
-    pairs = "; ".join(_write_pair(each) for each in experiment.pairs)
+    open_pairs = [each for each in experiment.pairs if not _is_separated(each)]
+    pairs = "; ".join(map(_write_pair, open_pairs or experiment.pairs))
     return pairs if experiment.input is None else f"{_write_input(experiment.input)}: {pairs}"
+
+
+def _is_separated(pair: SeparatedPair) -> bool:
+    """Return whether the record separates the causes, although their scores are similar."""
+    return pair.recorded is not None and pair.recorded.distance >= pair.recorded.required
 
 
 def _describe_pair(pair: SeparatedPair) -> dict[str, Any]:
@@ -75,7 +81,7 @@ def _write_input(designed: DesignedInput) -> str:
 
 
 def _write_pair(pair: SeparatedPair) -> str:
-    names = " or ".join(pair.causes)
+    names = " and ".join(pair.causes)
     if pair.recorded is None:
         return f"{names}: {_UNKNOWN_INPUT}"
     apart = f"{names} are {pair.recorded.distance:.1f} standard deviations of the noise apart in this record"

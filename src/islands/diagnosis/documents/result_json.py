@@ -133,6 +133,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
     entry = find_entry(finding.name)
     return {
         "name": finding.name,
+        "place": finding.place,
         "family": finding.family,
         "summary": finding.summary if entry is None else entry.summary,
         "distinguished_by": "" if entry is None else entry.distinguished_by,
@@ -171,4 +172,9 @@ def _describe_shape(shape: EffectShape) -> dict[str, Any]:
 
 
 def _describe_candidate(candidate: Candidate) -> dict[str, Any]:
-    return {"name": candidate.name, "score": candidate.score, "eta": candidate.explained_fraction}
+    return {
+        "name": candidate.name,
+        "place": candidate.place,
+        "score": candidate.score,
+        "eta": candidate.explained_fraction,
+    }

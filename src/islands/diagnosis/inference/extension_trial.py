@@ -132,7 +132,7 @@ def find_added_parameters(base: CalibrationResult, best: CalibrationResult) -> d
         places += [(place, f"{effect.name} ") for place in range(part.start, part.stop)]
     found = {place: (prefix, simulation.parameters[place]) for place, prefix in places}
     return {
-        place: f"{prefix}{parameter.name}"
+        place: f"{prefix}{parameter.name.removeprefix(prefix.strip()).strip()}".strip()
         for place, (prefix, parameter) in found.items()
         if not parameter.initial and (prefix or parameter.name not in known)
     }

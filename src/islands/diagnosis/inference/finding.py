@@ -88,6 +88,8 @@ class Finding:
         first effect is: further ones may follow its wrong form. No cause is if others are much more probable.
     resembles : Resemblance or None
         Simple law that a free curve has within its intervals; None for another effect.
+    place : str
+        State or parameter that it acts on; empty if it is another kind of effect.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Finding:
     summary: str = ""
     depends_on_time: bool = False
     resembles: Resemblance | None = None
+    place: str = ""
 
 
 def list_free_forms(findings: Sequence[Finding]) -> list[Finding]:
@@ -188,13 +191,13 @@ def _describe_effect(
     fit = hypothesis.fit
     screened = _list_screened(effect, alternatives, outcome)
     scored = _score_causes(effect, without.cost - hypothesis.cost, screened, outcome, rival)
-    name, family, values = effect.cause, effect.family, _get_values(fit, effect, deviations)
+    named_effect, values = effect, _get_values(fit, effect, deviations)
     if (confounder := find_confounder(fit, effect, target)) is not None:
         score = scored[effect.cause].score + confounder.score_gain
         scored[confounder.effect.cause] = ScoredAlternative(score, None)
         if confounder.score_gain > 0.0:
-            name, family = confounder.effect.cause, confounder.effect.family
-            values = _scale_values(confounder, values, fit)
+            named_effect, values = confounder.effect, _scale_values(confounder, values, fit)
+    name = named_effect.cause
     named = scored.pop(name)
     others = [*scored.values(), ScoredAlternative(0.0, sum_squares_by_block(without.fit, fit, target))]
     reference = choose_reference_fit(hypothesis.effects, without.fit, target)
@@ -207,7 +210,7 @@ def _describe_effect(
     equal += tuple(each for each in opposed if each not in (name, *equal))
     finding = Finding(
         name,
-        family,
+        named_effect.family,
         compute_confidence(named, others),
         equal,
         values,
@@ -217,6 +220,7 @@ def _describe_effect(
         noise_fraction=noise_fraction(reference, outcome.noise_floor),
         depends_on_time=effect.depends_on_time,
         resembles=_find_resemblance(effect, values, fit),
+        place=named_effect.place,
     )
     return finding, [each for each, _ in screened if each.effect.cause in equal]
 

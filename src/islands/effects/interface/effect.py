@@ -116,6 +116,11 @@ class Effect:
         """Name without the state or parameter after the colon."""
         return self.name.partition(":")[0]
 
+    @property
+    def place(self) -> str:
+        """State or parameter after the colon of the name; empty if it has none."""
+        return self.name.partition(":")[2]
+
 
 @dataclass(frozen=True, slots=True)
 class EffectTemplate:

@@ -6,9 +6,10 @@ those of the held-out data, which may disagree with the samples used for estimat
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from math import ceil, floor, log10
+from itertools import accumulate
+from math import ceil, floor, log10, sqrt
 from typing import Final
 
 from islands.data.channel_names import TEMPERATURES
@@ -47,11 +48,17 @@ _ALMOST_CERTAIN = 0.995
 #: Score of an effect that is written as more than zero.
 _LEAST_SCORE = 0.05
 
+#: Ratio of two errors from which on it is written as a factor, and not in per cent.
+_TIMES = 1.5
+
 #: Number of effects that are listed as the nearest ones.
 _NEAREST = 3
 
 #: Families of causes: wrong gains and parameters, terms that were found, gross errors of the record.
 _SCALE, _TERM, _GROSS = "scale", "discovered", "gross"
+
+#: Delay of the input, and its largest ratio to the sampling time for which the recording may be its cause.
+_DELAY, _SMALL_DELAY = "delay", 1.5
 
 #: Effects that limit the input and its rate.
 _SATURATION, _RATE_LIMIT = "input-saturation", "rate-limit"
@@ -130,8 +137,8 @@ class DiagnosisFacts:
         return [name for name, unit in channels if unit not in TEMPERATURES]
 
     @property
-    def has_several_shares(self) -> bool:
-        """Whether several shares are stated, each of another error. The terms have one in common."""
+    def has_several_comparisons(self) -> bool:
+        """Whether several errors without a cause are stated. The terms have one in common."""
         shares = sum(each["family"] not in (_TERM, _GROSS) for each in self.causes)
         return shares + bool(shares and self.terms) > 1
 
@@ -148,6 +155,37 @@ class DiagnosisFacts:
             if each["name"] == _RATE_LIMIT and values["inverse_rate"]["value"] > 0.0:
                 found.append((_RATE_LIMIT, 1.0 / values["inverse_rate"]["value"]))
         return found
+
+    @property
+    def small_delay(self) -> float:
+        """A claimed delay of about a sampling time or less, in seconds; zero if there is none."""
+        found = [each["parameters"]["tau"]["value"] for each in self.claimed if each["name"] == _DELAY]
+        longest = _SMALL_DELAY * self.document["record"]["dt"]
+        return float(found[0]) if found and abs(found[0]) < longest else 0.0
+
+    @property
+    def held_out_recordings(self) -> tuple[list[str], list[str]] | None:
+        """Names of the fitted and of the held-out recordings; None if one recording has both parts."""
+        record = self.document["record"]
+        names, segments = record.get("recordings", ()), record.get("segments", ())
+        bounds = list(accumulate(segments))
+        if not all(names) or self.document.get("estimation_samples") not in bounds[:-1]:
+            return None
+        count = bounds.index(self.document["estimation_samples"]) + 1
+        return list(names[:count]), list(names[count:])
+
+    @property
+    def is_worse_calibrated(self) -> bool:
+        """Whether the calibration without effects makes the error of the held-out data larger."""
+        given = self.document.get("as_given_rmse")
+        if (
+            self.gain is None
+            or given is None
+            or self.calibrated_rmse is None
+            or not self.document.get("calibrated")
+        ):
+            return False
+        return bool(given < (1.0 - _CALIBRATED) * self.calibrated_rmse)
 
     @property
     def grows(self) -> bool:
@@ -380,8 +418,10 @@ def _describe_extent(facts: DiagnosisFacts, whole: str = "the discrepancy") -> s
         return f"{whole} in the samples used for estimation alone"
     share = facts.share
     is_rest = bool(facts.remainder) or facts.is_far or facts.verdict == "named with remainder"
-    if not is_rest and (share is None or share >= _WHOLE or facts.is_noise):
+    if not is_rest and (facts.is_noise or share is None):
         return whole
+    if not is_rest and share is not None and share >= _WHOLE:
+        return whole if facts.noise_ratio is None else f"nearly all of {whole}"
     return f"most of {whole}" if share is None or share >= _MOST else f"a part of {whole}"
 
 
@@ -407,15 +447,18 @@ def _describe_noise_claim(facts: DiagnosisFacts) -> str:
 def _describe_named(facts: DiagnosisFacts) -> str:
     extent = f"{_describe_extent(facts)}{_describe_rest(facts)}"
     probably = "" if facts.is_sure else "probably "
+    names = _list_names([label_effect(each) for each in facts.claimed])
     if all(each["name"] == _FORM for each in facts.claimed):
         return f"The form of the model is {probably}wrong, which explains {extent}."
     if all(each["family"] == _SCALE for each in facts.claimed):
-        return f"A gain or a parameter of the simulation is {probably}wrong, which explains {extent}."
+        return (
+            f"A gain or a parameter of the simulation is {probably}wrong ({names}), which explains {extent}."
+        )
     if len(facts.claimed) == 1:
         others = ", with those that are not claimed," if facts.has_others else ""
-        return f"The simulation {probably}lacks a known effect, which{others} explains {extent}."
+        return f"The simulation {probably}lacks a known effect, {names}, which{others} explains {extent}."
     known = "" if facts.free_forms else "known "
-    return f"The simulation {probably}lacks {known}effects, which explain {extent}."
+    return f"The simulation {probably}lacks {known}effects, {names}, which explain {extent}."
 
 
 def _describe_rest(facts: DiagnosisFacts) -> str:
@@ -476,30 +519,44 @@ def _describe_confidence(effect: Document) -> str:
 
 
 def _describe_share(facts: DiagnosisFacts, cause: Document) -> str:
+    """State how much larger the error is without a cause."""
     share = f", {floor(100 * cause['eta'])} %"
     if cause["family"] == _GROSS:
         return f"{share} of the mean squared error" if facts.removes_error else ""
     if cause.get("error_share") is None:  # a document of an earlier version
         together = " by all terms and effects" if cause["family"] == _TERM else ""
         return f"{share} of the misfit above the noise floor{together}"
-    return "" if cause["family"] == _TERM else f", explains {_write_shares(facts, cause, 'it')}"
+    return "" if cause["family"] == _TERM else f"; without it, the RMSE is {_compare_errors(cause)}"
 
 
-def _write_shares(facts: DiagnosisFacts, cause: Document, left_out: str) -> str:
-    """Write the explained share of the mean squared error, and the share of the noise in it.
+def _compare_errors(cause: Document) -> str:
+    """Compare the error without a cause, after another calibration, with that of the extended simulation."""
+    left = 1.0 - cause["error_share"]
+    if left <= 0.0 or cause["error_share"] <= 0.0:
+        return "much larger" if left <= 0.0 else "not larger"
+    ratio = sqrt(1.0 / left)
+    return f"{ratio:.3g} times as large" if ratio >= _TIMES else f"{100 * (ratio - 1.0):.2g} % larger"
 
-    The reference of a share is the error without the causes that it belongs to.
-    """
-    share = f"{floor(1000 * cause['error_share']) / 10:g} % of the mean squared error without {left_out}"
-    limit = "" if facts.is_measured else "at most "
-    return f"{share} (noise: {limit}{100 * cause['noise_share']:.2g} %)"
+
+def label_effect(effect: Document) -> str:
+    """Name an effect with the state or the parameter that it acts on."""
+    return f"{effect['name']} of {place}" if (place := effect.get("place")) else str(effect["name"])
+
+
+def _list_names(names: Sequence[str]) -> str:
+    """Write names as a list: ``A, B and C``."""
+    names = list(dict.fromkeys(names))
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def _name_values(facts: DiagnosisFacts, effect: Document) -> str:
-    values = ", ".join(
-        f"{name} = {write_value(each, facts.is_exact)}" for name, each in effect["parameters"].items()
-    )
-    name = f"{effect['name']} {effect['term']}" if effect.get("term") else str(effect["name"])
+    prefix = f"{effect['name']}:{effect.get('place')}"
+    named = [
+        (name.removeprefix(prefix).lstrip(), write_value(each, facts.is_exact))
+        for name, each in effect["parameters"].items()
+    ]
+    values = ", ".join(f"{name} = {value}" if name else value for name, value in named)
+    name = f"{effect['name']} {effect['term']}" if effect.get("term") else label_effect(effect)
     if law := effect.get("resembles"):
         article = "an" if law["law"].startswith("a") else "a"
         return f"{name}, which resembles {article} {law['law']}: {law['formula']}; {values}"
@@ -551,6 +608,34 @@ def _describe_growth(facts: DiagnosisFacts) -> str:
     )
 
 
+def _describe_small_delay(facts: DiagnosisFacts) -> str:
+    dt = facts.document["record"]["dt"]
+    return (
+        f"The delay is {facts.small_delay / dt:.2g} times the sampling time of {write_amount(dt, 's')}: time "
+        "stamps, the order in which input and output are recorded, or the course of the input between two "
+        "samples may be its cause, rather than a dead time of the machine."
+    )
+
+
+def _describe_correlation(facts: DiagnosisFacts) -> str:
+    assert facts.noise_claim is not None
+    seconds = write_amount(float(f"{facts.noise_claim['correlation_time']:.2g}"), "s")
+    return (
+        f"What remains is correlated over {seconds}. If the sensor has no such noise, look for a "
+        "disturbance, an input that is not recorded, or dynamics that the simulation lacks."
+    )
+
+
+def _describe_recordings(facts: DiagnosisFacts) -> str:
+    assert facts.held_out_recordings is not None
+    record, (fitted, held_out) = facts.document["record"], facts.held_out_recordings
+    begin = write_amount(record["start"] + facts.document["estimation_samples"] * record["dt"], "s")
+    return (
+        f"Fitted to {_list_names(fitted)}; {facts.held_out_part}: {_list_names(held_out)}, in the figures "
+        f"from {begin} on."
+    )
+
+
 def _describe_second_input(facts: DiagnosisFacts) -> str:
     name, first = facts.second_inputs[0], facts.document["record"]["names"]["inputs"][0]
     return f"The input {name} acts on the system where {first} does, and the simulation does not read it."
@@ -587,7 +672,7 @@ def _describe_equations(facts: DiagnosisFacts) -> str:
 
 
 def _describe_extended_simulation(facts: DiagnosisFacts) -> str:
-    names = " and ".join(dict.fromkeys(each["name"] for each in facts.causes))
+    names = _list_names([label_effect(each) for each in facts.causes])
     calibrated = f"; {facts.calibrated}" if facts.calibrated else ""
     return f"Extended simulation: {facts.document['equations']}{calibrated}; with {names}."
 
@@ -600,7 +685,7 @@ def _describe_nearest_to_terms(facts: DiagnosisFacts) -> str:
 
 
 def _describe_nearest(facts: DiagnosisFacts) -> str:
-    listed = ", ".join(f"{each['name']} (score {each['score']:.1f})" for each in facts.nearest)
+    listed = ", ".join(f"{label_effect(each)} (score {each['score']:.1f})" for each in facts.nearest)
     return f"Nearest effects, none of which is confirmed (score: decrease of the BIC): {listed}."
 
 
@@ -644,17 +729,21 @@ def _describe_exchange(facts: DiagnosisFacts) -> str:
         else f"does not fall significantly: {before} without them, {after} with them"
     )
     text += f"the RMSE of the data that were used for estimation {falls}."
-    listed = "; ".join(
-        f"{each['name']} = {each['estimation']:.3g} and {each['validation']:.3g} {each['unit']}".rstrip()
-        for each in values
-        if not each["agrees"]
+    listed, different = (
+        "; ".join(
+            f"{each['name']} = {each['estimation']:.3g} and {each['validation']:.3g} {each['unit']}".rstrip()
+            for each in values
+            if not (each["agrees"] and chosen)
+        )
+        for chosen in (False, True)
     )
-    if listed:
+    if different:
         return (
-            f"{text} Both parts have different values: {listed}. The system differs between them, or the "
+            f"{text} Both parts have different values: {different}. The system differs between them, or the "
             "cause is another one."
         )
-    return f"{text} Both parts have the same values, within 10 % or four standard deviations."
+    compared = f" ({listed})" if listed else ""
+    return f"{text} Both parts have the same values{compared}, within 10 % or four standard deviations."
 
 
 def name_reference(document: Document) -> str:
@@ -691,15 +780,15 @@ def compare_with_output(facts: DiagnosisFacts) -> str | None:
 
 
 def _describe_noise_floor(facts: DiagnosisFacts) -> str:
-    bound = "" if facts.is_measured else "an upper bound of "
+    bound = "" if facts.is_measured else "at most "
     origin = (
         ", measured from repeated periods"
         if facts.is_measured
         else " (an input that repeats three times would measure it)"
     )
     return (
-        f"The noise floor is {facts.write_error(facts.floor)}, {bound}the RMSE that no simulation is "
-        f"expected to undercut{origin}{_compare_with_floor(facts)}."
+        f"The noise floor, the RMSE of the noise alone, is {bound}{facts.write_error(facts.floor)}{origin}"
+        f"{_compare_with_floor(facts)}."
     )
 
 
@@ -811,18 +900,25 @@ VERDICTS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
 #: Noise, record, errors, and next steps.
 DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
-        "shares",
-        lambda facts: facts.has_several_shares,
-        lambda _: (
-            "Each share is that of the error with all effects but this one, so that the shares do not add up."
-        ),
+        "comparisons",
+        lambda facts: facts.has_several_comparisons,
+        lambda _: "Errors without an effect are those of another calibration, with all others.",
     ),
     Statement(
         "coordinate", lambda facts: facts.coordinate, lambda facts: f"In the formulas, {facts.coordinate}."
     ),
+    Statement("small-delay", lambda facts: facts.small_delay, _describe_small_delay),
     Statement("input-limits", lambda facts: facts.input_limits, _describe_input_limits),
     Statement("second-input", lambda facts: facts.second_inputs, _describe_second_input),
     Statement("noise", lambda facts: facts.noise, _describe_noise),
+    Statement(
+        "correlation",
+        lambda facts: (
+            facts.is_coloured and _has("named", "named with remainder", "discovered", "family")(facts)
+        ),
+        _describe_correlation,
+    ),
+    Statement("recordings", lambda facts: facts.held_out_recordings, _describe_recordings),
     Statement("record", lambda facts: facts.document.get("record_findings"), _describe_record),
     Statement(
         "reading",
@@ -835,11 +931,9 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda _: "No effect was searched for: diagnose the corrected record.",
     ),
     Statement(
-        "terms-share",
+        "without-terms",
         lambda facts: facts.terms and facts.terms[0].get("error_share") is not None,
-        lambda facts: (
-            f"All terms and effects together explain {_write_shares(facts, facts.terms[0], 'them')}."
-        ),
+        lambda facts: f"Without all terms and effects, the RMSE is {_compare_errors(facts.terms[0])}.",
     ),
     Statement("equations", lambda facts: facts.discovered is not None, _describe_equations),
     Statement(
@@ -877,6 +971,15 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     ),
     Statement("gain", lambda facts: facts.gain is not None, _describe_gain),
     Statement("exchange", lambda facts: facts.document.get("exchange"), _describe_exchange),
+    Statement(
+        "calibration",
+        lambda facts: facts.is_worse_calibrated,
+        lambda facts: (
+            "Before the calibration, the RMSE there is "
+            f"{facts.write_error(facts.document['as_given_rmse'])}, less than after it: the values that fit "
+            "the other samples best replace what the simulation lacks, and do not carry over."
+        ),
+    ),
     Statement(
         "time-dependent",
         lambda facts: facts.gain is not None and facts.time_dependent,

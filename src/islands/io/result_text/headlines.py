@@ -98,13 +98,11 @@ def write_diagnosis_headline(document: Document) -> str:
             f"Error: {_percent(errors['before'])} of the standard deviation of the output with the record as "
             f"given, {_percent(errors['after'])} with the record corrected."
         )
-    if facts.gain is not None and facts.gain["before"]["mape"] is not None:
-        before, after = facts.gain["before"]["mape"], facts.gain["after"]["mape"]
-        return (
-            f"Mean absolute error on {facts.held_out_part}: {before:.3g} % of the output range without the "
-            f"effects, {after:.3g} % with them."
-        )
     compared = compare_with_output(facts)
+    if facts.gain is not None:
+        before, after = map(facts.write_error, facts.errors)
+        part = "" if compared is None else f", {compared}"
+        return f"RMSE on {facts.held_out_part}: {before} without the effects, {after} with them{part}."
     return "" if compared is None else f"Error on {facts.held_out_part}: {compared}."
 
 

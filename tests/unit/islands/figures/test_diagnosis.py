@@ -33,7 +33,7 @@ def diagnosis(friction: float = 0.3, levels: int = 0, samples: int = 900):
 
 @cache
 def residual_figure():
-    """Return the figure of the residual before and after."""
+    """Return the figure of the residuals of the simulation and of the extended one."""
     return draw_residual(diagnosis())
 
 
@@ -50,14 +50,14 @@ def test_residual_figure_has_a_panel_per_signal() -> None:
         "u (V)",
         "u (V)",
         "rate of the input (V/s)",
-        "simulated output (um)",
+        "output of the best simulation (um)",
         "frequency (Hz)",
-        "lag (samples)",
+        "lag (s); shaded: white noise",
     ]
     # Both residuals are drawn, and all values are finite.
     for panel in axes:
         coloured = {line.get_color() for line in panel.lines}
-        assert {"#c56fa0", "#0072b2"} <= coloured
+        assert {"#c56fa0", "#d55e00"} <= coloured
         assert all(np.isfinite(line.get_xydata()).all() for line in panel.lines)
 
 
@@ -72,7 +72,7 @@ def divide(samples: int, boundary: int):
 @pytest.mark.ci
 def test_lines_are_interrupted_between_recordings() -> None:
     divided = divide(900, 600)
-    for name, panels in (("over-time", 2), ("loops", 2)):
+    for name, panels in (("over-time", 3), ("loops", 2)):
         axes = DIAGNOSIS_FIGURES[name](divided).axes
         assert len(axes) == panels
         for line in [line for panel in axes for line in panel.lines if len(line.get_xdata()) > 2]:
@@ -106,7 +106,7 @@ def test_dry_friction_separates_the_directions_only_before_extension() -> None:
         if len(line.get_ydata()) > 2
     }
     before = mean["#c56fa0", "-"] - mean["#c56fa0", "--"]
-    after = mean["#0072b2", "-"] - mean["#0072b2", "--"]
+    after = mean["#d55e00", "-"] - mean["#d55e00", "--"]
     assert before == pytest.approx(-0.6, abs=0.05)
     assert after == pytest.approx(0.0, abs=0.05)
 
@@ -131,9 +131,9 @@ def test_input_with_few_levels_has_no_empty_cells() -> None:
 def test_long_record_is_shown_completely_and_in_a_section() -> None:
     shown = figures_of_long_record()["over-time"].axes
     whole, part = (np.ptp(shown[place].get_xlim()) for place in (0, 2))
-    assert len(shown) == 4
+    assert len(shown) == 5
     assert part < whole / 4
-    assert len(DIAGNOSIS_FIGURES["over-time"](diagnosis()).axes) == 2
+    assert len(DIAGNOSIS_FIGURES["over-time"](diagnosis()).axes) == 3
 
 
 def test_diagnosis_without_effects_has_no_lines_after_extension() -> None:
@@ -141,7 +141,7 @@ def test_diagnosis_without_effects_has_no_lines_after_extension() -> None:
     assert clean.best is clean.base
     for draw in DIAGNOSIS_FIGURES.values():
         texts = {text.get_text() for panel in draw(clean).axes for text in _legend(panel)}
-        assert not texts & {"before", "after", "extended"}
+        assert not texts & {"extended"}
 
 
 def test_screening_figure_colours_the_named_effects() -> None:

@@ -4,14 +4,17 @@ import { getJobPath, getJson } from "../../lib/api.js";
 import { el } from "../../lib/dom.js";
 import { HINT, makeSignalPlot } from "../signal_plot.js";
 
-/** Colours of the simulated outputs, and names of their residuals: before and after the extension. */
-const [COLOURS, RESIDUALS] = [["before", "accent"], ["residual before", "residual after"]];
+/** Colours of the simulated outputs and of their residuals. */
+const COLOURS = ["before", "accent"];
+
+/** Return the name of the residual of a simulated output. */
+const nameResidual = (output) => `residual ${output}`;
 
 /** Return the function that requests the outputs of a job for a plot. */
 const askOutputs = (job, signal) => async (query) => {
   const path = `${getJobPath(job)}/outputs?${query}`;
   const { outputs, residuals, ...part } = await getJson(path, { signal });
-  const named = residuals.map((each, at) => ({ ...each, name: RESIDUALS[at] }));
+  const named = residuals.map((each) => ({ ...each, name: nameResidual(each.name) }));
   return { ...part, columns: [...outputs, ...named] };
 };
 
@@ -26,7 +29,7 @@ export function makeOutputsPlot(job, { record, verdict, gain, estimation_samples
   const names = gain === null ? ["simulated"] : ["simulated", after];
   const makeLine = (name, at) => ({ name, unit: record.units.output, colour: COLOURS[at] ?? "ink" });
   const simulated = names.map(makeLine);
-  const residuals = names.map((_name, at) => makeLine(RESIDUALS[at], at));
+  const residuals = names.map((name, at) => makeLine(nameResidual(name), at));
   // The plot has no width before the page contains it.
   requestAnimationFrame(() => plot.show([[makeLine("measured"), ...simulated], residuals]));
   const all = el("button", { type: "button", class: "quiet", on: { click: plot.showAll } }, "Show all rows");

@@ -104,9 +104,7 @@ def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize(
-    "name", ["uneven", "radiation", pytest.param("limit", marks=pytest.mark.nightly)]
-)
+@pytest.mark.parametrize("name", ["uneven", "radiation", pytest.param("limit", marks=pytest.mark.nightly)])
 def test_extension_holds_for_another_record(name: str) -> None:
     record, found = find(name)
     spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))

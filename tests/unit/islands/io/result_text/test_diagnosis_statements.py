@@ -97,13 +97,15 @@ def test_a_cause_that_others_exceed_is_uncertain():
 @pytest.mark.parametrize(("confidence", "said"), [(0.5, "probably lacks"), (0.9, "lacks")])
 def test_a_cause_next_to_other_probable_ones_is_called_probable(confidence, said):
     causes = [CAUSE, {**CAUSE, "name": "jump", "confidence": confidence}]
-    assert text("named", effects=causes, gain=GAIN).startswith(f"The simulation {said} known effects, which")
+    assert text("named", effects=causes, gain=GAIN).startswith(
+        f"The simulation {said} known effects, delay and"
+    )
     assert text("named", effects=causes[1:], gain=GAIN).startswith(
-        f"The simulation {said} a known effect, which"
+        f"The simulation {said} a known effect, jump, which"
     )
 
 
-def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
+def test_a_claimed_cause_is_explained_with_the_error_without_it():
     explained = {
         **CAUSE,
         "error_share": 0.9876,
@@ -112,12 +114,11 @@ def test_a_claimed_cause_is_explained_with_its_share_of_the_whole_error():
         "distinguished_by": "a phase that grows with the frequency",
         "occurs_in": "sampling and communication",
     }
-    bound = text("named", effects=[explained], gain=GAIN)
-    share = "explains 98.7 % of the mean squared error without it"
-    assert f"{share} (noise: at most 0.49 %). The input acts later" in bound
-    assert "Distinguished by: a phase that grows with the frequency. Occurs in: sampling" in bound
-    measured = text("named", effects=[explained], gain=GAIN, noise_floor_is="measured by repeated periods")
-    assert f"{share} (noise: 0.49 %)" in measured
+    said = text("named", effects=[explained], gain=GAIN)
+    assert "without it, the RMSE is 8.98 times as large. The input acts later" in said
+    assert "Distinguished by: a phase that grows with the frequency. Occurs in: sampling" in said
+    small = {**explained, "error_share": 0.06}
+    assert "without it, the RMSE is 3.1 % larger. The input" in text("named", effects=[small], gain=GAIN)
     assert "Occurs in" not in text("named", effects=[{**explained, "claimed": False}], gain=GAIN)
     # Gains and parameters look alike: nothing in the record distinguishes them.
     assert "Distinguished by" not in text("named", effects=[{**explained, "family": "scale"}], gain=GAIN)
@@ -135,6 +136,62 @@ def test_the_extended_simulation_is_stated_with_its_values():
     found = text("discovered", effects=[term], gain=GAIN, calibrated={**states, "a1": 4.0})
     assert "Calibrated with them: k = 2." in found
     assert "Extended simulation" not in text("unknown", equations="dx/dt = u - k*x", calibrated={"k": 2.0})
+
+
+def test_effects_of_states_are_named_with_the_state():
+    first, second = "input-offset:upper", "state-clip:lower"
+    causes = [
+        {**CAUSE, "name": "input-offset", "place": "upper", "parameters": {first: _value(2.0, "V")}},
+        {**CAUSE, "name": "state-clip", "place": "lower", "parameters": {}},
+    ]
+    causes[1]["parameters"] = {second: _value(7.0, "V"), f"{second} caught": _value(0.5, "")}
+    said = text("named", effects=causes, gain=GAIN)
+    assert said.startswith(
+        "The simulation lacks known effects, input-offset of upper and state-clip of lower,"
+    )
+    assert "input-offset of upper: 2 V; confidence" in said
+    assert "state-clip of lower: 7 V, caught = 0.5; confidence" in said
+
+
+@pytest.mark.parametrize(("delay", "stated"), [(-0.0002, True), (0.014, True), (0.03, False)])
+def test_a_delay_of_a_sample_may_be_that_of_the_recording(delay, stated):
+    said = text("named", effects=[{**CAUSE, "parameters": {"tau": _value(delay, "s")}}], gain=GAIN)
+    assert ("the order in which input and output are recorded" in said) == stated
+
+
+def test_recordings_are_named_with_their_part():
+    record = make_document("named")["record"] | {"start": 0.0, "segments": [100, 50, 50]}
+    record["recordings"] = ["a.csv", "b.csv", "c.csv"]
+    held_out = {"held_out_part": "the 2 validation recordings", "estimation_samples": 100}
+    said = text("named", effects=[CAUSE], gain=GAIN, record=record, **held_out)
+    assert (
+        "Fitted to a.csv; the 2 validation recordings: b.csv and c.csv, in the figures from 1 s on." in said
+    )
+    one = text("named", effects=[CAUSE], gain=GAIN, record=record, estimation_samples=150 - 1)
+    assert "Fitted to" not in one
+
+
+def test_a_calibration_that_does_not_carry_over_is_stated():
+    values = {"calibrated": {"k": 2.0}, "effects": [CAUSE], "gain": GAIN}
+    assert "do not carry over" in text("named", **values, as_given_rmse=0.1)
+    assert "do not carry over" not in text("named", **values, as_given_rmse=0.199)
+
+
+def test_a_coloured_remainder_is_a_disturbance_or_dynamics():
+    noise = {**CAUSE, "name": "coloured-noise", "eta": None}
+    said = text("named", effects=[CAUSE, noise], gain=GAIN)
+    assert "What remains is correlated over 0.32 s. If the sensor has no such noise" in said
+    assert "is correlated over" not in text("nothing", effects=[noise])
+
+
+def test_values_of_both_parts_are_compared():
+    value = {"name": "delay tau", "unit": "s", "estimation": 0.03, "validation": 0.031, "agrees": True}
+    exchange = {"gain": GAIN, "values": [value]}
+    said = text("named", effects=[CAUSE], gain=GAIN, exchange=exchange)
+    assert "Both parts have the same values (delay tau = 0.03 and 0.031 s), within 10 %" in said
+    exchange["values"] = [value, {**value, "name": "jump", "agrees": False}]
+    said = text("named", effects=[CAUSE], gain=GAIN, exchange=exchange)
+    assert "Both parts have different values: jump = 0.03 and 0.031 s." in said
 
 
 def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
@@ -200,14 +257,13 @@ def test_terms_are_named_with_their_equations_and_share_one_part_of_the_error():
     ]
     said = text("discovered", effects=terms, gain=GAIN)
     assert "missing-term a1*u in output; confidence 0.98\n" in said
-    assert said.count("of the mean squared error") == 1
-    assert "All terms and effects together explain 98 % of the mean squared error without them" in said
+    assert said.count("Without all terms and effects, the RMSE is 7.07 times as large.") == 1
     # The share of an effect is that of another error, and may exceed the share of all causes together.
     effect = {**CAUSE, "error_share": 0.99, "noise_share": 0.01}
     both = text("discovered", effects=[*terms, effect], gain=GAIN)
-    assert "explains 99 % of the mean squared error without it" in both
-    assert "so that the shares do not add up." in both
-    assert "do not add up" not in said
+    assert "without it, the RMSE is 10 times as large" in both
+    assert "Errors without an effect are those of another calibration" in both
+    assert "another calibration" not in said
 
 
 def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
@@ -221,11 +277,11 @@ def test_agreement_is_stated_with_its_error_and_contradicted_by_a_large_one():
 def test_the_noise_floor_is_defined_and_says_how_it_is_measured():
     bound = text("nothing")
     assert (
-        "The noise floor is 0.01 um, an upper bound of the RMSE that no simulation is expected to undercut "
-        "(an input that repeats three times would measure it); the RMSE is" in bound
+        "The noise floor, the RMSE of the noise alone, is at most 0.01 um (an input that repeats three times "
+        "would measure it); the RMSE is" in bound
     )
     measured = text("nothing", noise_floor_is="measured by repeated periods")
-    assert "expected to undercut, measured from repeated periods; the RMSE is" in measured
+    assert "is 0.01 um, measured from repeated periods; the RMSE is" in measured
 
 
 def test_the_stated_noise_is_compared_with_the_error_once():
@@ -262,7 +318,7 @@ def test_properties_of_the_noise_are_no_causes():
     verdict, cause, *details = describe_diagnosis(make_document("named", effects=[CAUSE, noise], gain=GAIN))
     assert cause.startswith("  delay: ")
     assert "Sampling and noise: outliers: size = 0.1, confidence 0.98." in details
-    assert "a known effect," in verdict
+    assert "a known effect, delay," in verdict
 
 
 def test_wrong_values_and_forms_are_no_effects_that_a_simulation_lacks():
@@ -331,8 +387,8 @@ def test_an_effect_that_is_not_claimed_shares_the_gain():
     causes = [CAUSE, {**CAUSE, "name": "jump", "claimed": False}]
     said = text("named with remainder", effects=causes, gain=GAIN, remainder={"input": 5.0})
     assert said.startswith(
-        "The simulation lacks a known effect, which, with those that are not claimed, explains most of the "
-        "discrepancy; significant structure remains."
+        "The simulation lacks a known effect, delay, which, with those that are not claimed, explains most "
+        "of the discrepancy; significant structure remains."
     )
 
 
@@ -367,10 +423,10 @@ def test_contradictions_are_found():
         "The simulation lacks a known effect, confidence 0.31, 99 % of the misfit above the noise floor"
     )
     assert find_contradictions(
-        "The simulation lacks a known effect, confidence 0.31, explains 99 % of the mean squared error "
-        "without it (noise: 1 %)"
+        "The simulation lacks a known effect, confidence 0.31; without it, the RMSE is 10 times as large"
     )
-    assert find_contradictions("The noise floor is 0.2 um, noise floor (upper bound) 0.3")
+    floor = "The noise floor, the RMSE of the noise alone, is"
+    assert find_contradictions(f"{floor} 0.2 um, noise floor (upper bound) 0.3")
 
 
 def _value(value, unit):

@@ -54,6 +54,7 @@ def test_headline_of_several_outputs_states_every_error():
 def diagnosis(verdict: str = "named", **changes: Any) -> dict[str, Any]:
     gain = {"before": {"rmse": 2.0, "mape": 5.05}, "after": {"rmse": 0.5, "mape": 1.2}}
     found = {"verdict": verdict, "gain": gain, "noise_floor_rmse": 0.1, "held_out_part": "the last quarter"}
+    found["record"] = {"units": {"output": "um"}}
     return {**found, "output_std": 4.0, "calibrated_rmse": 1.0, **changes}
 
 
@@ -63,8 +64,8 @@ def diagnosis(verdict: str = "named", **changes: Any) -> dict[str, Any]:
         (
             diagnosis(),
             (
-                "Mean absolute error on the last quarter: 5.05 % of the output range without the effects, "
-                "1.2 % with them."
+                "RMSE on the last quarter: 2 um without the effects, 0.5 um with them, 12 % of the standard "
+                "deviation of the output."
             ),
         ),
         (
@@ -82,5 +83,5 @@ def diagnosis(verdict: str = "named", **changes: Any) -> dict[str, Any]:
         (diagnosis("gross error", record_findings=[{"errors": None}]), ""),
     ],
 )
-def test_diagnosis_headline_states_the_errors_in_per_cent(document, expected):
+def test_diagnosis_headline_states_the_errors(document, expected):
     assert write_diagnosis_headline(document) == expected
