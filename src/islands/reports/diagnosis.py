@@ -3,6 +3,8 @@
 from functools import partial
 from math import floor
 
+import numpy as np
+
 from islands.data.loops import has_loops
 from islands.diagnosis.detectability import NOTHING, SelfTest
 from islands.diagnosis.documents.result_json import diagnosis_document
@@ -10,6 +12,7 @@ from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.finding import list_free_forms
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
+from islands.effects.interface.context import Signal
 from islands.io.result_text.diagnosis_statements import (
     describe_causes,
     describe_details,
@@ -73,10 +76,15 @@ def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
     ]
 
 
+def _varies_smoothly(u: Signal) -> bool:
+    """Return whether an input changes in most samples; one that is held gives rectangles over itself."""
+    return bool(2 * np.count_nonzero(np.diff(u)) > u.size)
+
+
 def _list_figures(found: Diagnosis) -> list[str]:
     """Return the names of the figures that a diagnosis has, in the order of the report."""
     has = {
-        "loops": has_loops(found.record),
+        "loops": has_loops(found.record) and _varies_smoothly(found.record.u[:, 0]),
         "shape": found.shape is not None,
         "free-forms": bool(list_free_forms(found.effects)),
         "ladder": bool(found.candidates),

@@ -30,15 +30,20 @@ def describe_next_experiment(experiment: NextExperiment) -> dict[str, Any]:
 
 
 def write_advice(experiment: NextExperiment) -> str:
-    """Describe the next experiment in words: its input, and the separation of each pair."""
-    open_pairs = [each for each in experiment.pairs if not _is_separated(each)]
-    pairs = "; ".join(map(_write_pair, open_pairs or experiment.pairs))
+    """Describe the next experiment in words: its input, and the separation of each pair.
+
+    The text is empty if the record separates all pairs already: their causes have similar scores since both
+    imitate another one.
+    """
+    pairs = "; ".join(_write_pair(each) for each in experiment.pairs if not _is_separated(each))
+    if not pairs:
+        return ""
     return pairs if experiment.input is None else f"{_write_input(experiment.input)}: {pairs}"
 
 
 def _is_separated(pair: SeparatedPair) -> bool:
     """Return whether the record separates the causes, although their scores are similar."""
-    return pair.recorded is not None and pair.recorded.distance >= pair.recorded.required
+    return pair.recorded is not None and pair.recorded.sufficiency >= 1.0
 
 
 def _describe_pair(pair: SeparatedPair) -> dict[str, Any]:

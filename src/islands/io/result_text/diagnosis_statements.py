@@ -36,6 +36,9 @@ _LARGE_NOISE, _LARGE_COLOURED_NOISE = 0.3, 0.1
 #: Error as a fraction of the standard deviation of the output that is a rounding error.
 _ROUNDING = 1e-6
 
+#: Correlation time of the residual in samples from which on it is stated.
+_CORRELATED = 10
+
 #: Relative change of the error by the calibration that is stated.
 _CALIBRATED = 0.05
 
@@ -188,6 +191,16 @@ class DiagnosisFacts:
         return bool(given < (1.0 - _CALIBRATED) * self.calibrated_rmse)
 
     @property
+    def separated_pairs(self) -> list[str]:
+        """Pairs of causes with similar scores that the record would separate if one of them were right."""
+        pairs = (self.document.get("next_experiment") or {}).get("pairs", ())
+        return [
+            " or ".join(each["causes"])
+            for each in pairs
+            if each["recorded"] is not None and each["recorded"]["is_sufficient"]
+        ]
+
+    @property
     def grows(self) -> bool:
         """Whether an error that may be noise is larger on the held-out data than in the samples before."""
         if self.noise_claim is None or self.error is None:
@@ -299,6 +312,12 @@ class DiagnosisFacts:
     def is_noise(self) -> bool:
         """Whether the error of the held-out data is at most that of the noise."""
         return self.noise_ratio is not None and self.noise_ratio <= _NOISE_RATIO
+
+    @property
+    def is_correlated(self) -> bool:
+        """Whether the noise is coloured over more than a few samples."""
+        least = _CORRELATED * float(self.document["record"].get("dt", 0.0))
+        return self.is_coloured and (self.noise_claim or {}).get("correlation_time", 0.0) > least
 
     @property
     def is_coloured(self) -> bool:
@@ -914,7 +933,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "correlation",
         lambda facts: (
-            facts.is_coloured and _has("named", "named with remainder", "discovered", "family")(facts)
+            facts.is_correlated and _has("named", "named with remainder", "discovered", "family")(facts)
         ),
         _describe_correlation,
     ),
@@ -1032,6 +1051,14 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.document["decisive_experiment"],
         lambda facts: (
             f"Suggested experiment to separate confounded effects: {facts.document['decisive_experiment']}."
+        ),
+    ),
+    Statement(
+        "separated",
+        lambda facts: facts.separated_pairs,
+        lambda facts: (
+            f"If {'; '.join(dict.fromkeys(facts.separated_pairs))} were the cause, this record would tell "
+            "them apart: both may imitate another one."
         ),
     ),
     Statement(

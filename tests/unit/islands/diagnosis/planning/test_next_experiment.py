@@ -70,7 +70,14 @@ def test_a_record_with_a_fast_part_needs_no_input_beyond_it() -> None:
     experiment = designed(u)
     assert experiment.input is not None
     assert experiment.input.is_within
-    assert "within the range and the rate of the record" in write_advice(experiment)
+    (pair,) = experiment.pairs
+    assert pair.recorded is not None
+    # The record itself separates the causes.
+    assert pair.recorded.sufficiency >= 1.0
+    assert not write_advice(experiment)
+    slow = replace(pair, recorded=replace(pair.recorded, distance=0.0))
+    advice = write_advice(replace(experiment, pairs=(slow,)))
+    assert "within the range and the rate of the record" in advice
 
 
 def test_equal_arguments_give_the_same_samples() -> None:

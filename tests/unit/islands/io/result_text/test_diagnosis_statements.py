@@ -182,6 +182,18 @@ def test_a_coloured_remainder_is_a_disturbance_or_dynamics():
     said = text("named", effects=[CAUSE, noise], gain=GAIN)
     assert "What remains is correlated over 0.32 s. If the sensor has no such noise" in said
     assert "is correlated over" not in text("nothing", effects=[noise])
+    short = {"rms": 0.0123, "correlation_time": 0.02, "noise_level": None}
+    assert "is correlated over" not in text("named", effects=[CAUSE, noise], gain=GAIN, noise_claim=short)
+
+
+def test_causes_that_the_record_would_separate_may_imitate_another_one():
+    pair = {"causes": ["delay", "jump"], "recorded": {"is_sufficient": True}}
+    said = text("named", effects=[CAUSE], gain=GAIN, next_experiment={"pairs": [pair]})
+    assert "If delay or jump were the cause, this record would tell them apart" in said
+    pair["recorded"]["is_sufficient"] = False
+    assert "tell them apart" not in text(
+        "named", effects=[CAUSE], gain=GAIN, next_experiment={"pairs": [pair]}
+    )
 
 
 def test_values_of_both_parts_are_compared():
