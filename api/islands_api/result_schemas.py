@@ -91,6 +91,9 @@ class DiscrepancyResult(ResponseModel):
     )
     candidates: tuple[dict[str, Any], ...] = Field(description="All screened effects, the best first.")
     calibrated: dict[str, float] = Field(description="Values of the parameters of the simulation.")
+    values: tuple[dict[str, Any], ...] = Field(
+        default=(), description="The same with units and intervals, before and after the calibration."
+    )
     record_findings: tuple[dict[str, Any], ...] = Field(default=(), description="Findings about the record.")
     left_out: tuple[str, ...] = Field(default=(), description="Steps that a cancelled diagnosis left out.")
 

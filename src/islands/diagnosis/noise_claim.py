@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from islands.diagnosis.calibrated_values import list_calibrated_values
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.coloured_remainder import limit_confidences
@@ -55,7 +56,7 @@ def complete_findings(
     noise_level: float | None,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    """Return a diagnosis with all findings about its record, and with the claim about its residual.
+    """Return a diagnosis with all findings about its record, its values, and the claim about its residual.
 
     Parameters
     ----------
@@ -70,7 +71,11 @@ def complete_findings(
     """
     closed_loop = find_closed_loop(fit, target, found.record.input_names[0])
     found = limit_confidences(judge_noise(found, target, noise_level, rng), target)
-    return replace(found, record_findings=(*record_findings, *closed_loop, *found.record_findings))
+    return replace(
+        found,
+        values=list_calibrated_values(found, target),
+        record_findings=(*record_findings, *closed_loop, *found.record_findings),
+    )
 
 
 def judge_noise(

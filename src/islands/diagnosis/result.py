@@ -10,7 +10,7 @@ from islands.diagnosis.discovery.missing_terms import Discovery
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.diagnosis.inference.exchanged_parts import ExchangedParts
 from islands.diagnosis.inference.extension_trial import ExtensionTrial
-from islands.diagnosis.inference.finding import Finding
+from islands.diagnosis.inference.finding import Finding, Value
 from islands.diagnosis.inference.holdout import HoldoutGain
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.planning.next_experiment import NextExperiment
@@ -57,6 +57,27 @@ class NoiseClaim:
     noise_level: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class CalibratedValue:
+    """A parameter of the simulation.
+
+    Attributes
+    ----------
+    name : str
+    before : float
+        Value before the calibration: the given one, or an estimate.
+    alone : float or None
+        Value calibrated without effects; None if the simulation without them has no such parameter.
+    estimate : Value
+        Value of the best simulation, with its interval.
+    """
+
+    name: str
+    before: float
+    alone: float | None
+    estimate: Value
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
     """Result of a diagnosis.
@@ -101,6 +122,8 @@ class Diagnosis:
         Trial of the extended simulation beyond the record; None if no effect was added to it.
     exchange : ExchangedParts or None
         The extended simulation fitted to the hold-out recordings; None if there are none.
+    values : tuple of CalibratedValue
+        Parameters of the simulation, without initial states; empty after a gross error.
     left_out : tuple of str
         Steps that a stopped diagnosis has left out; empty for a complete one.
     """
@@ -124,6 +147,7 @@ class Diagnosis:
     noise_claim: NoiseClaim | None = None
     trial: ExtensionTrial | None = None
     exchange: ExchangedParts | None = None
+    values: tuple[CalibratedValue, ...] = ()
     left_out: tuple[str, ...] = ()
 
     @property

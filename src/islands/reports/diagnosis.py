@@ -19,6 +19,7 @@ from islands.io.result_text.diagnosis_statements import (
     describe_verdict,
     label_effect,
     name_reference,
+    write_value,
 )
 from islands.io.result_text.headlines import write_diagnosis_headline
 from islands.io.result_text.statements import Document
@@ -144,6 +145,19 @@ def _list_candidates(document: Document) -> list[tuple[str, str, str]]:
     ]
 
 
+def _list_values(document: Document) -> list[tuple[str, ...]]:
+    """Return the values of each parameter of the simulation."""
+    return [
+        (
+            each["name"],
+            f"{each['before']:.4g}",
+            "" if each["alone"] is None else f"{each['alone']:.4g}",
+            write_value(each),
+        )
+        for each in document["values"]
+    ]
+
+
 def diagnosis_report(
     origin: Origin,
     found: Diagnosis,
@@ -180,6 +194,7 @@ def diagnosis_report(
         errors=errors,
         error_remark=remark,
         figures=figures,
+        values=_list_values(document),
         candidates=_list_candidates(document),
         record=list_record(document["record"]),
         strengths=STRENGTHS,

@@ -11,10 +11,10 @@ from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.exchanged_parts import ExchangedParts
-from islands.diagnosis.inference.finding import Finding, list_free_forms
+from islands.diagnosis.inference.finding import Finding, Value, list_free_forms
 from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
-from islands.diagnosis.result import Candidate, Diagnosis
+from islands.diagnosis.result import CalibratedValue, Candidate, Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
 from islands.effects.catalogue import find_entry
 from islands.io.result_folder import record_document
@@ -63,6 +63,7 @@ def diagnosis_document(
         else "an upper bound",
         "noise_claim": None if diagnosis.noise_claim is None else asdict(diagnosis.noise_claim),
         "calibrated": _get_calibrated_values(diagnosis),
+        "values": [_describe_value(each) for each in diagnosis.values],
         "equations": diagnosis.best.simulation.simulator.equations,
         **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None or diagnosis.refusal else "extended.json",
@@ -140,14 +141,7 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "occurs_in": "" if entry is None else entry.occurs_in,
         "confidence": finding.confidence,
         "equivalents": list(finding.equivalents),
-        "parameters": {
-            name: {
-                "value": each.value,
-                "unit": each.unit,
-                "ci95": None if each.ci95 is None else list(each.ci95),
-            }
-            for name, each in finding.parameters.items()
-        },
+        "parameters": {name: _describe_estimate(each) for name, each in finding.parameters.items()},
         "score": finding.score,
         "eta": finding.explained_fraction,
         "error_share": finding.error_fraction,
@@ -157,6 +151,20 @@ def _describe_finding(finding: Finding) -> dict[str, Any]:
         "claimed": finding.is_claimed,
         "free_form": bool(list_free_forms([finding])),
         "resembles": None if finding.resembles is None else asdict(finding.resembles),
+    }
+
+
+def _describe_estimate(estimate: Value) -> dict[str, Any]:
+    interval = None if estimate.ci95 is None else list(estimate.ci95)
+    return {"value": estimate.value, "unit": estimate.unit, "ci95": interval}
+
+
+def _describe_value(each: CalibratedValue) -> dict[str, Any]:
+    return {
+        "name": each.name,
+        "before": each.before,
+        "alone": each.alone,
+        **_describe_estimate(each.estimate),
     }
 
 

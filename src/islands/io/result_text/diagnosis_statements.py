@@ -43,7 +43,7 @@ _CORRELATED = 10
 _CALIBRATED = 0.05
 
 #: Digits of the widest value. A narrower interval is that of exact data, or of a value without a response.
-_MOST_DIGITS = 9
+_MOST_DIGITS = 8
 
 #: Confidence whose two digits are 1.00, although no cause is certain.
 _ALMOST_CERTAIN = 0.995
@@ -278,6 +278,8 @@ class DiagnosisFacts:
 
         The initial states are those of the record, and the coefficients of terms are stated with them.
         """
+        if values := self.document.get("values"):
+            return ", ".join(f"{each['name']} = {write_value(each, self.is_exact)}" for each in values)
         coefficients = {name for term in self.terms for name in term["parameters"]}
         return ", ".join(
             f"{name} = {value:.4g}"
@@ -599,7 +601,7 @@ def write_value(given: Document, is_exact: bool = False) -> str:
     low, high = interval
     digits = 4
     if value and low < high:
-        digits = max(4, ceil(log10(abs(value) / (high - low))) + 3)
+        digits = max(4, ceil(log10(abs(value) / (high - low))) + 2)
     if digits > _MOST_DIGITS:
         width = f"+/- {(high - low) / 2:.1g}" if is_exact else "not determined by the record"
         return f"{value:.4g}{unit} ({width})"
@@ -918,6 +920,11 @@ VERDICTS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
 
 #: Noise, record, errors, and next steps.
 DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
+    Statement(
+        "intervals",
+        lambda facts: any(each["ci95"] for cause in facts.causes for each in cause["parameters"].values()),
+        lambda _: "Values in brackets are 95 % intervals.",
+    ),
     Statement(
         "comparisons",
         lambda facts: facts.has_several_comparisons,

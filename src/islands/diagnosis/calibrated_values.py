@@ -1,0 +1,45 @@
+"""Calibrated values of the parameters of a simulation, with their intervals."""
+
+from islands.diagnosis.calibration.levenberg_marquardt import estimate_deviations, whiten_target
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.finding import Value
+from islands.diagnosis.result import CalibratedValue, Diagnosis
+
+
+def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[CalibratedValue, ...]:
+    """Return the values of the best simulation of a diagnosis, without those of its terms and initial states.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    target : Target
+        The record that it explains.
+
+    Returns
+    -------
+    tuple of CalibratedValue
+        Without intervals if the residual is a rounding error.
+    """
+    fit, base = found.best, found.base
+    simulation, part = fit.simulation, fit.simulation.simulator_slice
+    parameters = simulation.parameters[part]
+    if not parameters:
+        return ()
+    is_exact = target.is_matched(fit.output)
+    deviations = None if is_exact else estimate_deviations(fit, whiten_target(target, fit))
+    known = base.simulation.simulator_slice
+    alone = {
+        parameter.name: float(value)
+        for parameter, value in zip(base.simulation.parameters[known], base.values[known], strict=True)
+    }
+    terms = {name for each in found.causes if each.term for name in each.parameters}
+    values = []
+    for place, parameter in enumerate(parameters, part.start):
+        if parameter.initial or parameter.name in terms:
+            continue
+        value = float(fit.values[place])
+        half = None if deviations is None else 1.96 * float(deviations[place])
+        interval = None if half is None else (value - half, value + half)
+        estimate = Value(value, parameter.unit, interval)
+        values.append(CalibratedValue(parameter.name, parameter.nominal, alone.get(parameter.name), estimate))
+    return tuple(values)
