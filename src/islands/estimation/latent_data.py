@@ -170,6 +170,12 @@ class LatentData:
         """Conditions on the parameters, for scaled signals."""
         return self.scales.scale_conditions(self.stated)
 
+    @property
+    def operating_inputs(self) -> tuple[float, ...]:
+        """Inputs about which models are linearised: those of a stated gain, or the means."""
+        stated = (each.inputs for each in self.stated.statics if each.channel)
+        return next(stated, tuple(self.scales.mean.tolist()))
+
     def without_statics(self) -> "LatentData":
         """Return the same data without the static conditions, which a search does not impose."""
         return replace(self, stated=replace(self.stated, statics=()))

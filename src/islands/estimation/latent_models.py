@@ -345,7 +345,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
         units=system.units,
         wiring=wiring,
         memory=memory,
-        operating_inputs=tuple(data.scales.mean.tolist()),
+        operating_inputs=data.operating_inputs,
         limits=data.limits,
         parameters=tuple(value for value in theta.tolist() if value != 0.0),
         input_names=record.input_names,

@@ -154,7 +154,7 @@ class LatentModel(ParametricModel):
     memory : int
         Number of samples from which the initial states of a free run are estimated.
     operating_inputs : tuple of float
-        Inputs of the operating point, as the means of the estimation data.
+        Inputs of the operating point: those of a stated gain, or the means of the estimation data.
     limits : SensorLimits
         Least and greatest output that the sensor shows.
     quantity_errors : tuple of float or None

@@ -38,6 +38,14 @@ def test_every_model_meets_the_constraints_before_and_after_a_refit(result):
 
 
 @pytest.mark.ci
+def test_quantities_are_those_at_the_stated_gain(result):
+    for each in result.models:
+        assert each.model.operating_inputs == (0.0,)
+        gain = each.model.linearise(each.model.rest).static_gains
+        assert gain == pytest.approx([0.564], rel=1e-9)
+
+
+@pytest.mark.ci
 def test_a_saved_result_states_the_constraints(result, tmp_path):
     result.save(tmp_path, figures=())
     saved = islands.load(tmp_path)
@@ -54,7 +62,7 @@ def test_members_of_the_ensemble_meet_the_constraints(result):
     drawn = 0
     for structure in result.search_result.ensemble.structures:
         for parameters in structure.parameters:
-            member = replace(structure.model.with_parameters(parameters.tolist()), operating_inputs=(0.0,))
+            member = structure.model.with_parameters(parameters.tolist())
             assert member.linearise(member.rest).static_gains == pytest.approx([0.564], rel=1e-9)
         drawn += len(structure.parameters)
     assert drawn > 10
