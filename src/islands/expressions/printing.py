@@ -14,7 +14,7 @@ from math import copysign
 from typing import ClassVar, NamedTuple
 
 from islands.errors import ModelError
-from islands.expressions.primitives import LARGEST_EXPONENT
+from islands.expressions.primitives import LARGEST_EXPONENT, NEG
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primitive, Shift, Symbol
 
 #: Largest exponent in text. A larger power is written as a product of powers. The limit prevents untrusted
@@ -76,6 +76,9 @@ class Printer:
 
     #: Format string of brackets.
     brackets: ClassVar[str] = "({})"
+
+    #: Sign of a negative expression.
+    minus: ClassVar[str] = "-"
 
     def write(self, expression: Expression) -> str:
         """Write an expression."""
@@ -319,6 +322,7 @@ class _MathmlPrinter(_ModelPrinter):
         "mul": Operator(TIMES, PRODUCT, ATOM, ATOM),
     }
     brackets = "<mrow><mo>(</mo>{}<mo>)</mo></mrow>"
+    minus = MINUS
 
     def signal(self, channel: int, lag: int) -> str:
         name = self.name(channel)
@@ -357,27 +361,50 @@ class _MathmlPrinter(_ModelPrinter):
         return f"<mrow><mi>{safe}</mi>{_APPLY}{self.brackets.format('<mo>,</mo>'.join(arguments))}</mrow>"
 
 
-class SignalNames:
-    """Names of the signals of a block, and the numbers of its parameters, for printers of equations.
+class SignalNames(_ModelPrinter):
+    """Names of the signals of a block, for printers of equations.
+
+    A negative addend is subtracted: ``u(k-1) - 0.5*y(k-1)``.
 
     Parameters
     ----------
     signals : sequence of str
         Names by channel: ``y``, ``x1``, ``u2``.
-    symbols : mapping
-        Texts of parameters by name; other names are written as they are.
     """
 
-    def __init__(self, signals: Sequence[str], symbols: Mapping[str, str]) -> None:
-        self._signals, self._symbols = signals, symbols
+    def __init__(self, signals: Sequence[str]) -> None:
+        self._signals = signals
+
+    def write(self, expression: Expression) -> str:
+        """Write an equation or a part of it."""
+        return super().write(_take_sign(expression))
+
+    def join(self, operator: Operator, arguments: Sequence[Expression]) -> str:
+        """Write an operator between its operands."""
+        if operator.own != SUM or operator.text != self.operators["add"].text:
+            return super().join(operator, arguments)
+        text = super().join(operator, [_take_sign(each) for each in arguments])
+        return text.replace(f"{operator.text}{self.minus}", self.operators["sub"].text)
+
+    def _write(self, expression: Expression) -> tuple[str, int]:
+        match expression:
+            case Apply(Primitive("neg", is_protected=False), (operand,)):
+                return f"{self.minus}{self.write_operand(operand, QUOTIENT)}", QUOTIENT
+        return super()._write(expression)
 
     def name(self, channel: int) -> str:
         """Return the name of a signal."""
         return self._signals[channel]
 
-    def symbol(self, name: str) -> str:
-        """Write a parameter."""
-        return self._symbols.get(name, name)
+
+def _take_sign(expression: Expression) -> Expression:
+    """Return a negative number, or a product that begins with one, as the negative of a positive one."""
+    match expression:
+        case Constant(number) if number < 0.0:
+            return Apply(NEG, (Constant(-number),))
+        case Apply(Primitive("mul"), (Constant(number), *others)) if number < 0.0:
+            return Apply(NEG, (Apply(expression.primitive, (Constant(-number), *others)),))
+    return expression
 
 
 class PlainSignals(SignalNames, _ReaderPrinter):

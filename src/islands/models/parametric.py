@@ -5,7 +5,7 @@ service work with them. Add it to ``islands.io.models.MODEL_CLASSES``.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, ClassVar, Self
@@ -20,10 +20,8 @@ from islands.expressions.printing import (
     MathmlSignals,
     PlainSignals,
     Printer,
-    latex_number,
-    mathml_number,
 )
-from islands.expressions.tree import Expression, Lagged, replace_leaves
+from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves, substitute
 from islands.models.block import Block, BlockTerm
 from islands.models.equations import latex_statement, mathml_statement, signal_names
 from islands.models.protocol import EquationText
@@ -195,10 +193,9 @@ class ParametricModel(ABC):
         signals = self._insert(further)
         statement = describe_signals(self)
         line = "\n".join(self._write_lines(sides, signals, signals))
-        rows = self._write(sides, signals, LatexSignals(signals, self._numbers(latex_number)), " = ")
+        rows = self._write(sides, signals, LatexSignals(signals), " = ")
         rows += [latex_statement(statement)] if statement else []
-        printer = MathmlSignals(signals, self._numbers(mathml_number))
-        written = self._write(sides, signals, printer, "<mo>=</mo>")
+        written = self._write(sides, signals, MathmlSignals(signals), "<mo>=</mo>")
         elements = [f"<mrow>{each}</mrow>" for each in written] + mathml_statement(statement)
         named = (output, *self.states, *further, *inputs)
         return EquationText(
@@ -219,20 +216,16 @@ class ParametricModel(ABC):
         self, sides: Mapping[str, str], signals: Sequence[str], names: Sequence[str]
     ) -> list[str]:
         """Return the equations as plain text with the given names of the signals."""
-        return self._write(sides, signals, PlainSignals(names, self._numbers(str)), " = ")
-
-    def _numbers(self, write: Callable[[str], str]) -> dict[str, str]:
-        """Return the text of each parameter by name, in brackets if it is negative."""
-        numbers = [f"{value:.{_DIGITS}g}" for value in self.parameters]
-        return {
-            name: f"({write(number)})" if number[0] == "-" and write is not mathml_number else write(number)
-            for name, number in zip(self.names, numbers, strict=True)
-        }
+        return self._write(sides, signals, PlainSignals(names), " = ")
 
     def _write(
         self, sides: Mapping[str, str], signals: Sequence[str], printer: Printer, equals: str
     ) -> list[str]:
-        """Return the equations as a printer writes them, with the signals of the record at sample k."""
+        """Return the equations as a printer writes them, with numbers and the signals of the record at k."""
+        numbers: dict[str, Expression] = {
+            name: Constant(float(f"{value:.{_DIGITS}g}"))
+            for name, value in zip(self.names, self.parameters, strict=True)
+        }
         leads = dict(zip(self.signals, self.leads, strict=True))
 
         def delay(leaf: Lagged) -> Expression:
@@ -240,7 +233,7 @@ class ParametricModel(ABC):
 
         return [
             f"{printer.write(Lagged(signals.index(name), 0))}{equals}"
-            f"{printer.write(replace_leaves(parse_signals(side, signals), delay))}"
+            f"{printer.write(substitute(replace_leaves(parse_signals(side, signals), delay), numbers))}"
             for name, side in sides.items()
         ]
 

@@ -43,10 +43,10 @@ def test_the_equations_number_outputs_states_and_units_one_after_the_other():
     assert written.plain.splitlines() == [
         "y1(k) = 1.2*x1(k) + 0.3",
         "x1(k) = 0.9*x1(k-1) + 0.3*x2(k-1) + 0.02*u(k-1)",
-        "x2(k) = (-0.3)*x1(k-1) + 0.9*x2(k-1) + 0.15*u(k-1) + (-0.05)*h1(k-1)",
+        "x2(k) = -0.3*x1(k-1) + 0.9*x2(k-1) + 0.15*u(k-1) - 0.05*h1(k-1)",
         "h1(k) = cube(1*x1(k))",
         "about rest at u = 0: resonance at 5.189 Hz with a damping ratio of 0.162",
-        "y2(k) = 2*x3(k) + (-1)",
+        "y2(k) = 2*x3(k) - 1",
         "x3(k) = 0.8*x3(k-1) + 0.4*h2(k-1)",
         "h2(k) = min(max(1.5*u(k) + 0.1, -1), 1)",
         "about rest at u = 0: time constant 0.04481 s",

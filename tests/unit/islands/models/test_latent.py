@@ -23,7 +23,7 @@ def test_equations_have_the_units_as_signals():
     assert make_model().equation().plain.splitlines() == [
         "y(k) = 1.2*x1(k) + 0.3",
         "x1(k) = 0.9*x1(k-1) + 0.3*x2(k-1) + 0.02*u(k-1)",
-        "x2(k) = (-0.3)*x1(k-1) + 0.9*x2(k-1) + 0.15*u(k-1) + (-0.05)*h1(k-1)",
+        "x2(k) = -0.3*x1(k-1) + 0.9*x2(k-1) + 0.15*u(k-1) - 0.05*h1(k-1)",
         "h1(k) = cube(1*x1(k))",
         "about rest at u = 0: resonance at 5.189 Hz with a damping ratio of 0.162",
     ]
