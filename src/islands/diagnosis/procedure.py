@@ -22,8 +22,8 @@ from islands.diagnosis.calibration.preparation import (
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
 from islands.diagnosis.discovery.form_search import compare_with_free_forms
+from islands.diagnosis.discovery.inner_effects import list_effects, search_inner_effects
 from islands.diagnosis.discovery.missing_terms import explain_all, find_missing_terms, replaces_effects
-from islands.diagnosis.discovery.state_limits import search_state_limits
 from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.diagnosis.gross_errors.record_finding import describe_extrapolation, describe_gaps
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
@@ -202,10 +202,10 @@ def _find_causes(
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
     is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
     if not is_clean:
-        limited = search_state_limits(outcome, base, target, run)
-        if limited is not outcome:
-            base, outcome = calibrate(limited.base.simulation, target, limited.base.values), limited
-            run = run.with_effects([*run.effects, *base.simulation.simulator.state_effects])
+        inner = search_inner_effects(outcome, base, target, run)
+        if inner is not outcome:
+            base, outcome = calibrate(inner.base.simulation, target, inner.base.values), inner
+            run = run.with_effects(list_effects(base.simulation.simulator, run))
         run.progress("comparing with free forms")
         outcome = compare_with_free_forms(outcome, forms, run)
         found_forms = [form for form in forms if form in outcome.hypothesis.effects]

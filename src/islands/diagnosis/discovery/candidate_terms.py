@@ -69,6 +69,13 @@ FADING_FORM = ScaledForm(f"{{signal}}*exp(-{TIME}/{{scale}})", 0.3, f"{TIME}*{{s
 #: Radiation: the argument of the scale is a temperature, and the scale its distance from the absolute zero.
 RADIATION_FORM = ScaledForm("({signal} + {scale})**4", 2.0, "{signal}**4")
 
+#: Elastic stops of a position: on both sides, and on one of them. The argument of the scale is the position.
+STOP_FORMS = (
+    ScaledForm("sign({signal})*max(abs({signal}) - {scale}, 0)", 0.7, ""),
+    ScaledForm("max({signal} - {scale}, 0)", 0.7, ""),
+    ScaledForm("max(-{signal} - {scale}, 0)", 0.7, ""),
+)
+
 #: Further scales from which a fit starts, relative to the nominal one.
 STARTING_SCALES = (0.3, 3.0)
 
@@ -319,6 +326,8 @@ def list_candidate_terms(
                 continue
             size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
             terms.append(CandidateTerm(target, text, size, unit=own_unit))
+        if system.force is not None and system.force.rate and FORCE in find_symbols(own):
+            terms += _list_stops(target, system.force.coordinate, unit, sizes, units)
         if _is_process(target, system):
             terms += _list_process_terms(target, own, unit, sizes, units)
         for signal in signals:
@@ -362,6 +371,20 @@ def _list_process_terms(
             *(target, RADIATION_FORM, target, (largest + scale) ** 4, largest),
             (find_factor_unit(unit, power, units), units.get(target, "")),
         ),
+    ]
+
+
+def _list_stops(
+    target: str, position: str, unit: str, sizes: Mapping[str, float], units: Mapping[str, str]
+) -> list[CandidateTerm]:
+    """Return elastic stops of a position in the equation that forces act in."""
+    largest, own_unit = sizes[position], find_factor_unit(unit, Symbol(position), units)
+    return [
+        _make_scaled(
+            *(target, form, position, (1.0 - form.scale) * largest, largest),
+            (own_unit, units.get(position, "")),
+        )
+        for form in STOP_FORMS
     ]
 
 

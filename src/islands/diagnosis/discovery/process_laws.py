@@ -1,11 +1,19 @@
-"""Sentences about terms that are a known law of a process: another rate in one direction, radiation."""
+"""Sentences about terms that are a known law: another rate in one direction, radiation, an elastic stop."""
 
 from collections.abc import Mapping
 
-from islands.diagnosis.discovery.candidate_terms import RADIATION_FORM, CandidateTerm, write_rate_size
+from islands.diagnosis.discovery.candidate_terms import (
+    RADIATION_FORM,
+    STOP_FORMS,
+    CandidateTerm,
+    write_rate_size,
+)
 from islands.expressions.primitives import DIV
 from islands.expressions.tree import Apply, Symbol
 from islands.simulators.ode.system import OdeSystem
+
+#: Where each of the elastic stops acts, and the sign of its coefficient if it pushes back.
+_STOPS = (("beyond +-", -1.0), ("above ", -1.0), ("below -", 1.0))
 
 
 def describe_law(term: CandidateTerm, number: int, system: OdeSystem, values: Mapping[str, float]) -> str:
@@ -44,4 +52,15 @@ def describe_law(term: CandidateTerm, number: int, system: OdeSystem, values: Ma
             f"A loss by the fourth power of {state} + {scales[0]}, as by radiation of heat: {state} = "
             f"-{scales[0]} is the absolute zero"
         )
+    return _describe_stop(term, number, system, values)
+
+
+def _describe_stop(term: CandidateTerm, number: int, system: OdeSystem, values: Mapping[str, float]) -> str:
+    """Return what an elastic stop means; empty if the term is none."""
+    position = "" if system.force is None else system.force.coordinate
+    for form, (place, sign) in zip(STOP_FORMS, _STOPS, strict=True):
+        if term.text == form.text.format(signal=position, scale="{scale}"):
+            coefficient, scale = term.name_parameters(number)
+            law = "An elastic stop acts" if sign * values[coefficient] > 0.0 else "The spring is softer"
+            return f"{law} where {position} is {place}{scale}"
     return ""

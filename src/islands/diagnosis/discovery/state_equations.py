@@ -1,6 +1,7 @@
 """Differential equations in place of a linear simulation: terms and limits then act inside of the plant."""
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -13,9 +14,12 @@ from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.linear_states import Cascade, list_cascades
+from islands.simulators.linear_states import LinearStates, list_states
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.output_equation import OutputEquation
+
+#: Longest step of a simulation before its step is selected, relative to the fastest time constant.
+_LONGEST_STEP = 1.0
 
 
 def list_state_fits(fit: CalibrationResult, target: Target) -> list[CalibrationResult]:
@@ -30,8 +34,8 @@ def list_state_fits(fit: CalibrationResult, target: Target) -> list[CalibrationR
     Returns
     -------
     list of CalibrationResult
-        One for each order of its processes, not calibrated; none if it is another simulation, or has no such
-        equations.
+        An oscillator, or one for each order of its processes, not calibrated; none if it is another
+        simulation, or has no such equations.
     """
     equation = fit.simulation.simulator
     linear = equation.simulator if isinstance(equation, OutputEquation) else None
@@ -39,8 +43,8 @@ def list_state_fits(fit: CalibrationResult, target: Target) -> list[CalibrationR
         return []
     bare, values = fit.simulation.with_effects(()), fit.values[fit.simulation.simulator_slice]
     output, dt = bare.simulate(values), bare.context.dt
-    cascades = list_cascades(linear, values[: len(linear.parameters)], dt)
-    return [_make_fit(each, linear.name, output, bare.context, target) for each in cascades]
+    states = list_states(linear, values[: len(linear.parameters)], dt)
+    return [_make_fit(each, linear.name, output, bare.context, target) for each in states]
 
 
 def calibrate_states(fit: CalibrationResult, target: Target) -> CalibrationResult:
@@ -53,14 +57,16 @@ def calibrate_states(fit: CalibrationResult, target: Target) -> CalibrationResul
 
 
 def _make_fit(
-    cascade: Cascade, name: str, output: Signal, context: SimulationContext, target: Target
+    equations: LinearStates, name: str, output: Signal, context: SimulationContext, target: Target
 ) -> CalibrationResult:
     """Return equations with the initial states of an output of the linear simulation."""
     states = [
-        cascade.find_states(context.u[first:last], output[first:last]) for first, last in context.bounds
+        equations.find_states(context.u[first:last], output[first:last]) for first, last in context.bounds
     ]
-    simulator = _make_simulator(cascade, name, states[0], context)
-    simulation = ExtendedSimulator(ResampledSimulator(simulator, InterSample.ZOH, 1), (), context)
+    simulator = _make_simulator(equations, name, states[0], context)
+    context = replace(context, force_coordinate=simulator.make_force_coordinate(context, output))
+    steps = max(ceil(equations.fastest * equations.dt / _LONGEST_STEP), 1)
+    simulation = ExtendedSimulator(ResampledSimulator(simulator, InterSample.ZOH, steps), (), context)
     start: Signal = simulation.nominal
     for place, parameter in enumerate(simulation.parameters):
         if parameter.initial:
@@ -70,13 +76,13 @@ def _make_fit(
 
 
 def _make_simulator(
-    cascade: Cascade, name: str, initial: dict[str, float], context: SimulationContext
+    equations: LinearStates, name: str, initial: dict[str, float], context: SimulationContext
 ) -> OdeSimulator:
     """Make the simulator of the equations, whose sizes are those of a simulation of each recording."""
-    system = cascade.make_system(name, context.input_unit, context.output_unit, context.output_peak)
-    names = [*cascade.states, *(f"d{each}/dt" for each in cascade.states)]
+    system = equations.make_system(name, context.input_unit, context.output_unit, context.output_peak)
+    names = [*equations.states, *(f"d{each}/dt" for each in equations.states)]
     rough = OdeSimulator(system, initial, dict.fromkeys(names, 1.0), {})
-    expressions = (*map(Symbol, cascade.states), *(right for _, right in system.derivatives))
+    expressions = (*map(Symbol, equations.states), *(right for _, right in system.derivatives))
     parts = [rough.simulate_nominal(part, expressions) for part in context.split()]
     sizes = [peak_amplitude(signal) for signal in np.concatenate(parts, axis=1)]
     return replace(rough, sizes=dict(zip(names, sizes, strict=True)))

@@ -16,6 +16,7 @@ from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.context import make_context
@@ -45,11 +46,24 @@ def stop(x: Signal, u: float) -> list[float]:
     return [0.0 if abs(inner) == 1.8 and rate * inner > 0.0 else rate, (inner - x[1]) / 0.5]
 
 
+def oscillate(force: Callable[[float, float], float]) -> Equation:
+    """Return an oscillator of 0.6 Hz with a force that depends on position and speed."""
+
+    def equation(state: Signal, u: float) -> list[float]:
+        v, x = state.tolist()
+        return [12.0 * (u - x) - 1.2 * v + force(x, v), v]
+
+    return equation
+
+
 #: Processes, with the order of the simulation.
 PROCESSES: dict[str, tuple[Equation, int]] = {
     "uneven": (follow_unevenly, 1),
     "radiation": (radiate, 1),
     "limit": (stop, 2),
+    "friction": (oscillate(lambda _, v: -2.0 * float(np.tanh(v / 0.02))), 2),
+    "spring": (oscillate(lambda x, _: -1.5 * x**3), 2),
+    "elastic stop": (oscillate(lambda x, _: -100.0 * (max(x - 1.5, 0.0) - max(-x - 1.5, 0.0))), 2),
 }
 
 
@@ -68,10 +82,17 @@ def make_record(name: str, seed: int = 0) -> Dataset:
     return Dataset(u, y, DT, ("u_V",), "T_K", ("V",), "K")
 
 
+#: Oscillators, and the effects that are searched for in their records.
+OSCILLATORS = ("friction", "spring", "elastic stop")
+CATALOGUE = ("coulomb-friction", "cubic-stiffness", "input-saturation", "delay")
+
+
 @cache
 def find(name: str) -> tuple[Dataset, Diagnosis]:
     record = make_record(name)
-    return record, diagnose(record, make_simulator(f"linear:{PROCESSES[name][1]}", record))
+    catalogue = [each for each in EFFECTS if each.name in CATALOGUE] if name in OSCILLATORS else EFFECTS
+    simulator = make_simulator(f"linear:{PROCESSES[name][1]}", record)
+    return record, diagnose(record, simulator, catalogue=catalogue)
 
 
 @pytest.mark.ci
@@ -104,7 +125,34 @@ def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", ["uneven", "radiation", pytest.param("limit", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("name", "cause", "value"),
+    [("friction", "coulomb-friction", 2.0 / 12.0), ("spring", "cubic-stiffness", 0.125)],
+)
+def test_force_in_an_oscillator_is_found_by_a_linear_simulation(name: str, cause: str, value: float) -> None:
+    _, found = find(name)
+    assert [each.name for each in found.causes] == [cause]
+    (force,) = found.causes[0].parameters.values()
+    assert force.value == pytest.approx(value, rel=0.05)
+
+
+@pytest.mark.ci
+@pytest.mark.nightly
+def test_elastic_stop_of_an_oscillator_is_found_by_a_linear_simulation() -> None:
+    _, found = find("elastic stop")
+    (cause,) = found.causes
+    assert cause.term == "a1*(sign(x)*max(abs(x) - s1, 0)) in dv/dt"
+    assert cause.parameters["a1"].value == pytest.approx(-100.0, rel=0.1)
+    assert cause.parameters["s1"].value == pytest.approx(1.5, rel=0.02)
+    assert cause.summary == "An elastic stop acts where x is beyond +-s1"
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(each, marks=pytest.mark.nightly if each in {*OSCILLATORS, "limit"} else ()) for each in PROCESSES],
+)
 def test_extension_holds_for_another_record(name: str) -> None:
     record, found = find(name)
     spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))

@@ -1,0 +1,113 @@
+"""Search for effects inside of a linear simulation: limits of its states, and forces on its position.
+
+Its differential equations have them, and it has not.
+"""
+
+from dataclasses import replace
+
+from islands.diagnosis.calibration.intersample_selection import select_intersample
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+    whiten_target,
+)
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.equation_simulator import find_equations
+from islands.diagnosis.discovery.state_equations import list_state_fits
+from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
+from islands.diagnosis.inference.hypothesis import Hypothesis
+from islands.diagnosis.inference.screening import (
+    ScreenedEffect,
+    bic_penalty,
+    screen_effects,
+    transfer_parameters,
+)
+from islands.diagnosis.inference.stepwise_search import stepwise_search
+from islands.diagnosis.inference.strategies import SearchOutcome, assess_evidence, make_outcome
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.interface.effect import Effect, Site
+from islands.simulators.interface import Simulator
+
+
+def search_inner_effects(
+    outcome: SearchOutcome, base: CalibrationResult, target: Target, run: DiagnosisRun
+) -> SearchOutcome:
+    """Return the outcome of a search in equations with an effect inside of them, if that explains more.
+
+    Parameters
+    ----------
+    outcome : SearchOutcome
+        Outcome of a search for effects.
+    base : CalibrationResult
+        The simulation without effects, calibrated to unweighted residuals.
+    target, run
+        Arguments of the search.
+
+    Returns
+    -------
+    SearchOutcome
+        The given one if no such effect fits better by the margin of equivalents, or none withstands the
+        tests. The base of another one is a fit of the equations.
+    """
+    inner = _find_best_effect(outcome.hypothesis, base, target, run)
+    if inner is None:
+        return outcome
+    simulator = select_intersample(inner.fit, target)
+    simulation = replace(inner.fit.simulation, simulator=simulator)
+    fit = calibrate(simulation, target, inner.fit.values)
+    if fit.noise.order:  # Ordinary least squares would fit the coloured noise as well.
+        target = whiten_target(target, fit)
+        fit = calibrate(simulation, target, fit.values)
+    bare = simulation.with_effects(())
+    without = calibrate(bare, target, transfer_parameters(fit.values, simulation, bare))
+    own = run.with_effects(list_effects(simulator, run))
+    others = screen_effects(without, target, own.without_effects([inner.effect]))
+    screened = [ScreenedEffect(inner.effect, fit), *others]
+    hypothesis, target = stepwise_search(without, screened, target, own)
+    found = assess_evidence(make_outcome(without, screened, target, hypothesis), own)
+    is_inner = any(effect in _list_inner_effects(simulator, run) for effect in found.hypothesis.effects)
+    return found if is_inner and found.verdict != Verdict.UNKNOWN else outcome
+
+
+def list_effects(simulator: Simulator, run: DiagnosisRun) -> list[Effect]:
+    """Return the effects of a run that equations of a linear simulation lack, and those of their states."""
+    kept = [effect for effect in run.effects if effect.name not in simulator.built_in_effects]
+    return [*kept, *simulator.state_effects]
+
+
+def _list_inner_effects(simulator: Simulator, run: DiagnosisRun) -> list[Effect]:
+    """Return the effects that act in the equations of a linear simulation and not at its ends."""
+    equations = find_equations(simulator)
+    assert equations is not None
+    force = equations.system.force
+    is_oscillator = force is not None and bool(force.rate)
+    of_states = simulator.state_effects
+    return [
+        effect
+        for effect in list_effects(simulator, run)
+        if effect in of_states or (is_oscillator and effect.site == Site.FORCE)
+    ]
+
+
+def _find_best_effect(
+    alone: Hypothesis, base: CalibrationResult, target: Target, run: DiagnosisRun
+) -> ScreenedEffect | None:
+    """Return the inner effect with the best fit; None if none fits better than the effects of a hypothesis.
+
+    The values of a simulation that lacks the effect may be far from those of the plant. Those with an effect
+    that imitates it are closer.
+    """
+    # The scores of a search with model error count other samples.
+    scored = evaluate_fit(alone.fit.simulation, target, alone.fit.values)
+    best, least = None, scored.score + sum(bic_penalty(effect, base) for effect in alone.effects)
+    least -= EQUIVALENCE_MARGIN
+    for start in (base, alone.fit) if alone.effects else (base,):
+        for states in list_state_fits(start, target):
+            inner = _list_inner_effects(states.simulation.simulator, run)
+            for each in screen_effects(states, target, run.with_effects(inner)):
+                cost = each.fit.score + bic_penalty(each.effect, base)
+                if cost < least:
+                    best, least = each, cost
+    return best
