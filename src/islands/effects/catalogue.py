@@ -34,6 +34,7 @@ from islands.effects.nonlinearity import (
     OUTFLOW_LAW,
     OUTPUT_SATURATION,
     STATE_CLIP,
+    UNSIGNED_SENSOR,
 )
 from islands.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
 from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
@@ -70,6 +71,7 @@ EFFECTS: tuple[Effect, ...] = (
     SENSOR_LAG,
     RESONANCE,
     ABSOLUTE_VALUE_SENSOR,
+    UNSIGNED_SENSOR,
     OUTPUT_SATURATION,
     OFFSET,
     LINEAR_DRIFT,

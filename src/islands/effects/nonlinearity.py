@@ -222,6 +222,47 @@ ABSOLUTE_VALUE_SENSOR = Effect(
 )
 
 
+#: Parts of its peak below which an output is close to zero, and above which it has left it.
+_NEAR_ZERO, _OFF_ZERO = 0.1, 0.3
+
+#: Least number of times that an output without sign comes close to zero.
+_MIN_RETURNS = 3
+
+
+def _unsigned_sensor_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return (1.0 - values[0]) * y + values[0] * np.abs(y)
+
+
+def _is_unsigned(context: SimulationContext) -> bool:
+    """Return whether the measured output comes close to zero several times, and does not pass it."""
+    if context.measured is None:
+        return False
+    peak = float(np.max(np.abs(context.measured)))
+    if peak == 0.0 or float(np.min(context.measured)) < -_NEAR_ZERO * peak:
+        return False
+    parts = context.measured / peak
+    is_off = parts[(parts < _NEAR_ZERO) | (parts > _OFF_ZERO)] > _OFF_ZERO
+    return int(np.count_nonzero(is_off[:-1] & ~is_off[1:])) >= _MIN_RETURNS
+
+
+UNSIGNED_SENSOR = Effect(
+    name="unsigned-sensor",
+    summary="The sensor shows the output without its sign: (1 - k) y + k |y|",
+    family="shape",
+    site=Site.OUTPUT,
+    parameters=lambda _: (Parameter("k", "", 0.0, 0.01, 0.0, 1.5),),
+    starting_points=lambda _context, _residual: ((1.0,), (0.5,)),
+    form=_unsigned_sensor_form,
+    equation=lambda _: MapEquation("(1 - n0)*x + n0*abs(x)"),
+    is_applicable=_is_unsigned,
+    source="Doebelin, Measurement Systems, section 3",
+    linear_parameters=0,
+    similar_to="absolute-value-sensor, output-curve",
+    distinguished_by="an output that turns at zero; `k` = 1 for the absolute value, 0.5 for a rectifier",
+    occurs_in="speed from the frequency of pulses, rectifiers, amplitudes, flow meters without direction",
+)
+
+
 def outflow_law(state: str) -> Effect:
     """Return the linear outflow of one state as an effect; its value is in 1/s."""
     label = f"{OUTFLOW_LAW.name}:{state}"

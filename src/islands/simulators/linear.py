@@ -133,6 +133,12 @@ class LinearSimulator(Simulator):
             found += sum_output_forces(coordinates, context, [run.forces for run in runs])
         return found[:, ::every]
 
+    def simulate_at_rest(self, u: Signal) -> Signal:
+        """Simulate the output of the nominal values, from the rest at the reference input."""
+        poles = np.concatenate([[1.0], -self.denominator])
+        deviations = delay_samples(u, self.delay) - self.reference_input
+        return self.level + filter_linearly(self.numerator, poles, deviations)
+
     def _find_state_at_rest(self) -> Signal:
         remainder = 1.0 - float(self.denominator.sum())
         gain = float(self.numerator.sum()) / remainder if remainder > 0.0 else 0.0

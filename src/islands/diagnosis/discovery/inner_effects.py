@@ -1,6 +1,7 @@
-"""Search for effects inside of a linear simulation: limits of its states, and forces on its position.
+"""Search for effects that need other values or equations of a linear simulation than its calibration has.
 
-Its differential equations have them, and it has not.
+Its differential equations have limits of states and forces on a position, and it has not. Behind a sensor of
+the absolute value, it has other values.
 """
 
 from dataclasses import replace
@@ -15,6 +16,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
 from islands.diagnosis.discovery.state_equations import list_state_fits
+from islands.diagnosis.discovery.unsigned_output import fit_unsigned_output
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.screening import (
@@ -61,13 +63,15 @@ def search_inner_effects(
         target = whiten_target(target, fit)
         fit = calibrate(simulation, target, fit.values)
     bare = simulation.with_effects(())
-    without = calibrate(bare, target, transfer_parameters(fit.values, simulation, bare))
+    start = transfer_parameters(fit.values, simulation, bare)
+    without = calibrate(bare, target, base.values if simulator is base.simulation.simulator else start)
     own = run.with_effects(list_effects(simulator, run))
     others = screen_effects(without, target, own.without_effects([inner.effect]))
     screened = [ScreenedEffect(inner.effect, fit), *others]
     hypothesis, target = stepwise_search(without, screened, target, own)
     found = assess_evidence(make_outcome(without, screened, target, hypothesis), own)
-    is_inner = any(effect in _list_inner_effects(simulator, run) for effect in found.hypothesis.effects)
+    possible = [inner.effect, *_list_inner_effects(simulator, run)]
+    is_inner = any(effect in possible for effect in found.hypothesis.effects)
     return found if is_inner and found.verdict != Verdict.UNKNOWN else outcome
 
 
@@ -103,11 +107,14 @@ def _find_best_effect(
     scored = evaluate_fit(alone.fit.simulation, target, alone.fit.values)
     best, least = None, scored.score + sum(bic_penalty(effect, base) for effect in alone.effects)
     least -= EQUIVALENCE_MARGIN
+    unsigned = fit_unsigned_output(base, target, run)
+    screened = [] if unsigned is None else [unsigned]
     for start in (base, alone.fit) if alone.effects else (base,):
         for states in list_state_fits(start, target):
             inner = _list_inner_effects(states.simulation.simulator, run)
-            for each in screen_effects(states, target, run.with_effects(inner)):
-                cost = each.fit.score + bic_penalty(each.effect, base)
-                if cost < least:
-                    best, least = each, cost
+            screened += screen_effects(states, target, run.with_effects(inner))
+    for each in screened:
+        cost = each.fit.score + bic_penalty(each.effect, base)
+        if cost < least:
+            best, least = each, cost
     return best

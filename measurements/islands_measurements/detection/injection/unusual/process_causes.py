@@ -235,7 +235,7 @@ PROCESS_CAUSES = (
         "the sensor shows the absolute value",
         "linear:2",
         _absolute_sensor,
-        "absolute-value-sensor",
+        "absolute-value-sensor unsigned-sensor",
         r"abs\(y_sim\)",
         "shape",
         r"max\(y|abs\(",

@@ -1,0 +1,138 @@
+"""Linear simulation behind a sensor that shows the absolute value: its signs are estimated first.
+
+A linear simulation that is calibrated to an absolute value is far from the plant, so that no calibration from
+there finds the plant behind the sensor. Low-passes and resonances of the input, counted from several levels,
+have absolute values that resemble the output. The best of them give it signs. A linear model of the output
+with signs gives better ones, until they remain (alternating projections, as for the phase of a field whose
+intensity is measured: Fienup, Phase retrieval algorithms: a comparison, 1982).
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.data.segments import fill_gaps
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.screening import ScreenedEffect
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.interface.effect import Signal
+from islands.effects.nonlinearity import UNSIGNED_SENSOR
+from islands.errors import RecordError
+from islands.kernels.linear_filter import filter_linearly
+from islands.simulators.linear import LinearSimulator, estimate_linear
+from islands.simulators.output_equation import OutputEquation
+
+#: Number of time constants and natural frequencies of the filters, and damping ratios of the resonances.
+_TIMES, _FREQUENCIES, _DAMPINGS = 10, 12, (0.03, 0.15, 0.5)
+
+#: Levels from which a filtered input is counted, as quantiles of it.
+_LEVELS = np.linspace(0.05, 0.95, 19)
+
+#: Number of sequences of signs that are refined, and the mean product of two of them that are the same.
+_STARTS, _SAME = 3, 0.9
+
+#: Maximum number of linear models of the output with signs.
+_ITERATIONS = 15
+
+
+def fit_unsigned_output(base: CalibrationResult, target: Target, run: DiagnosisRun) -> ScreenedEffect | None:
+    """Return a linear simulation behind a sensor of the absolute value.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+        The simulation without effects.
+    target, run
+        Arguments of a search.
+
+    Returns
+    -------
+    ScreenedEffect or None
+        None if the simulation is not linear or has prior values, if the search does not include such a
+        sensor, or if the record is too short.
+    """
+    equation = base.simulation.simulator
+    linear = equation.simulator if isinstance(equation, OutputEquation) else None
+    if not isinstance(linear, LinearSimulator) or target.prior_std or UNSIGNED_SENSOR not in run.effects:
+        return None
+    context = base.simulation.context
+    first, last = max(context.bounds, key=lambda ends: min(ends[1], target.fitted) - ends[0])
+    part = slice(first, min(last, target.fitted))
+    record = Dataset(context.u[part], fill_gaps(target.y)[part], context.dt, ("u",))
+    try:
+        found = _estimate(linear.denominator.size, linear.delay, record)
+    except RecordError:  # It is too short for a linear model.
+        return None
+    simulation = base.simulation.with_effects((UNSIGNED_SENSOR,))
+    start = simulation.nominal
+    start[: len(linear.parameters)] = _transfer_values(found, linear)
+    start[simulation.get_slice(UNSIGNED_SENSOR)] = 1.0
+    return ScreenedEffect(UNSIGNED_SENSOR, calibrate(simulation, target, start))
+
+
+def _transfer_values(found: LinearSimulator, linear: LinearSimulator) -> Signal:
+    """Return the values of a linear model for another one, which counts its input from another value."""
+    values = np.array([each.nominal for each in found.parameters])
+    numerator, denominator, level, _ = found.split_values(values)
+    distance = found.reference_input - linear.reference_input
+    gain = float(numerator.sum()) / (1.0 - float(denominator.sum()))
+    state = distance * (found.state_at_rest - linear.state_at_rest)
+    first = 0 if linear.has_direct_term else 1
+    return np.concatenate([numerator[first:], denominator, [level - gain * distance], state])
+
+
+def _estimate(order: int, delay: int, record: Dataset) -> LinearSimulator:
+    """Return the linear model whose absolute output is closest to a record."""
+    starts = _list_signs(record.u[:, 0], record.y, order)
+    _, best = min((_refine(order, delay, record, signs) for signs in starts), key=lambda each: each[0])
+    return best
+
+
+def _refine(order: int, delay: int, record: Dataset, signs: Signal) -> tuple[float, LinearSimulator]:
+    """Return the best linear model with signs that follow from it, with its mean squared error."""
+    best: tuple[float, LinearSimulator] | None = None
+    for _ in range(_ITERATIONS):
+        model = estimate_linear(order, delay, Dataset(record.u, signs * record.y, record.dt, ("u",)))
+        simulated = model.simulate_at_rest(record.u[:, 0])
+        error = float(np.mean((np.abs(simulated) - record.y) ** 2))
+        if best is None or error < best[0]:
+            best = error, model
+        before, signs = signs, np.where(simulated < 0.0, -1.0, 1.0)
+        if np.array_equal(signs, before):
+            break
+    assert best is not None
+    return best
+
+
+def _list_signs(u: Signal, y: Signal, order: int) -> list[Signal]:
+    """Return the signs of filtered inputs whose absolute values resemble an output most."""
+    deviations = y - y.mean()
+    found = []
+    for filtered in _filter_input(u - u[0], order):
+        for level in np.quantile(filtered, _LEVELS):
+            shape = np.abs(filtered - level)
+            size = float(np.std(shape))
+            if size > 0.0:
+                found.append((float(deviations @ shape) / size, np.where(filtered < level, -1.0, 1.0)))
+    found.sort(key=lambda each: -each[0])
+    signs: list[Signal] = []
+    for _, each in found:
+        if all(abs(float(np.mean(each * other))) < _SAME for other in signs):
+            signs.append(each)
+        if len(signs) == _STARTS:
+            break
+    return signs
+
+
+def _filter_input(u: Signal, order: int) -> Iterator[Signal]:
+    """Yield low-passes of an input, and resonances if there are two poles."""
+    for time in np.geomspace(2.0, u.size / 20.0, _TIMES).tolist():
+        pole = float(np.exp(-1.0 / time))
+        yield filter_linearly([1.0 - pole], [1.0, -pole], u)
+    for frequency in np.geomspace(20.0 * np.pi / u.size, 1.5, _FREQUENCIES if order > 1 else 0).tolist():
+        for damping in _DAMPINGS:
+            complex_pole = np.exp(frequency * complex(-damping, np.sqrt(1.0 - damping**2)))
+            poles = [1.0, -2.0 * complex_pole.real, abs(complex_pole) ** 2]
+            yield filter_linearly([0.0, sum(poles)], poles, u)
