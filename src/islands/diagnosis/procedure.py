@@ -205,7 +205,8 @@ def _find_causes(
         inner = search_inner_effects(outcome, base, target, run)
         if inner is not outcome:
             base, outcome = calibrate(inner.base.simulation, target, inner.base.values), inner
-            run = run.with_effects(list_effects(base.simulation.simulator, run))
+            found_effects = outcome.hypothesis.effects
+            run = run.with_effects(list_effects(base.simulation.simulator, run, found_effects))
         run.progress("comparing with free forms")
         outcome = compare_with_free_forms(outcome, forms, run)
         found_forms = [form for form in forms if form in outcome.hypothesis.effects]

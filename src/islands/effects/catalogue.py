@@ -34,6 +34,7 @@ from islands.effects.nonlinearity import (
     OUTFLOW_LAW,
     OUTPUT_SATURATION,
     STATE_CLIP,
+    STATE_RANGE,
     UNSIGNED_SENSOR,
 )
 from islands.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
@@ -92,7 +93,7 @@ CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}
 #: Templates of the effects that exist once for each state, parameter or model of a simulation, by name.
 OF_EACH: Mapping[str, EffectTemplate] = {
     template.name: template
-    for template in (WRONG_PARAMETER, STATE_CLIP, INPUT_OFFSET, OUTFLOW_LAW, MODEL_FORM)
+    for template in (WRONG_PARAMETER, STATE_CLIP, STATE_RANGE, INPUT_OFFSET, OUTFLOW_LAW, MODEL_FORM)
 }
 
 

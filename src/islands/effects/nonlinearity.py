@@ -335,6 +335,57 @@ def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = Tru
     )
 
 
+#: Starting points of the limits of a range, as parts of the range of the output by which they narrow it.
+_CUTS = (-0.25, 0.0, 0.1, 0.25, 0.4)
+
+#: Nominal limits of a range, beyond those of the output, in ranges of it; no state reaches them.
+_FREE = 3.0
+
+
+def state_range(state: str, unit: str) -> Effect:
+    """Return a lower and an upper limit on one state, whose range is about that of the output."""
+    label = f"{STATE_RANGE.name}:{state}"
+
+    def find_range(context: SimulationContext) -> tuple[float, float]:
+        if context.measured is None:
+            return -context.output_peak, context.output_peak
+        return float(np.min(context.measured)), float(np.max(context.measured))
+
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        low, high = find_range(context)
+        span = high - low
+        least, most = low - _FREE * span, high + _FREE * span
+        return (
+            Parameter(f"{label} lower", unit, least, 0.01 * span, least, high),
+            Parameter(f"{label} upper", unit, most, 0.01 * span, low, most),
+        )
+
+    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        low, high = find_range(context)
+        cuts = [-_FREE * (high - low), *(cut * (high - low) for cut in _CUTS)]
+        return tuple((low + below, high - above) for below in cuts for above in cuts)[1:]
+
+    return Effect(
+        name=label,
+        summary=STATE_RANGE.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+        linear_parameters=0,
+    )
+
+
+STATE_RANGE = EffectTemplate(
+    "state-range",
+    "A state is limited to a range from a lower to an upper level, or in one direction only",
+    similar_to="state-clip, output-saturation",
+    distinguished_by="the output flattens later than the state, at two levels that are not opposite",
+    occurs_in="end stops on both sides of a position, valves between closed and open",
+)
+
 STATE_CLIP = EffectTemplate(
     "state-clip",
     "A state is limited to a level, as in a tank that overflows; the next state may receive a fraction",

@@ -7,6 +7,7 @@ for such a system alone, reproduce any zeros.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from typing import TypeAlias
@@ -29,6 +30,12 @@ MAX_ORDER = 2
 #: Range of the time constants in sampling times. A faster process follows its input within a sample, and the
 #: record does not distinguish a slower one from an integrator.
 TIME_CONSTANTS = (0.2, 1e5)
+
+#: Largest gain of a second equation, relative to that of the first one, of simple processes in series.
+_SIMPLE = 0.1
+
+#: Time constants of simple processes in series, relative to that of a single process.
+_SPLIT = (0.75, 0.25)
 
 #: Bounds of gains and of the level, relative to the largest gain and to the largest output.
 _LIMIT = 20.0
@@ -141,6 +148,11 @@ class Cascade(LinearStates):
         return found | self._own_values
 
     @property
+    def is_simple(self) -> bool:
+        """Whether the input drives only the first process, up to a small part."""
+        return bool(np.all(np.abs(self.gains[1:]) < _SIMPLE * np.abs(self.gains[0])))
+
+    @property
     def fastest(self) -> float:
         """Fastest rate in 1/s."""
         return 1.0 / float(self.times.min())
@@ -175,7 +187,11 @@ class Cascade(LinearStates):
             force=OdeForce("u", "", output_unit, Symbol("u")),
             contains=("offset",),
             # The level is an offset of each state.
-            effects=tuple(OdeEffect(f"state-clip:{each}") for each in self.states),
+            effects=tuple(
+                OdeEffect(f"{limit}:{each}")
+                for each in self.states
+                for limit in ("state-clip", "state-range")
+            ),
         )
 
     def _realise(self) -> tuple[Signal, Signal, Signal, Signal]:
@@ -255,7 +271,7 @@ class LinearOscillator(LinearStates):
             states=(OdeState("x", position, 0.0), OdeState("v", speed, 0.0)),
             force=OdeForce("x", "v", input_unit, Symbol("u")),
             contains=("offset", "viscous"),
-            effects=(OdeEffect("state-clip:x"),),
+            effects=(OdeEffect("state-clip:x"), OdeEffect("state-range:x")),
         )
 
     def _list_bounds(self) -> dict[str, tuple[float | None, float | None]]:
@@ -314,6 +330,45 @@ def list_states(linear: LinearSimulator, values: Signal, dt: float) -> list[Line
     if np.any(np.iscomplex(poles)):
         return _list_oscillators(complex(poles[0]), response, common)
     return _list_cascades(np.asarray(poles.real, dtype=np.float64), response, common)
+
+
+def approximate_cascade(
+    linear: LinearSimulator, single: LinearSimulator, known: Sequence[LinearStates], dt: float
+) -> Cascade | None:
+    """Return two processes in series with the gain and the delay of a single one.
+
+    A model of second order that is fitted to a record with a limited state may have zeros and poles that are
+    far from those of the plant.
+
+    Parameters
+    ----------
+    linear : LinearSimulator
+        Model of second order.
+    single : LinearSimulator
+        Model of first order of the same record.
+    known : sequence of LinearStates
+        Differential equations of the model of second order.
+    dt : float
+        Sampling time in seconds.
+
+    Returns
+    -------
+    Cascade or None
+        None if the model has another order, or is such processes already, or if the single one is no stable
+        process.
+    """
+    cascades = [each for each in known if isinstance(each, Cascade)]
+    if linear.denominator.size != MAX_ORDER or any(each.is_simple for each in cascades):
+        return None
+    pole = float(single.denominator[0])
+    if not 0.0 < pole < 1.0:
+        return None
+    gain = float(single.numerator.sum()) / (1.0 - pole)
+    direct = 0.0 if linear.has_direct_term else None
+    shortest, longest = (factor * dt for factor in TIME_CONSTANTS)
+    times = np.clip(-dt / np.log(pole) * np.array(_SPLIT), shortest, longest)
+    level = single.level - gain * single.reference_input
+    return Cascade(direct, level, dt, linear.delay, times, np.array([gain, 0.0]))
 
 
 def _list_cascades(poles: Signal, response: Signal, common: _Common) -> list[LinearStates]:

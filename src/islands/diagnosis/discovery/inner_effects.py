@@ -4,7 +4,10 @@ Its differential equations have limits of states and forces on a position, and i
 the absolute value, it has other values.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from islands.diagnosis.calibration.intersample_selection import select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import (
@@ -15,7 +18,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
-from islands.diagnosis.discovery.state_equations import list_state_fits
+from islands.diagnosis.discovery.state_equations import list_process_fits, list_state_fits
 from islands.diagnosis.discovery.unsigned_output import fit_unsigned_output
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
 from islands.diagnosis.inference.hypothesis import Hypothesis
@@ -30,6 +33,7 @@ from islands.diagnosis.inference.strategies import SearchOutcome, assess_evidenc
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect, Site
+from islands.effects.nonlinearity import STATE_CLIP, STATE_RANGE
 from islands.simulators.interface import Simulator
 
 
@@ -58,14 +62,16 @@ def search_inner_effects(
         return outcome
     simulator = select_intersample(inner.fit, target)
     simulation = replace(inner.fit.simulation, simulator=simulator)
-    fit = calibrate(simulation, target, inner.fit.values)
+    inner = replace(inner, fit=calibrate(simulation, target, inner.fit.values))
+    inner = _find_opposite_limits(inner, base, target) or inner
+    simulation, fit = inner.fit.simulation, inner.fit
     if fit.noise.order:  # Ordinary least squares would fit the coloured noise as well.
         target = whiten_target(target, fit)
         fit = calibrate(simulation, target, fit.values)
     bare = simulation.with_effects(())
     start = transfer_parameters(fit.values, simulation, bare)
     without = calibrate(bare, target, base.values if simulator is base.simulation.simulator else start)
-    own = run.with_effects(list_effects(simulator, run))
+    own = run.with_effects(list_effects(simulator, run, [inner.effect]))
     others = screen_effects(without, target, own.without_effects([inner.effect]))
     screened = [ScreenedEffect(inner.effect, fit), *others]
     hypothesis, target = stepwise_search(without, screened, target, own)
@@ -75,10 +81,37 @@ def search_inner_effects(
     return found if is_inner and found.verdict != Verdict.UNKNOWN else outcome
 
 
-def list_effects(simulator: Simulator, run: DiagnosisRun) -> list[Effect]:
-    """Return the effects of a run that equations of a linear simulation lack, and those of their states."""
+def _find_opposite_limits(
+    inner: ScreenedEffect, base: CalibrationResult, target: Target
+) -> ScreenedEffect | None:
+    """Return opposite limits in place of a range of a state if they are about as good; None otherwise.
+
+    With a large step, in which a state meets its limits at the wrong instants, a range may have been better.
+    """
+    simulation, state = inner.fit.simulation, inner.effect.name.partition(":")[2]
+    opposite = {each.name: each for each in simulation.simulator.state_effects}.get(
+        f"{STATE_CLIP.name}:{state}"
+    )
+    if inner.effect.cause != STATE_RANGE.name or opposite is None:
+        return None
+    other = simulation.with_effects((opposite,))
+    start = transfer_parameters(inner.fit.values, simulation, other)
+    start[other.get_slice(opposite)] = np.abs(inner.fit.values[simulation.get_slice(inner.effect)]).mean()
+    fit = calibrate(other, target, start)
+    margin = bic_penalty(inner.effect, base) - bic_penalty(opposite, base) + EQUIVALENCE_MARGIN
+    return ScreenedEffect(opposite, fit) if fit.score < inner.fit.score + margin else None
+
+
+def list_effects(simulator: Simulator, run: DiagnosisRun, found: Sequence[Effect]) -> list[Effect]:
+    """Return the effects of a run that equations of a linear simulation lack, and those of their states.
+
+    Opposite limits of a state are a special case of a range, which would be no other cause. There are ranges
+    only if effects that were found contain one.
+    """
     kept = [effect for effect in run.effects if effect.name not in simulator.built_in_effects]
-    return [*kept, *simulator.state_effects]
+    is_range = any(effect.cause == STATE_RANGE.name for effect in found)
+    left_out = STATE_CLIP.name if is_range else STATE_RANGE.name
+    return [*kept, *(effect for effect in simulator.state_effects if effect.cause != left_out)]
 
 
 def _list_inner_effects(simulator: Simulator, run: DiagnosisRun) -> list[Effect]:
@@ -87,12 +120,9 @@ def _list_inner_effects(simulator: Simulator, run: DiagnosisRun) -> list[Effect]
     assert equations is not None
     force = equations.system.force
     is_oscillator = force is not None and bool(force.rate)
-    of_states = simulator.state_effects
-    return [
-        effect
-        for effect in list_effects(simulator, run)
-        if effect in of_states or (is_oscillator and effect.site == Site.FORCE)
-    ]
+    forces = [effect for effect in run.effects if is_oscillator and effect.site == Site.FORCE]
+    built_in = simulator.built_in_effects
+    return [*(effect for effect in forces if effect.name not in built_in), *simulator.state_effects]
 
 
 def _find_best_effect(
@@ -109,10 +139,11 @@ def _find_best_effect(
     least -= EQUIVALENCE_MARGIN
     unsigned = fit_unsigned_output(base, target, run)
     screened = [] if unsigned is None else [unsigned]
-    for start in (base, alone.fit) if alone.effects else (base,):
-        for states in list_state_fits(start, target):
-            inner = _list_inner_effects(states.simulation.simulator, run)
-            screened += screen_effects(states, target, run.with_effects(inner))
+    starts = [base, alone.fit] if alone.effects else [base]
+    fits = [states for start in starts for states in list_state_fits(start, target)]
+    for states in [*fits, *list_process_fits(base, target)]:
+        inner = _list_inner_effects(states.simulation.simulator, run)
+        screened += screen_effects(states, target, run.with_effects(inner))
     for each in screened:
         cost = each.fit.score + bic_penalty(each.effect, base)
         if cost < least:

@@ -5,6 +5,8 @@ from math import ceil
 
 import numpy as np
 
+from islands.data.dataset import Dataset
+from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.intersample_selection import select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
 from islands.diagnosis.calibration.target import Target
@@ -13,8 +15,8 @@ from islands.expressions.tree import Symbol
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
-from islands.simulators.linear import LinearSimulator
-from islands.simulators.linear_states import LinearStates, list_states
+from islands.simulators.linear import LinearSimulator, estimate_linear
+from islands.simulators.linear_states import LinearStates, approximate_cascade, list_states
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.output_equation import OutputEquation
 
@@ -37,14 +39,39 @@ def list_state_fits(fit: CalibrationResult, target: Target) -> list[CalibrationR
         An oscillator, or one for each order of its processes, not calibrated; none if it is another
         simulation, or has no such equations.
     """
-    equation = fit.simulation.simulator
-    linear = equation.simulator if isinstance(equation, OutputEquation) else None
-    if not isinstance(linear, LinearSimulator):
+    linear = get_linear(fit)
+    if linear is None:
         return []
     bare, values = fit.simulation.with_effects(()), fit.values[fit.simulation.simulator_slice]
-    output, dt = bare.simulate(values), bare.context.dt
-    states = list_states(linear, values[: len(linear.parameters)], dt)
+    output = bare.simulate(values)
+    states = list_states(linear, values[: len(linear.parameters)], bare.context.dt)
     return [_make_fit(each, linear.name, output, bare.context, target) for each in states]
+
+
+def list_process_fits(fit: CalibrationResult, target: Target) -> list[CalibrationResult]:
+    """Return simple processes in series if a linear simulation of second order is none, not calibrated."""
+    linear, context = get_linear(fit), fit.simulation.context
+    if linear is None:
+        return []
+    values = fit.values[fit.simulation.simulator_slice][: len(linear.parameters)]
+    known = list_states(linear, values, context.dt)
+    single = estimate_linear(1, linear.delay, make_fitted_record(context, target))
+    cascade = approximate_cascade(linear, single, known, context.dt)
+    return [] if cascade is None else [_make_fit(cascade, linear.name, fit.output, context, target)]
+
+
+def get_linear(fit: CalibrationResult) -> LinearSimulator | None:
+    """Return the linear model of a fit; None if it is another simulation."""
+    equation = fit.simulation.simulator
+    linear = equation.simulator if isinstance(equation, OutputEquation) else None
+    return linear if isinstance(linear, LinearSimulator) else None
+
+
+def make_fitted_record(context: SimulationContext, target: Target) -> Dataset:
+    """Return the longest recording, as far as it is fitted."""
+    first, last = max(context.bounds, key=lambda ends: min(ends[1], target.fitted) - ends[0])
+    part = slice(first, min(last, target.fitted))
+    return Dataset(context.u[part], fill_gaps(target.y)[part], context.dt, ("u",))
 
 
 def calibrate_states(fit: CalibrationResult, target: Target) -> CalibrationResult:

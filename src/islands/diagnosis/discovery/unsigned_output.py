@@ -12,9 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.state_equations import get_linear, make_fitted_record
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Signal
@@ -22,7 +22,6 @@ from islands.effects.nonlinearity import UNSIGNED_SENSOR
 from islands.errors import RecordError
 from islands.kernels.linear_filter import filter_linearly
 from islands.simulators.linear import LinearSimulator, estimate_linear
-from islands.simulators.output_equation import OutputEquation
 
 #: Number of time constants and natural frequencies of the filters, and damping ratios of the resonances.
 _TIMES, _FREQUENCIES, _DAMPINGS = 10, 12, (0.03, 0.15, 0.5)
@@ -53,14 +52,10 @@ def fit_unsigned_output(base: CalibrationResult, target: Target, run: DiagnosisR
         None if the simulation is not linear or has prior values, if the search does not include such a
         sensor, or if the record is too short.
     """
-    equation = base.simulation.simulator
-    linear = equation.simulator if isinstance(equation, OutputEquation) else None
-    if not isinstance(linear, LinearSimulator) or target.prior_std or UNSIGNED_SENSOR not in run.effects:
+    linear = get_linear(base)
+    if linear is None or target.prior_std or UNSIGNED_SENSOR not in run.effects:
         return None
-    context = base.simulation.context
-    first, last = max(context.bounds, key=lambda ends: min(ends[1], target.fitted) - ends[0])
-    part = slice(first, min(last, target.fitted))
-    record = Dataset(context.u[part], fill_gaps(target.y)[part], context.dt, ("u",))
+    record = make_fitted_record(base.simulation.context, target)
     try:
         found = _estimate(linear.denominator.size, linear.delay, record)
     except RecordError:  # It is too short for a linear model.

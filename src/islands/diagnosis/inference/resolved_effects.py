@@ -35,14 +35,15 @@ def _may_be_zero(fit: CalibrationResult, effect: Effect, covariance: Signal) -> 
     """Return whether the confidence region of the strengths of an effect contains that without the effect.
 
     The shape of the effect, as the time constant of a creep, is given: without it, a short record that shows
-    the effect determines its strength less than its response. A free form has no strength: a gain of the
-    simulation may make up for the size of all of its values.
+    the effect determines its strength less than its response. Of an effect without a strength all values
+    count: one limit of a range may not be reached. A free form has none: a gain of the simulation may make
+    up for the size of all of its values.
     """
     if effect.is_free:
         return False
     part = fit.simulation.get_slice(effect)
     parameters = effect.parameters(fit.simulation.context)
-    count = max(effect.linear_parameters, 1)
+    count = effect.linear_parameters or len(parameters)
     places, shape = slice(part.start, part.start + count), slice(part.start + count, part.stop)
     mixed = covariance[places, shape]
     given = mixed @ np.linalg.pinv(covariance[shape, shape], hermitian=True) @ mixed.T

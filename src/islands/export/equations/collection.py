@@ -275,6 +275,10 @@ class _Collection:
                 upper = _choose("min", upper, level)
                 lower = _choose("max", lower, Apply(NEG, (level,)))
                 caught = Symbol(f"{label} caught") if f"{label} caught" in self.values else None
+            own = f"state-range:{state.name}"
+            if own in self.clips:
+                upper = _choose("min", upper, Symbol(f"{own} upper"))
+                lower = _choose("max", lower, Symbol(f"{own} lower"))
             if (lower, upper) != (None, None):
                 limits[state.name] = StateLimit(lower, upper, state.spills_into if caught else "", caught)
         return limits

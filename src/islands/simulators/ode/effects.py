@@ -12,7 +12,7 @@ from math import inf
 from islands.effects.baseline import input_offset
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
-from islands.effects.nonlinearity import outflow_law, state_clip
+from islands.effects.nonlinearity import outflow_law, state_clip, state_range
 from islands.effects.time_variation import GAIN_EFFECTS
 from islands.errors import ModelError, suggest
 from islands.expressions.parsing import parse_expression
@@ -77,11 +77,14 @@ def find_effects(system: OdeSystem, sizes: Mapping[str, float]) -> tuple[frozens
             # A listed limit has the size of the output: that of a state which is not measured is uncertain.
             size = 0.0 if system.effects else sizes[place]
             found.append(state_clip(place, unit or "1", size, spills=bool(states[place].spills_into)))
+        elif cause == "state-range" and place in states and not each.term:
+            found.append(state_range(place, unit or "1"))
         else:
             raise ModelError(
                 f"[effects] {each.name}: there is no such effect: take input-offset:NAME, outflow-law:NAME, "
-                f"{', '.join(sorted(_SUPPORTED))}, each with equation and term, or state-clip:STATE"
-                f"{suggest(cause, ('input-offset', 'outflow-law', 'state-clip', *_SUPPORTED))}"
+                f"{', '.join(sorted(_SUPPORTED))}, each with equation and term, or state-clip:STATE or "
+                f"state-range:STATE without them"
+                f"{suggest(cause, ('input-offset', 'outflow-law', 'state-clip', 'state-range', *_SUPPORTED))}"
             )
     return frozenset(supported), tuple(found)
 
@@ -93,8 +96,9 @@ def find_limits(
     limits, spills = {}, {}
     for state in system.states:
         label = f"state-clip:{state.name}"
-        level = effect_parameters.get(label, inf)
-        lower, upper = max(state.lower, -level), min(state.upper, level)
+        level, own = effect_parameters.get(label, inf), f"state-range:{state.name}"
+        lower = max(state.lower, -level, effect_parameters.get(f"{own} lower", -inf))
+        upper = min(state.upper, level, effect_parameters.get(f"{own} upper", inf))
         if (lower, upper) != (-inf, inf):
             limits[state.name] = (lower, upper)
         if caught := effect_parameters.get(f"{label} caught", 0.0):

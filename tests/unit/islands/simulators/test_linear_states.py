@@ -9,7 +9,7 @@ from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.linear_states import LinearStates, list_states
+from islands.simulators.linear_states import LinearStates, approximate_cascade, list_states
 from islands.simulators.ode.simulator import OdeSimulator
 
 DT = 0.1
@@ -89,6 +89,19 @@ def test_other_models_have_no_such_equations(
 ) -> None:
     linear = make_linear(numerator, denominator, delay)
     assert list_states(linear, get_values(linear), DT) == []
+
+
+def test_a_model_with_zeros_is_approximated_by_two_processes_with_one_gain() -> None:
+    single = make_linear([0.0, 0.1], [0.9], delay=2)
+    for name, is_simple in (("nearly equal poles", True), ("oscillator", False)):
+        linear = make_linear(*MODELS[name], 2)
+        known = list_states(linear, get_values(linear), DT)
+        found = approximate_cascade(linear, single, known, DT)
+        assert (found is None) == is_simple
+    assert found is not None
+    assert found.values["K1"] == pytest.approx(1.0)
+    assert (found.values["K2"], found.delay) == (0.0, 2)
+    assert found.times.sum() == pytest.approx(-DT / np.log(0.9))
 
 
 def test_equations_of_a_model_without_direct_term_have_none() -> None:

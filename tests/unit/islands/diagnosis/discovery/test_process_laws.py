@@ -46,6 +46,13 @@ def stop(x: Signal, u: float) -> list[float]:
     return [0.0 if abs(inner) == 1.8 and rate * inner > 0.0 else rate, (inner - x[1]) / 0.5]
 
 
+def stop_between(x: Signal, u: float) -> list[float]:
+    inner = min(max(x[0], -1.0), 2.0)
+    rate = (1.5 * u - inner) / 1.5
+    is_stopped = (inner == -1.0 and rate < 0.0) or (inner == 2.0 and rate > 0.0)
+    return [0.0 if is_stopped else rate, (inner - x[1]) / 0.5]
+
+
 def oscillate(force: Callable[[float, float], float]) -> Equation:
     """Return an oscillator of 0.6 Hz with a force that depends on position and speed."""
 
@@ -61,6 +68,7 @@ PROCESSES: dict[str, tuple[Equation, int]] = {
     "uneven": (follow_unevenly, 1),
     "radiation": (radiate, 1),
     "limit": (stop, 2),
+    "range": (stop_between, 2),
     "friction": (oscillate(lambda _, v: -2.0 * float(np.tanh(v / 0.02))), 2),
     "spring": (oscillate(lambda x, _: -1.5 * x**3), 2),
     "elastic stop": (oscillate(lambda x, _: -100.0 * (max(x - 1.5, 0.0) - max(-x - 1.5, 0.0))), 2),
@@ -82,15 +90,15 @@ def make_record(name: str, seed: int = 0) -> Dataset:
     return Dataset(u, y, DT, ("u_V",), "T_K", ("V",), "K")
 
 
-#: Oscillators, and the effects that are searched for in their records.
-OSCILLATORS = ("friction", "spring", "elastic stop")
+#: Processes in whose records few effects are searched for, and these effects.
+BRIEFLY_SEARCHED = ("range", "friction", "spring", "elastic stop")
 CATALOGUE = ("coulomb-friction", "cubic-stiffness", "input-saturation", "delay")
 
 
 @cache
 def find(name: str) -> tuple[Dataset, Diagnosis]:
     record = make_record(name)
-    catalogue = [each for each in EFFECTS if each.name in CATALOGUE] if name in OSCILLATORS else EFFECTS
+    catalogue = [each for each in EFFECTS if each.name in CATALOGUE] if name in BRIEFLY_SEARCHED else EFFECTS
     simulator = make_simulator(f"linear:{PROCESSES[name][1]}", record)
     return record, diagnose(record, simulator, catalogue=catalogue)
 
@@ -126,6 +134,16 @@ def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
 
 @pytest.mark.ci
 @pytest.mark.nightly
+def test_limits_of_a_state_that_are_not_opposite_are_found() -> None:
+    _, found = find("range")
+    (cause,) = found.causes
+    assert cause.name == "state-range"
+    limits = [cause.parameters[f"state-range:x1 {which}"].value for which in ("lower", "upper")]
+    assert limits == pytest.approx([-1.0, 2.0], rel=0.02)
+
+
+@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "cause", "value"),
     [("friction", "coulomb-friction", 2.0 / 12.0), ("spring", "cubic-stiffness", 0.125)],
@@ -151,7 +169,7 @@ def test_elastic_stop_of_an_oscillator_is_found_by_a_linear_simulation() -> None
 @pytest.mark.ci
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(each, marks=pytest.mark.nightly if each in {*OSCILLATORS, "limit"} else ()) for each in PROCESSES],
+    [pytest.param(each, marks=pytest.mark.nightly if each in BRIEFLY_SEARCHED else ()) for each in PROCESSES],
 )
 def test_extension_holds_for_another_record(name: str) -> None:
     record, found = find(name)

@@ -5,6 +5,7 @@ import pytest
 from islands.errors import ModelError, SettingsError
 from islands.export.equations.collection import collect_equations
 from islands.export.extension import EXTENDED_EXPORTS, export_extended
+from islands.expressions.tree import Symbol
 from islands.simulators.specification.table import LocalExtendedSpec
 from support.simulated_records import DT, MODEL
 
@@ -37,6 +38,20 @@ def make_spec(core, effects=(), inputs=("u_V",), **further):
             **further,
         }
     )
+
+
+def test_a_range_of_a_state_is_its_limits_in_a_program():
+    equations = {
+        "kind": "ode",
+        "name": "valve",
+        "input": "u",
+        "output": "x",
+        "equations": "dx/dt = u - x",
+        "effects": {"state-range:x": {}},
+    }
+    limits = {"state-range:x lower": -1.0, "state-range:x upper": 2.0}
+    (limit,) = collect_equations(make_spec(equations, {"state-range:x": limits})).limits.values()
+    assert (limit.lower, limit.upper) == tuple(map(Symbol, limits))
 
 
 @pytest.mark.parametrize(

@@ -135,6 +135,13 @@ def test_a_limit_of_a_state_holds_in_both_directions() -> None:
     assert np.ptp(ours.simulate(values)) > 0.2
 
 
+def test_a_range_of_a_state_has_a_lower_and_an_upper_limit() -> None:
+    ours = example("second-order")
+    values = np.array([0.5, 4.0, 200.0, 0.0, 0.0])
+    limited = ours.simulate(values, {"state-range:x lower": -0.02, "state-range:x upper": 0.05})
+    assert (limited.min(), limited.max()) == (-0.02, 0.05)
+
+
 def test_effects_enter_where_the_file_says() -> None:
     """A state that is the integral of another state has no balance; the shaft has its own unit of force."""
     motor = example("dc-motor")
