@@ -11,6 +11,7 @@ from islands.diagnosis.calibration.intersample_selection import select_intersamp
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.context import Signal, SimulationContext
+from islands.errors import RecordError
 from islands.expressions.tree import Symbol
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
@@ -55,7 +56,10 @@ def list_process_fits(fit: CalibrationResult, target: Target) -> list[Calibratio
         return []
     values = fit.values[fit.simulation.simulator_slice][: len(linear.parameters)]
     known = list_states(linear, values, context.dt)
-    single = estimate_linear(1, linear.delay, make_fitted_record(context, target))
+    try:
+        single = estimate_linear(1, linear.delay, make_fitted_record(context, target))
+    except RecordError:  # Its longest recording is too short for a linear model.
+        return []
     cascade = approximate_cascade(linear, single, known, context.dt)
     return [] if cascade is None else [_make_fit(cascade, linear.name, fit.output, context, target)]
 

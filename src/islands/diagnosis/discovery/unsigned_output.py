@@ -50,7 +50,7 @@ def fit_unsigned_output(base: CalibrationResult, target: Target, run: DiagnosisR
     -------
     ScreenedEffect or None
         None if the simulation is not linear or has prior values, if the search does not include such a
-        sensor, or if the record is too short.
+        sensor, or if the record is too short or has a constant input.
     """
     linear = get_linear(base)
     if linear is None or target.prior_std or UNSIGNED_SENSOR not in run.effects:
@@ -59,6 +59,8 @@ def fit_unsigned_output(base: CalibrationResult, target: Target, run: DiagnosisR
     try:
         found = _estimate(linear.denominator.size, linear.delay, record)
     except RecordError:  # It is too short for a linear model.
+        return None
+    if found is None:
         return None
     simulation = base.simulation.with_effects((UNSIGNED_SENSOR,))
     start = simulation.nominal
@@ -78,11 +80,11 @@ def _transfer_values(found: LinearSimulator, linear: LinearSimulator) -> Signal:
     return np.concatenate([numerator[first:], denominator, [level - gain * distance], state])
 
 
-def _estimate(order: int, delay: int, record: Dataset) -> LinearSimulator:
-    """Return the linear model whose absolute output is closest to a record."""
+def _estimate(order: int, delay: int, record: Dataset) -> LinearSimulator | None:
+    """Return the linear model whose absolute output is closest to a record; None if its input is constant."""
     starts = _list_signs(record.u[:, 0], record.y, order)
-    _, best = min((_refine(order, delay, record, signs) for signs in starts), key=lambda each: each[0])
-    return best
+    found = [_refine(order, delay, record, signs) for signs in starts]
+    return min(found, key=lambda each: each[0])[1] if found else None
 
 
 def _refine(order: int, delay: int, record: Dataset, signs: Signal) -> tuple[float, LinearSimulator]:

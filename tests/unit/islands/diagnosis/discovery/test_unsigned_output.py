@@ -5,14 +5,21 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.diagnosis.calibration.preparation import select_effects
+from islands.diagnosis.calibration.levenberg_marquardt import evaluate_fit
+from islands.diagnosis.calibration.preparation import make_target, select_effects
+from islands.diagnosis.discovery.state_equations import list_process_fits
+from islands.diagnosis.discovery.unsigned_output import fit_unsigned_output
 from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
 from islands.effects.nonlinearity import UNSIGNED_SENSOR
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.output_equation import add_output_equation
 from islands.simulators.specification.factory import make_simulator
+from islands.simulators.specification.table import LinearSpec
 
 #: Denominators of plants with two real poles, with a resonance, and with a resonance behind a lag.
 PLANTS: dict[str, list[float]] = {
@@ -67,3 +74,21 @@ def test_sensor_of_the_absolute_value_shows_no_sign_and_returns_to_zero(
     simulator = make_simulator("linear:2", record)
     context = make_context(record, simulator, record.samples)
     assert (UNSIGNED_SENSOR in select_effects(simulator, context, {})) is is_possible
+
+
+@pytest.mark.parametrize("change", ["constant input", "short recordings"])
+def test_a_record_that_determines_no_linear_model_has_no_signs(change: str) -> None:
+    record = make_record("linear:2", 0)
+    linear = LinearSpec(kind="linear", order=2, numerator=(0.0, 0.1, 0.1), denominator=(1.8, -0.9))
+    if change == "constant input":
+        record = islands.Dataset(np.ones(record.samples), record.y, record.dt, ("u_V",))
+    else:
+        record = islands.join(tuple(record[first : first + 30] for first in range(0, 800, 30)))
+    simulator = make_simulator(linear, record)
+    context = make_context(record, simulator, record.samples)
+    simulation = ExtendedSimulator(add_output_equation(simulator, context), (), context)
+    target = make_target(record, record.samples, {})
+    base = evaluate_fit(simulation, target, simulation.nominal)
+    assert fit_unsigned_output(base, target, DiagnosisRun([UNSIGNED_SENSOR])) is None
+    if change == "short recordings":
+        assert list_process_fits(base, target) == []
