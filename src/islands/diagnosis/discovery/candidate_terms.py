@@ -14,6 +14,7 @@ import numpy as np
 from islands.diagnosis.discovery.term_unit import divide_units, find_expression_unit, find_factor_unit
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
+from islands.expressions.primitives import ADD
 from islands.expressions.printing import render
 from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, substitute
 from islands.simulators.ode.equation_parser import FORCE, TIME
@@ -318,11 +319,12 @@ def list_candidate_terms(
         own = system.output if target == OUTPUT else dict(system.derivatives)[target]
         unit = units.get(target, "") if target == OUTPUT else divide_units(units.get(target, ""), "s")
         signals = [*states, *(outputs if target == OUTPUT else ()), system.input]
+        gains = {render(each) for each in _list_gains(target, own)}
         for text in dict.fromkeys(_list_texts(signals, rate)):
             expression = parse_expression(text)
             # Calibration absorbs gains, which a simulation without equations may have anywhere.
             is_gain = bool(system.simulated) and expression == Symbol(system.input)
-            if is_gain or render(expression) == render(own):
+            if is_gain or render(expression) in gains:
                 continue
             size, own_unit = _compute_size(expression, values), find_factor_unit(unit, expression, units)
             terms.append(CandidateTerm(target, text, size, unit=own_unit))
@@ -339,6 +341,17 @@ def list_candidate_terms(
             ]
             terms.append(_make_scaled(target, FADING_FORM, signal, sizes[signal], duration, (own_unit, "s")))
     return tuple(terms)
+
+
+def _list_gains(target: str, own: Expression) -> list[Expression]:
+    """Return the terms that are a gain of a right-hand side, or of a part of the output, as of ``x + D*u``.
+
+    Calibration absorbs the gain of a state that the output shows.
+    """
+    match own:
+        case Apply(primitive, (first, second)) if primitive == ADD and target == OUTPUT:
+            return [own, *_list_gains(target, first), *_list_gains(target, second)]
+    return [own]
 
 
 def write_rate_size(own: Expression) -> str:

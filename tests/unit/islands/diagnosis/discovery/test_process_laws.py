@@ -233,6 +233,16 @@ def test_a_process_has_laws_that_a_velocity_has_not() -> None:
     assert not {"abs(u - x - v)", "v**4", "(v + {scale})**4"} & of_velocity
 
 
+def test_the_gain_of_a_state_at_the_output_is_no_candidate() -> None:
+    system = OdeSpec.model_validate({**OSCILLATOR, "output": "x + 0.1*v + 0.2*u"}).make_system()
+    sizes = dict.fromkeys(("x", "v", "dx/dt", "dv/dt", "u", "rate(u)"), 2.0)
+    of_output = [
+        each.text for each in list_candidate_terms(system, sizes, 10.0, {}) if each.target == "output"
+    ]
+    assert "x" not in of_output
+    assert {"v", "u", "x**3"} <= set(of_output)
+
+
 def test_another_rate_in_one_direction_is_a_candidate_far_from_zero() -> None:
     document = {**PROCESS, "equations": "dx/dt = (u + level - x)/T", "parameters": {"T": 2.0, "level": 300.0}}
     system = OdeSpec.model_validate(document).make_system()
