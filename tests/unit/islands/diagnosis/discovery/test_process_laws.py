@@ -169,7 +169,10 @@ def test_elastic_stop_of_an_oscillator_is_found_by_a_linear_simulation() -> None
 @pytest.mark.ci
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(each, marks=pytest.mark.nightly if each in BRIEFLY_SEARCHED else ()) for each in PROCESSES],
+    [
+        pytest.param(each, marks=pytest.mark.nightly if each in (*BRIEFLY_SEARCHED, "limit") else ())
+        for each in PROCESSES
+    ],
 )
 def test_extension_holds_for_another_record(name: str) -> None:
     record, found = find(name)
