@@ -19,7 +19,8 @@ from islands.estimation.constraints.state_space import linearise_constraints
 from islands.estimation.covariance import sandwich
 from islands.estimation.damped_least_squares import inner_products
 from islands.estimation.fitted_state_space import number
-from islands.kernels.state_space import accumulate_products
+from islands.kernels.state_space import trace_states
+from islands.kernels.state_space_products import accumulate_products
 from islands.models.latent import LatentModel
 from islands.models.linear_system import Quantity, list_modes, measure_gains, measure_mode
 from islands.simulation.initial_states import estimate_initial_states, read_inputs
@@ -114,9 +115,13 @@ def _differentiate_errors(
         u, _ = read_inputs(record, model, begin, end)
         y = np.append(np.nan, record.y[first:end])
         rows = np.zeros((len(products), len(y)))
-        signals = np.ascontiguousarray(u), start, y, *model.limits.range
-        done = accumulate_products(model.theta, places, model.codes, *signals, columns, products, rows)
-        if done < len(y) or not np.isfinite(rows).all():
+        u, units = np.ascontiguousarray(u), len(model.codes)
+        traces = np.empty((len(y), model.order + 2 * units, 1))
+        if trace_states(model.theta, model.codes, u, start, traces) < len(y):
+            return None
+        signals = traces, 0, u, y, *model.limits.range
+        accumulate_products(model.theta, places, units, *signals, columns, products, rows)
+        if not np.isfinite(rows).all():
             return None
         found.append(rows[:, 1:])
     joined = np.concatenate(found, axis=1)

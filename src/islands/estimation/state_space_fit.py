@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
 from islands.estimation.constraints.static_state import StateSpace
-from islands.kernels.state_space import NO_DERIVATIVES, accumulate_products
+from islands.kernels.damped_step import solve_damped, solve_own
+from islands.kernels.state_space_products import NO_DERIVATIVES, accumulate_products
 from islands.models.latent import StateSpaceLayout
 from islands.simulation.segment_lanes import SegmentLanes
 
@@ -28,6 +29,15 @@ _PATIENCE, _MIN_GAIN = 4, 1e-5
 
 #: Least norm of the derivatives for a parameter, relative to the median, by which the parameter is scaled.
 _LEAST_SCALE = 1e-3
+
+
+class _Equations(NamedTuple):
+    """Normal equations of all segments, and the scales of the parameters and of the initial states."""
+
+    products: NDArray[np.float64]
+    total: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    own_scale: NDArray[np.float64]
 
 
 class _Move(NamedTuple):
@@ -101,11 +111,11 @@ class StateSpaceFit:
         self.places, self._damping, self.gain = places, _DAMPING, np.inf
 
     def _step(self) -> bool:
-        products = self._accumulate()
-        if products is None:
+        equations = self._accumulate()
+        if equations is None:
             return False
         while self._damping <= _MAX_DAMPING:
-            moved = self._move(products)
+            moved = self._move(equations)
             found = np.inf if moved is None else self._measure(moved.theta, moved.states)
             if moved is not None and found < self.mean_square:
                 self.gain = 1.0 - found / self.mean_square
@@ -121,55 +131,57 @@ class StateSpaceFit:
         errors = self.segments.sum_squared_errors(theta, self.codes, states)
         return np.inf if errors is None else float(errors.sum() / max(1, self.segments.counts.sum()))
 
-    def _accumulate(self) -> NDArray[np.float64] | None:
+    def _accumulate(self) -> _Equations | None:
         columns = int(self.places.max()) + 1
         size = columns + self.states.shape[1] + 1
         found = np.empty((len(self.segments), size, size))
-        for segment, start, products in zip(self.segments, self.states, found, strict=True):
-            rows = accumulate_products(
-                *(self.theta, self.places, self.codes, segment.u, start),
+        traces = self.segments.trace(self.theta, self.codes, self.states)
+        if traces is None:
+            return None
+        for lane, (segment, products) in enumerate(zip(self.segments, found, strict=True)):
+            accumulate_products(
+                *(self.theta, self.places, len(self.codes), traces, lane, segment.u),
                 *(segment.y, segment.lower, segment.upper, columns, products, NO_DERIVATIVES),
             )
-            if rows < len(segment.y):
-                return None
-        return found if np.isfinite(found).all() else None
+        if not np.isfinite(found).all():
+            return None
+        squares = np.diagonal(found, axis1=1, axis2=2)
+        scales = _scale(squares[:, :columns].sum(axis=0)), _scale(squares[:, columns:-1])
+        return _Equations(found, found[:, :columns].sum(axis=0), *scales)
 
-    def _move(self, products: NDArray[np.float64]) -> _Move | None:
-        """Return the parameters and states after a damped step; None if it cannot meet the conditions."""
-        order = self.states.shape[1]
-        columns = products.shape[1] - order - 1
-        own, shared = slice(columns, columns + order), slice(0, columns)
-        total = products[:, shared, shared].sum(axis=0)
-        scale = _scale(np.diagonal(total))
-        normal = total + self._damping * np.diag(scale**2)
-        blocks = products[:, own, own].copy()
-        # The right-hand sides of the states are the columns of the parameters, and the error.
-        others = np.concatenate([products[:, own, shared], products[:, own, -1:]], axis=2)
-        places = np.arange(order)
-        blocks[:, places, places] += self._damping * _scale(blocks[:, places, places]) ** 2
-        coupled = np.linalg.solve(blocks, others)
-        reduced = (products[:, shared, own] @ coupled).sum(axis=0)
-        right = products[:, shared, -1].sum(axis=0) - reduced[:, -1]
-        scaled = (normal - reduced[:, :-1]) / np.outer(scale, scale)
-        step = np.linalg.solve(scaled, right / scale) / scale
+    def _move(self, equations: _Equations) -> _Move | None:
+        """Return the parameters and states after a damped step.
+
+        None if it cannot meet the conditions, or the damping is too small for the rounding of the equations.
+        """
+        scale, own_scale = equations.scale, equations.own_scale
+        blocks, step = np.empty((*own_scale.shape, own_scale.shape[1])), np.empty(len(scale))
+        factors = np.empty((own_scale.size + len(scale), len(scale) + 1))
+        if not solve_damped(*equations, self._damping, blocks, factors, step):
+            return None
         theta, free, rests = self.theta.copy(), self.places >= 0, self._rests
-        theta[free] += step[self.places[free]]
+        theta[free] += (step / scale)[self.places[free]]
         if self.conditions.statics:
+            root = factors[own_scale.size :, :-1]
 
             def invert(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-                return np.linalg.solve(scaled, columns / scale[:, None]) / scale[:, None]
+                half = np.linalg.solve(root.T, columns / scale[:, None])
+                return np.linalg.solve(root, half) / scale[:, None]
 
             started = self.system.with_theta(theta)
             corrected = self.conditions.correct(started, free, invert, starts=rests)
             if corrected is None:
                 return None
             theta, rests = corrected[0].theta, corrected[1].states
-            step = (theta - self.theta)[free]
-        return _Move(theta, self.states + coupled[:, :, -1] - coupled[:, :, :-1] @ step, rests)
+            step = (theta - self.theta)[free] * scale
+        changes = np.empty(own_scale.shape)
+        solve_own(blocks, factors, step, changes)
+        return _Move(theta, self.states + changes, rests)
 
 
 def _scale(squares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the norms of derivatives along the last axis, none much smaller than their median."""
     norms = np.sqrt(np.maximum(squares, 0.0))
-    least = _LEAST_SCALE * np.median(norms, axis=-1, keepdims=True)
+    middle = norms.shape[-1] // 2
+    least = _LEAST_SCALE * np.sort(norms, axis=-1)[..., middle : middle + 1]
     return np.maximum(norms, np.maximum(least, np.finfo(float).tiny ** 0.25))

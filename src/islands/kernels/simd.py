@@ -4,7 +4,8 @@
 LLVM's ``[count x <8 x double>]`` and defines one function per operation. The compiler maps it to the
 registers of the processor: eight lanes are one register of AVX-512, two of AVX2, four of SSE2. The source
 fixes the number of lanes and with it the order of every sum over them, so no result depends on the processor.
-For the same reason no operation is contracted into a fused multiply-add.
+For the same reason no operation is contracted into a fused multiply-add; where the source asks for one, as
+``multiply_add``, its single rounding is that of every processor.
 
 A count is a constant: ``load(arena, offset, 4)``. Offsets are in values, not in bytes. There are no bounds
 checks.
@@ -99,6 +100,18 @@ def broadcast(_typingctx, number, count):
     return SimdVector(count.literal_value)(types.float64, count), generate
 
 
+@intrinsic(prefer_literal=True)
+def spread(_typingctx, array, offset, count):
+    """Return a vector with the value of an array at an offset in every lane."""
+
+    def generate(context, builder, signature, arguments):
+        number = builder.load(_pointer_in_array(context, builder, signature, arguments))
+        vector = _broadcast(builder, number)
+        return _build(builder, signature.return_type.count, lambda _i: vector)
+
+    return SimdVector(count.literal_value)(array, types.int64, count), generate
+
+
 @intrinsic
 def add(_typingctx, a, b):
     """Return ``a + b``."""
@@ -115,6 +128,12 @@ def subtract(_typingctx, a, b):
 def multiply(_typingctx, a, b):
     """Return ``a * b``."""
     return a(a, b), elementwise(lambda builder, x, y: builder.fmul(x, y))
+
+
+@intrinsic
+def multiply_add(_typingctx, a, b, c):
+    """Return ``a * b + c``, rounded once: one operation of a processor with AVX2, a slow call on others."""
+    return a(a, b, c), elementwise(_fuse)
 
 
 @intrinsic
@@ -179,6 +198,43 @@ def outer(_typingctx, a, b):
 def outer_upper(_typingctx, a):
     """Return the products of four vectors with each other: each with itself and with those after it."""
     return SimdVector(10)(a), _generate_products([(i, j) for i in range(4) for j in range(i, 4)])
+
+
+@intrinsic
+def add_outer(_typingctx, sums, a, b):
+    """Return the sums of 16 vectors and of the products of `outer`, each rounded once."""
+    return sums(sums, a, b), _generate_sums([(i, j) for i in range(4) for j in range(4)])
+
+
+@intrinsic
+def add_outer_upper(_typingctx, sums, a):
+    """Return the sums of ten vectors and of the products of `outer_upper`, each rounded once."""
+    return sums(sums, a), _generate_sums([(i, j) for i in range(4) for j in range(i, 4)])
+
+
+def _generate_sums(places):
+    def generate(_context, builder, _signature, arguments):
+        sums, one, other = arguments[0], arguments[1], arguments[-1]
+        return _build(
+            builder,
+            len(places),
+            lambda k: _fuse(
+                builder,
+                builder.extract_value(one, places[k][0]),
+                builder.extract_value(other, places[k][1]),
+                builder.extract_value(sums, k),
+            ),
+        )
+
+    return generate
+
+
+def _fuse(builder, a, b, c):
+    name = f"llvm.fma.v{VECTOR}f64"
+    function = builder.module.globals.get(name)
+    if function is None:
+        function = ir.Function(builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * 3), name)
+    return builder.call(function, [a, b, c])
 
 
 def _generate_products(places):

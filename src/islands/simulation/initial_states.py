@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.kernels.state_space import NO_DERIVATIVES, accumulate_products, simulate_state_space
+from islands.kernels.state_estimation import find_nearest, minimise_error
+from islands.kernels.state_space import simulate_state_space
 from islands.models.latent import LatentModel
 
 #: Weight of the measurement of the initial states, relative to the variance of the output of the states.
@@ -21,9 +22,6 @@ _DISTANCE = 2.0
 
 #: Rows from which each state is first estimated if the model diverges in the whole of them.
 _FIRST_ROWS = 3
-
-#: Steps of the estimation of initial states, and the step that ends it.
-_STATE_STEPS, _NEGLIGIBLE_STEP = 30, 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,9 +120,8 @@ def _find_starts(
         return [rest]
     moved = [rest + sign * _DISTANCE * row for row in np.eye(len(rest)) for sign in (1.0, -1.0)]
     starts = [rest, *moved]
-    runs = [simulate_errors(theta, codes, segment, each) for each in starts]
-    errors = [np.inf if run is None else float(np.nansum(run**2)) for run in runs]
-    best = int(np.argmin(errors))
+    limits = segment.lower, segment.upper
+    best = find_nearest(theta, codes, segment.u, segment.y, *limits, np.array(starts))
     return [rest, starts[best]] if best else [rest]
 
 
@@ -141,35 +138,12 @@ def _minimise(
     start: NDArray[np.float64],
     rest: NDArray[np.float64],
 ) -> tuple[float, NDArray[np.float64]] | None:
-    """Return the least error and its states by Gauss-Newton steps; None if the model diverges from the start.
-
-    A step that increases the error is halved.
-    """
+    """Return the least error and its states; None if the model diverges at the start."""
     order = len(rest)
-    places = np.full(theta.size, -1)
-    fixed = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
-    best, least = start, np.inf
-    step = np.zeros_like(start)
-    products = np.empty((order + 1, order + 1))
-    for _ in range(_STATE_STEPS):
-        states = best + step
-        rows = accumulate_products(
-            *(theta, places, codes, segment.u, states, segment.y, segment.lower, segment.upper),
-            *(0, products, NO_DERIVATIVES),
-        )
-        error = products[-1, -1] + fixed * float(np.sum((states - rest) ** 2))
-        if rows == len(segment.y) and np.isfinite(products).all() and error < least:
-            best, least = states, error
-            normal = products[:-1, :-1] + fixed * np.eye(order)
-            right = products[:-1, -1] - fixed * (states - rest)
-            step = np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0], np.float64)
-        elif least == np.inf:
-            return None
-        else:
-            step = step / 2.0
-        if np.abs(step).max() < _NEGLIGIBLE_STEP:
-            break
-    return least, best
+    weight = _RIDGE * float(np.sum(theta[order * (order + segment.u.shape[1]) :][:order] ** 2))
+    states, limits = np.array(start), (segment.lower, segment.upper)
+    least = minimise_error(theta, codes, segment.u, segment.y, *limits, rest, weight, states)
+    return None if least == np.inf else (least, states)
 
 
 def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tuple[NDArray[np.float64], int]:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.kernels.simd import VECTOR
-from islands.kernels.state_space_lanes import sum_squared_errors
+from islands.kernels.state_space import trace_states
+from islands.kernels.state_space_lanes import sum_squared_errors, trace_lanes
 from islands.simulation.initial_states import Segment, simulate_errors
 
 
@@ -78,3 +79,29 @@ class SegmentLanes(Sequence[Segment]):
         signals = self._u, self._y, self._lengths
         is_bounded = sum_squared_errors(theta, codes, *signals, *limits, states, total)
         return total[: len(self)] if is_bounded else None
+
+    def trace(
+        self, theta: NDArray[np.float64], codes: NDArray[np.int64], starts: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Return the states, the units and their slopes of the free runs; None if one diverges.
+
+        Parameters
+        ----------
+        theta, codes, starts
+            As of `sum_squared_errors`.
+
+        Returns
+        -------
+        ndarray, shape (rows, states and units and units, lanes), or None
+            A lane for each segment, and further ones.
+        """
+        items = starts.shape[1] + 2 * len(codes)
+        if len(self) == 1:
+            traces = np.empty((len(self[0].y), items, 1))
+            is_bounded = trace_states(theta, codes, self[0].u, starts[0], traces) == len(traces)
+        else:
+            traces = np.empty((len(self._u), items, len(self._lengths)))
+            states = np.zeros((starts.shape[1], len(self._lengths)))
+            states[:, : len(self)] = starts.T
+            is_bounded = trace_lanes(theta, codes, self._u, self._lengths, states, traces)
+        return traces if is_bounded else None
