@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
 from islands.estimation.constraints.static_state import StateSpace
 from islands.kernels.damped_step import solve_damped, solve_own
+from islands.kernels.dependent_parameters import extend_products, find_dependent
 from islands.kernels.state_space_products import NO_DERIVATIVES, accumulate_products
 from islands.models.latent import StateSpaceLayout
 from islands.simulation.segment_lanes import SegmentLanes
@@ -32,12 +33,14 @@ _LEAST_SCALE = 1e-3
 
 
 class _Equations(NamedTuple):
-    """Normal equations of all segments, and the scales of the parameters and of the initial states."""
+    """Normal equations of all segments; see `solve_damped`."""
 
-    products: NDArray[np.float64]
+    own_rows: NDArray[np.float64]
     total: NDArray[np.float64]
     scale: NDArray[np.float64]
     own_scale: NDArray[np.float64]
+    #: Place of each parameter in the equations, -1 of a fixed one. Dependent ones are last.
+    order: NDArray[np.int64]
 
 
 class _Move(NamedTuple):
@@ -132,48 +135,60 @@ class StateSpaceFit:
         return np.inf if errors is None else float(errors.sum() / max(1, self.segments.counts.sum()))
 
     def _accumulate(self) -> _Equations | None:
-        columns = int(self.places.max()) + 1
-        size = columns + self.states.shape[1] + 1
-        found = np.empty((len(self.segments), size, size))
         traces = self.segments.trace(self.theta, self.codes, self.states)
         if traces is None:
             return None
+        columns, (segments, own), units = int(self.places.max()) + 1, self.states.shape, len(self.codes)
+        directions = np.empty((own * (own + 1), columns + self.states.size))
+        dependent, inputs = np.empty(len(directions), np.int64), self.segments[0].u.shape[1]
+        sizes = inputs, units, self.states, columns
+        count = find_dependent(self.theta, self.places, *sizes, directions, dependent)
+        kept = np.delete(np.arange(columns), dependent[:count])
+        order = np.full(columns + 1, -1)
+        order[[*kept, *dependent[:count]]] = range(columns)
+        order = order[self.places]
+        found = np.empty((segments, len(kept) + own + 1, len(kept) + own + 1))
+        places = np.where(order < len(kept), order, -1)
         for lane, (segment, products) in enumerate(zip(self.segments, found, strict=True)):
             accumulate_products(
-                *(self.theta, self.places, len(self.codes), traces, lane, segment.u),
-                *(segment.y, segment.lower, segment.upper, columns, products, NO_DERIVATIVES),
+                *(self.theta, places, units, traces, lane, segment.u),
+                *(segment.y, segment.lower, segment.upper, len(kept), products, NO_DERIVATIVES),
             )
         if not np.isfinite(found).all():
             return None
-        squares = np.diagonal(found, axis1=1, axis2=2)
-        scales = _scale(squares[:, :columns].sum(axis=0)), _scale(squares[:, columns:-1])
-        return _Equations(found, found[:, :columns].sum(axis=0), *scales)
+        own_rows, total = np.empty((segments, own, columns + own + 1)), np.empty((columns, columns + 1))
+        combinations = directions[:count, [*kept, *range(columns, directions.shape[1])]]
+        extend_products(found, combinations, own_rows, total)
+        own_squares = np.diagonal(found, axis1=1, axis2=2)[:, len(kept) : -1]
+        return _Equations(own_rows, total, _scale(np.diagonal(total)), _scale(own_squares), order)
 
     def _move(self, equations: _Equations) -> _Move | None:
         """Return the parameters and states after a damped step.
 
         None if it cannot meet the conditions, or the damping is too small for the rounding of the equations.
         """
-        scale, own_scale = equations.scale, equations.own_scale
+        own_rows, total, scale, own_scale, order = equations
         blocks, step = np.empty((*own_scale.shape, own_scale.shape[1])), np.empty(len(scale))
         factors = np.empty((own_scale.size + len(scale), len(scale) + 1))
-        if not solve_damped(*equations, self._damping, blocks, factors, step):
+        if not solve_damped(own_rows, total, scale, own_scale, self._damping, blocks, factors, step):
             return None
         theta, free, rests = self.theta.copy(), self.places >= 0, self._rests
-        theta[free] += (step / scale)[self.places[free]]
+        at = order[free]
+        theta[free] += (step / scale)[at]
         if self.conditions.statics:
-            root = factors[own_scale.size :, :-1]
+            root = factors[own_scale.size :, :-1][:, at]
 
             def invert(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-                half = np.linalg.solve(root.T, columns / scale[:, None])
-                return np.linalg.solve(root, half) / scale[:, None]
+                scales = scale[at, None]
+                half = np.linalg.solve(root.T, columns / scales)
+                return np.linalg.solve(root, half) / scales
 
             started = self.system.with_theta(theta)
             corrected = self.conditions.correct(started, free, invert, starts=rests)
             if corrected is None:
                 return None
             theta, rests = corrected[0].theta, corrected[1].states
-            step = (theta - self.theta)[free] * scale
+            step[at] = (theta - self.theta)[free] * scale[at]
         changes = np.empty(own_scale.shape)
         solve_own(blocks, factors, step, changes)
         return _Move(theta, self.states + changes, rests)

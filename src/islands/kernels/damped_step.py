@@ -62,22 +62,22 @@ def _subtract_rows(rows, width, row, count, place):
 
 
 @kernel(forceinline=True)
-def _eliminate(products, scale, own_scale, damping, width, blocks, rows):
+def _eliminate(own_rows, scale, own_scale, damping, width, blocks, rows):
     """Write the factors of the equations of all segments, and their rows; return whether they exist."""
     shared, own = scale.size, own_scale.shape[1]
-    for segment in range(len(products)):
+    for segment in range(len(own_rows)):
         block = blocks[segment]
         for i in range(own):
             for j in range(own):
-                block[i, j] = products[segment, shared + i, shared + j]
+                block[i, j] = own_rows[segment, i, shared + j]
             block[i, i] += damping * own_scale[segment, i] ** 2
         if not factor(block):
             return False
         for i in range(own):
             at = (segment * own + i) * width
             for j in range(shared):
-                rows[at + j] = products[segment, shared + i, j] / scale[j]
-            rows[at + shared] = products[segment, shared + i, shared + own]
+                rows[at + j] = own_rows[segment, i, j] / scale[j]
+            rows[at + shared] = own_rows[segment, i, shared + own]
             for k in range(i):
                 before, ratio = (segment * own + k) * width, block[i, k]
                 for j in range(shared + 1):
@@ -89,8 +89,8 @@ def _eliminate(products, scale, own_scale, damping, width, blocks, rows):
 
 @kernel
 def solve_damped(
-    products,  # float64 [segment, size, size]: of shared columns, own ones, and the error
-    total,  # float64 [shared, size]: sum of the first rows over the segments
+    own_rows,  # float64 [segment, own, shared + own + 1]: products of own columns with all, and the error
+    total,  # float64 [shared, shared + 1]: of the shared columns of all segments, and with the error
     scale,  # float64 [shared]: scale of each shared parameter
     own_scale,  # float64 [segment, own]
     damping,
@@ -103,14 +103,14 @@ def solve_damped(
     width = -(-(shared + 1) // (4 * VECTOR)) * 4 * VECTOR
     rows = padded_size((before + shared) * width)
     rows[:] = 0.0
-    if not _eliminate(products, scale, own_scale, damping, width, blocks, rows):
+    if not _eliminate(own_rows, scale, own_scale, damping, width, blocks, rows):
         return False
     for i in range(shared):
         at = (before + i) * width
         for j in range(i, shared):
             rows[at + j] = total[i, j] / (scale[i] * scale[j])
         rows[at + i] += damping
-        rows[at + shared] = total[i, total.shape[1] - 1] / scale[i]
+        rows[at + shared] = total[i, shared] / scale[i]
         _subtract_rows(rows, width, before + i, before + i, i)
         pivot = rows[at + i]
         if not pivot > 0.0:

@@ -21,10 +21,11 @@ def solve(products, shared, own):
     """Return whether there is a step, and the step of the shared and of the own parameters."""
     squares = np.diagonal(products, axis1=1, axis2=2)
     scale, own_scale = np.sqrt(squares[:, :shared].sum(axis=0)), np.sqrt(squares[:, shared:-1])
-    total = products[:, :shared].sum(axis=0)
+    total = np.delete(products[:, :shared].sum(axis=0), range(shared, shared + own), axis=1)
+    own_rows = products[:, shared:-1].copy()
     blocks, step = np.empty((SEGMENTS, own, own)), np.empty(shared)
     factors, changes = np.empty((SEGMENTS * own + shared, shared + 1)), np.empty((SEGMENTS, own))
-    found = solve_damped(products, total, scale, own_scale, DAMPING, blocks, factors, step)
+    found = solve_damped(own_rows, total, scale, own_scale, DAMPING, blocks, factors, step)
     if found:
         solve_own(blocks, factors, step, changes)
     return found, step / scale, changes
