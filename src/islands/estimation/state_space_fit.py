@@ -176,7 +176,8 @@ class StateSpaceFit:
         at = order[free]
         theta[free] += (step / scale)[at]
         if self.conditions.statics:
-            root = factors[own_scale.size :, :-1][:, at]
+            # Values below the diagonal have no meaning.
+            root = np.triu(factors[own_scale.size :, :-1])[:, at]
 
             def invert(columns: NDArray[np.float64]) -> NDArray[np.float64]:
                 scales = scale[at, None]

@@ -1,8 +1,8 @@
 """Damped step of a least-squares fit whose segments have own parameters, the states at their first rows.
 
 The parameters of a segment are eliminated from the normal equations (Schur complement), all by Cholesky
-factors. The rows of the factors are vectors. A row of the reduced equations has the rows of the eliminated
-ones subtracted in the same way as those of its own factor, and the right-hand side is one more column.
+factors. The rows of the factors are vectors: those of the eliminated parameters are subtracted from the
+reduced equations as are the rows of the shared ones before, and the right-hand side is one more column.
 """
 
 import math
