@@ -69,7 +69,7 @@ def test_equations_have_the_values_of_the_parameters(record):
     model = model_of(record)
     assert export(model, "plain").splitlines() == [
         "y(k) = x1(k) + 10",
-        "x1(k) = 0.9*x1(k-1) + (1 - 0.9)*(2 + (-0.4)*u(k-1))*u(k-1)",
+        "x1(k) = 0.9*x1(k-1) + (1 - 0.9)*(2 - 0.4*u(k-1))*u(k-1)",
     ]
     assert "x_{1,k-1}" in export(model, "latex")
     assert "<mi>x</mi><mrow><mn>1</mn><mo>,</mo><mi>k</mi>" in export(model, "mathml")
