@@ -84,7 +84,7 @@ def _describe_experiment(experiment: NextExperiment | None) -> dict[str, Any]:
     if experiment is None:
         return {"decisive_experiment": None, "next_experiment": None}
     return {
-        "decisive_experiment": write_advice(experiment),
+        "decisive_experiment": write_advice(experiment) or None,
         "next_experiment": describe_next_experiment(experiment),
     }
 

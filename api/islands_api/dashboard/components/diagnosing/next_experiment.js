@@ -78,7 +78,7 @@ export function makeNextExperiment(job, { next_experiment: experiment, decisive_
     el("p", { class: "soft small" }, ABOUT),
     makePairTable(pairs),
     input === null
-      ? el("p", {}, `${words}.`)
+      ? words && el("p", {}, `${words}.`)
       : [
           makeInputFacts(input),
           makeInputPlot(job, input, signal),
