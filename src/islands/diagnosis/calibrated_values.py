@@ -37,9 +37,11 @@ def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[Calibrated
     for place, parameter in enumerate(parameters, part.start):
         if parameter.initial or parameter.name in terms:
             continue
-        value = float(fit.values[place])
-        half = None if deviations is None else 1.96 * float(deviations[place])
-        interval = None if half is None else (value - half, value + half)
-        estimate = Value(value, parameter.unit, interval)
+        value, unit = float(fit.values[place]), parameter.unit
+        estimate = (
+            Value(value, unit, None)
+            if deviations is None
+            else Value.estimate(value, unit, float(deviations[place]))
+        )
         values.append(CalibratedValue(parameter.name, parameter.nominal, alone.get(parameter.name), estimate))
     return tuple(values)

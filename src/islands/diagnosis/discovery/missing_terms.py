@@ -285,9 +285,8 @@ def describe_terms(
     for each in found.terms:
         values = {}
         for name in each.parameters:
-            value, half = float(fit.values[places[name]]), 1.96 * float(deviations[places[name]])
             unit = fit.simulation.parameters[places[name]].unit
-            values[name] = Value(value, unit, (value - half, value + half))
+            values[name] = Value.estimate(fitted[name], unit, float(deviations[places[name]]))
         findings.append(
             Finding(
                 *(MISSING_TERM, FAMILY, confidence, (), values, each.gain),

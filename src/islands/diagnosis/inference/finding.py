@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import scipy
@@ -53,6 +54,12 @@ class Value:
     value: float
     unit: str
     ci95: tuple[float, float] | None
+
+    @classmethod
+    def estimate(cls, value: float, unit: str, deviation: float) -> Self:
+        """Return an estimate with a standard deviation."""
+        half_width = 1.96 * deviation
+        return cls(value, unit, (value - half_width, value + half_width))
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,6 +361,5 @@ def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> M
         if fit.simulation.is_copy[index]:
             continue
         parameter, value = fit.simulation.parameters[index], float(fit.values[index])
-        half_width = 1.96 * float(deviations[index])
-        values[parameter.name] = Value(value, parameter.unit, (value - half_width, value + half_width))
+        values[parameter.name] = Value.estimate(value, parameter.unit, float(deviations[index]))
     return values

@@ -750,17 +750,14 @@ def _describe_exchange(facts: DiagnosisFacts) -> str:
         else f"does not fall significantly: {before} without them, {after} with them"
     )
     text += f"the RMSE of the data that were used for estimation {falls}."
-    listed, different = (
-        "; ".join(
-            f"{each['name']} = {each['estimation']:.3g} and {each['validation']:.3g} {each['unit']}".rstrip()
-            for each in values
-            if not (each["agrees"] and chosen)
-        )
-        for chosen in (False, True)
+    different = [each for each in values if not each["agrees"]]
+    listed = "; ".join(
+        f"{each['name']} = {each['estimation']:.3g} and {each['validation']:.3g} {each['unit']}".rstrip()
+        for each in different or values
     )
     if different:
         return (
-            f"{text} Both parts have different values: {different}. The system differs between them, or the "
+            f"{text} Both parts have different values: {listed}. The system differs between them, or the "
             "cause is another one."
         )
     compared = f" ({listed})" if listed else ""
