@@ -1,5 +1,6 @@
 """Static nonlinearities of input, coordinate, state and output."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -304,6 +305,26 @@ _CAUGHT = (0.0, 0.5)
 _MAX_LEVEL = 4.0
 
 
+def _make_state_limit(
+    label: str,
+    template: EffectTemplate,
+    parameters: Callable[[SimulationContext], tuple[Parameter, ...]],
+    starting_points: Callable[[SimulationContext, Signal], Sequence[tuple[float, ...]]],
+) -> Effect:
+    """Return an effect that limits a state."""
+    return Effect(
+        name=label,
+        summary=template.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+        linear_parameters=0,
+    )
+
+
 def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = True) -> Effect:
     """Return the limit on one state as an effect, with its unit and peak if they are not those of the output.
 
@@ -322,17 +343,7 @@ def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = Tru
             tuple((level, caught) for level in levels for caught in _CAUGHT) if spills else tuple(zip(levels))
         )
 
-    return Effect(
-        name=label,
-        summary=STATE_CLIP.summary,
-        family="shape",
-        site=Site.CORE,
-        parameters=parameters,
-        starting_points=starting_points,
-        form=None,
-        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
-        linear_parameters=0,
-    )
+    return _make_state_limit(label, STATE_CLIP, parameters, starting_points)
 
 
 #: Starting points of the limits of a range, as parts of the range of the output by which they narrow it.
@@ -365,17 +376,7 @@ def state_range(state: str, unit: str) -> Effect:
         cuts = [-_FREE * (high - low), *(cut * (high - low) for cut in _CUTS)]
         return tuple((low + below, high - above) for below in cuts for above in cuts)[1:]
 
-    return Effect(
-        name=label,
-        summary=STATE_RANGE.summary,
-        family="shape",
-        site=Site.CORE,
-        parameters=parameters,
-        starting_points=starting_points,
-        form=None,
-        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
-        linear_parameters=0,
-    )
+    return _make_state_limit(label, STATE_RANGE, parameters, starting_points)
 
 
 STATE_RANGE = EffectTemplate(
