@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.data.flat_extremes import find_limits
 from islands.data.split import measure_input_ranges
 from islands.estimation.estimator_table import Criterion
 from islands.evolution.search_result import SearchResult
@@ -114,6 +115,7 @@ def _data_document(found: SearchResult) -> dict[str, Any]:
     return {
         "missing_outputs": int(np.isnan(found.record.y).sum()),
         "output_range": found.record.output_range,
+        "output_limits": list(find_limits(found.record.y, found.record.bounds)),
         "noise": measure_output_noise(found.split.estimation),
         "inputs": {part: measure_input_ranges(record) for part, record in parts.items()},
     }

@@ -399,6 +399,12 @@ class ResultFacts(RunFacts):
         return [f"{each}, in means of {count} samples" for each in found] if count > 1 else found
 
     @property
+    def ignores_limits(self) -> bool:
+        """Whether the measured output is flat at an extreme, and the model is a difference equation."""
+        limits = self.data.get("output_limits") or ()
+        return "kind" not in self.model and any(each is not None for each in limits)
+
+    @property
     def is_unpredictable_ahead(self) -> bool:
         """Whether the error of the free run has a cause that the residual one step ahead does not show."""
         return (self.has_structure or self.exceeds_noise) and not exceeds_limit(self.share("one_step_ahead"))
@@ -1184,6 +1190,14 @@ NEXT_STEPS: Final[tuple[Statement[ResultFacts], ...]] = (
         "wider-record",
         lambda facts: facts.generalises_poorly or facts.extrapolation,
         lambda _: "estimate from a record that covers the amplitudes and rates of the validation data",
+    ),
+    Statement(
+        "sensor-limits",
+        lambda facts: facts.ignores_limits,
+        lambda facts: (
+            f"if the sensor of {facts.names[0]} is at its limit in the flat samples, estimate a model that "
+            f"has this limit ({name_option('model', 'latent')})"
+        ),
     ),
     Statement("insignificant", lambda facts: facts.insignificant, _describe_longer_record),
     Statement(
