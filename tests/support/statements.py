@@ -102,6 +102,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (r"(is|,) a rounding error", r"the RMSE is [\d.e+]+ times the floor"),
     (_FAR, r"(What remains counts as coloured noise|The noise is large)"),
     (r"measured from repeated periods", r"(an upper bound|that repeats three times would)"),
+    (r"Extended simulation: ", r"Calibrated with them: "),
     (r"no effect alone improves the fit", r"none of which is confirmed"),
 )
 

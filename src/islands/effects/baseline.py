@@ -1,10 +1,12 @@
 """Effects on the baseline: offsets, drifts and jumps."""
 
-from islands.effects.channels import channel, channel_range, channel_unit, has_channel
+from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, EffectTemplate, Formula, Signal, SimulationContext, Site
+from islands.effects.interface.formula import Quantity
 from islands.effects.interface.map_equation import MapEquation
 from islands.effects.time_variation import (
+    STEP_NOTE,
     candidate_instants,
     instant_bounds,
     smooth_step,
@@ -33,6 +35,7 @@ OFFSET = Effect(
     starting_points=_offset_starting_points,
     form=_offset_form,
     equation=lambda _: MapEquation("x + n0"),
+    formula=Formula("x + c"),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, even-nonlinearity, input-offset",
     distinguished_by="the mean of the residual",
@@ -61,6 +64,7 @@ def input_offset(state: str, unit: str = "", size: float = 0.0) -> Effect:
         parameters=parameters,
         starting_points=starting_points,
         form=None,
+        formula=Formula(symbols=(f"offset_{state}",)),
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
     )
 
@@ -97,6 +101,13 @@ LINEAR_DRIFT = Effect(
     starting_points=_linear_drift_starting_points,
     form=_linear_drift_form,
     equation=lambda context: MapEquation(f"x + n0*t/{context.duration}"),
+    formula=Formula(
+        "x + c*t/T",
+        quantities=lambda values, context: (
+            Quantity("c", float(values[0]), context.output_unit, "c"),
+            Quantity("T", context.duration, "s"),
+        ),
+    ),
     source="Doebelin, Measurement Systems, section 3",
     depends_on_time=True,
     similar_to="jump, thermal-drift, exponential-creep",
@@ -129,6 +140,7 @@ JUMP = Effect(
     starting_points=_jump_starting_points,
     form=_jump_form,
     equation=lambda context: MapEquation(f"x + n0*{write_step(context, 'n1')}"),
+    formula=Formula("x + c*step(t - t0)", symbols=("c", "t0"), note=STEP_NOTE),
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
     depends_on_time=True,
@@ -168,6 +180,7 @@ THERMAL_DRIFT = Effect(
     starting_points=_thermal_drift_starting_points,
     form=_thermal_drift_form,
     equation=lambda _: MapEquation("x + n0*z0", (("temperature",),)),
+    formula=Formula("x + k*(T - T_0)", names=("T", "T_0"), note=TEMPERATURE_NOTE),
     source="Doebelin, Measurement Systems, section 2",
     is_applicable=lambda context: has_channel(context, True),
     similar_to="cross-coupling; linear-drift if the temperature only rises",

@@ -6,6 +6,10 @@ from islands.data.channel_names import TEMPERATURES
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.errors import RecordError
 
+#: Notes on the formulas of effects of a channel.
+TEMPERATURE_NOTE = "{T} is the first temperature among the channels, {T_0} its first value"
+CHANNEL_NOTE = "{w} is the first channel that is not a temperature"
+
 
 def has_channel(context: SimulationContext, thermal: bool) -> bool:
     """Return whether a channel varies: a temperature if ``thermal``, otherwise any other signal."""

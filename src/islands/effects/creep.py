@@ -7,7 +7,8 @@ import numpy as np
 from islands.data.segments import is_resting
 from islands.effects.filters import low_pass
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
+from islands.effects.interface.formula import Quantity
 from islands.effects.interface.map_equation import MapEquation
 
 #: Largest step before the first sample, times the fraction that creeps, relative to the largest output.
@@ -73,6 +74,14 @@ EXPONENTIAL_CREEP = Effect(
     starting_points=_exponential_creep_starting_points,
     form=_exponential_creep_form,
     equation=lambda context: _write_creep(["exp(n1)"], context),
+    formula=Formula(
+        "x + kappa*(z - z(0))",
+        quantities=lambda values, _: (
+            Quantity("kappa", float(values[0]), "", "kappa"),
+            Quantity("tau", float(np.exp(values[1])), "s"),
+        ),
+        states=(("z", "(x - z)/tau"),),
+    ),
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
     similar_to="relaxation, logarithmic-creep, linear-drift",
     distinguished_by="the output continues at constant input, with one time constant",
@@ -106,6 +115,12 @@ LOGARITHMIC_CREEP = Effect(
     starting_points=_logarithmic_creep_starting_points,
     form=_logarithmic_creep_form,
     equation=lambda context: _write_creep(list(map(str, TAUS)), context),
+    formula=Formula(
+        "x + kappa*f(x)",
+        names=("f",),
+        note="{f} is a sum of low-passes with the time constants "
+        f"{', '.join(f'{tau:g}' for tau in TAUS[:-1])} and {TAUS[-1]:g} s, less their first values",
+    ),
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
     similar_to="exponential-creep",
     distinguished_by="the output continues at constant input, by equal steps in each decade of time",

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.effects.channels import channel, channel_range, channel_unit, has_channel
+from islands.effects.channels import CHANNEL_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.input_spectrum import LINE_WIDTH, compute_spectrum, find_single_frequency
 from islands.effects.interface.map_equation import MapEquation
 
@@ -41,6 +41,7 @@ SECOND_INPUT = Effect(
     starting_points=_second_input_starting_points,
     form=_add_channel,
     equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
+    formula=Formula("x + k*w", names=("w",), note=CHANNEL_NOTE),
     source="Ljung, System Identification, 2nd ed., section 4.2",
     is_applicable=lambda context: has_channel(context, False),
     similar_to="cross-coupling",
@@ -75,6 +76,7 @@ CROSS_COUPLING = Effect(
     starting_points=_cross_coupling_starting_points,
     form=_add_channel,
     equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
+    formula=Formula("x + k*w", names=("w",), note=CHANNEL_NOTE),
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),
     similar_to="thermal-drift, second-input",
@@ -146,6 +148,7 @@ PERIODIC_DISTURBANCE = Effect(
     starting_points=_periodic_disturbance_starting_points,
     form=_periodic_disturbance_form,
     equation=lambda _: MapEquation(f"x + n0*cos({2 * np.pi}*n2*t) + n1*sin({2 * np.pi}*n2*t)"),
+    formula=Formula("x + a*cos(2*pi*f*t) + b*sin(2*pi*f*t)", symbols=("a", "b", "f")),
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
     linear_parameters=2,
     extra_degrees_of_freedom=2,

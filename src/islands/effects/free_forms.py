@@ -12,7 +12,8 @@ import numpy as np
 
 from islands.effects import free_maps
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Map, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, Map, Signal, SimulationContext, Site
+from islands.effects.interface.formula import write_curve_formula
 from islands.effects.interface.map_equation import MakeEquation, MapEquation
 from islands.kernels.curve import VALUES, interpolate, write_curve
 
@@ -36,6 +37,7 @@ def _make_free_form(
     special_cases: tuple[str, ...],
     similar_to: str,
     distinguished_by: str,
+    formula: Formula,
     labels: Callable[[SimulationContext], Sequence[str]],
     unit: _Text = lambda _: "",
     size: _Number = lambda _: 1.0,
@@ -62,6 +64,7 @@ def _make_free_form(
         form=form,
         source=source,
         equation=equation,
+        formula=formula,
         linear_parameters=0,
         acts_between_samples=acts_between_samples,
         is_free=True,
@@ -96,6 +99,13 @@ _STATIC = ("dead-zone", "input-saturation", "absolute-value-sensor", "output-sat
 _DAMPING = ("viscous", "coulomb-friction", "viscous-asymmetry", "quadratic-drag")
 _CHANGING = ("gain-step", "ageing")
 
+#: Formulas that forms of the input and of the output have in common.
+_FILTERED = write_curve_formula("x + f(x)", "a sum of low-passes")
+_LAGGED = write_curve_formula("f(x)", "an uneven lag")
+_HYSTERESIS = write_curve_formula("x + f(x)", "a sum of plays")
+_ADDED = write_curve_formula("x + f(x)", "a curve")
+_SCALED = write_curve_formula("x*(1 + f(t))", "a curve over the time")
+
 #: The free forms, in the order in which maps act on a signal.
 FREE_FORMS: tuple[Effect, ...] = (
     _make_free_form(
@@ -108,6 +118,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _LINEAR,
         "delay, output-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
+        _FILTERED,
         free_maps.label_time_constants,
         equation=free_maps.write_low_passes,
     ),
@@ -121,6 +132,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         ("sensor-lag", "rate-limit", "delay"),
         "input-filter, rate-limit, output-lag-curve",
         "transients that differ between up and down, or between slow and fast changes",
+        _LAGGED,
         lambda _: free_maps.LAG_LABELS,
         lambda _: "s",
         lambda context: context.dt / (2.0 * START),
@@ -137,6 +149,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _HYSTERETIC,
         "backlash, stiction, output-memory",
         "loops that do not become thinner when the input is slower",
+        _HYSTERESIS,
         free_maps.label_half_widths,
         equation=lambda context: free_maps.write_plays(context.input_peak),
     ),
@@ -150,6 +163,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _STATIC,
         "dead-zone, input-saturation, output-curve",
         "a curve of the residual over the input, the same in both directions",
+        _ADDED,
         free_maps.label_places,
         lambda context: context.input_unit,
         lambda context: context.input_peak,
@@ -166,6 +180,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _CHANGING,
         "gain-step, ageing, output-gain-curve",
         "a residual proportional to the input, with a factor that changes over time",
+        _SCALED,
         free_maps.label_times,
         equation=free_maps.write_time_factor,
     ),
@@ -184,6 +199,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _DAMPING,
         "viscous, coulomb-friction, quadratic-drag",
         "a curve of the residual over the rate, the same at all places",
+        write_curve_formula("f(v)", "a curve over the rate"),
         free_maps.label_places,
         lambda context: context.force_coordinate.force_unit,
         lambda context: context.force_coordinate.force,
@@ -202,6 +218,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _STATIC,
         "cubic-stiffness, even-nonlinearity, input-curve",
         "a curve of the residual over the coordinate, the same at all rates",
+        write_curve_formula("f(x)", "a curve over the coordinate"),
         free_maps.label_places,
         lambda context: context.force_coordinate.force_unit,
         lambda context: context.force_coordinate.force,
@@ -216,6 +233,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _LINEAR,
         "sensor-lag, exponential-creep, input-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
+        _FILTERED,
         free_maps.label_time_constants,
         equation=free_maps.write_low_passes,
     ),
@@ -229,6 +247,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         ("sensor-lag", "delay"),
         "output-filter, input-lag-curve",
         "transients that differ between up and down, or between slow and fast changes",
+        _LAGGED,
         lambda _: free_maps.LAG_LABELS,
         lambda _: "s",
         lambda context: context.dt / (2.0 * START),
@@ -245,6 +264,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _HYSTERETIC,
         "second-hysteresis, input-memory",
         "loops that do not become thinner when the input is slower",
+        _HYSTERESIS,
         free_maps.label_half_widths,
         equation=lambda context: free_maps.write_plays(context.output_peak),
     ),
@@ -258,6 +278,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _STATIC,
         "output-saturation, absolute-value-sensor, input-curve",
         "a curve of the residual over the output, the same in both directions",
+        _ADDED,
         free_maps.label_places,
         lambda context: context.output_unit,
         lambda context: context.output_peak,
@@ -273,6 +294,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _CHANGING,
         "gain-step, ageing, input-gain-curve",
         "a residual proportional to the output, with a factor that changes over time",
+        _SCALED,
         free_maps.label_times,
         equation=free_maps.write_time_factor,
     ),
@@ -286,6 +308,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         _DRIFTING,
         "linear-drift, jump, thermal-drift",
         "a slow residual that depends on the time alone",
+        write_curve_formula("x + f(t)", "a curve over the time"),
         free_maps.label_times,
         lambda context: context.output_unit,
         lambda context: context.output_peak,

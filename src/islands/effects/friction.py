@@ -4,7 +4,7 @@ from math import tanh
 from typing import Any
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
 
 
 def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
@@ -40,6 +40,7 @@ COULOMB_FRICTION = Effect(
         is_dissipative=True,
         equation="n0*tanh(v/n1)",
     ),
+    formula=Formula("F*sign(v)", note="The simulation smooths sign({v}) around zero"),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="backlash, second-hysteresis",
     distinguished_by="a step of the residual where the rate x' changes its sign",
@@ -76,6 +77,7 @@ VISCOUS = Effect(
     parameters=_viscous_parameters,
     starting_points=_viscous_starting_points,
     form=ForceLaw(_viscous_force, is_dissipative=True, equation="n0*v"),
+    formula=Formula("c*v"),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="delay, sensor-lag",
     distinguished_by="the hysteretic part of the output is not delayed",
@@ -107,6 +109,7 @@ VISCOUS_ASYMMETRY = Effect(
     parameters=_viscous_asymmetry_parameters,
     starting_points=_viscous_starting_points,
     form=ForceLaw(_viscous_asymmetry_force, is_dissipative=True, equation="n0*abs(v)"),
+    formula=Formula("c*abs(v)"),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="offset, loop-asymmetry",
     distinguished_by="the slope over the rate differs with the sign of the rate",
@@ -138,6 +141,7 @@ QUADRATIC_DRAG = Effect(
     parameters=_quadratic_drag_parameters,
     starting_points=_quadratic_drag_starting_points,
     form=ForceLaw(_quadratic_drag_force, is_dissipative=True, equation="n0*abs(v)*v"),
+    formula=Formula("c*abs(v)*v"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="viscous; on a single sine also second-hysteresis",
     distinguished_by="drag grows with the square of the frequency, hysteresis does not",

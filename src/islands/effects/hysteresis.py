@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
 from islands.kernels.memory_operators import play_from, slider
 
@@ -41,6 +41,11 @@ STICTION = Effect(
     starting_points=_stiction_starting_points,
     form=_stiction_form,
     equation=lambda _: MapEquation("z0", (("slider", "n0"),)),
+    formula=Formula(
+        "stick(x, s)",
+        symbols=("s",),
+        note="stick({x}, {s}) follows {x} only after that has moved by {s}",
+    ),
     source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
     linear_parameters=0,
     similar_to="backlash, dead-zone, coulomb-friction",
@@ -72,6 +77,7 @@ BACKLASH = Effect(
     starting_points=_backlash_starting_points,
     form=_backlash_form,
     equation=lambda _: MapEquation("z0", (("play", "n0"),)),
+    formula=Formula("play(x, b)", note="play({x}, {b}) is a play of half width {b}"),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),
     similar_to="stiction, coulomb-friction, exponential-creep",
@@ -98,6 +104,7 @@ RELAXATION = Effect(
     parameters=_relaxation_parameters,
     starting_points=_relaxation_starting_points,
     form=None,
+    formula=Formula(symbols=("r",)),
     source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
     similar_to="exponential-creep",
     distinguished_by="hysteresis decays while the input is constant; slow loops are narrower",
@@ -132,6 +139,7 @@ RATE_DEPENDENT_LOOP = Effect(
     parameters=_rate_dependent_loop_parameters,
     starting_points=_rate_dependent_loop_starting_points,
     form=None,
+    formula=Formula(symbols=("k",)),
     source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
     similar_to="viscous, delay",
     distinguished_by="the width of the loop over the rate, at one amplitude",
@@ -166,6 +174,7 @@ LOOP_ASYMMETRY = Effect(
     parameters=_loop_asymmetry_parameters,
     starting_points=_loop_asymmetry_starting_points,
     form=None,
+    formula=Formula(symbols=("delta",)),
     source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
     similar_to="jump, offset, viscous-asymmetry",
     distinguished_by="the two branches of the loop are not mirror images",
@@ -250,6 +259,7 @@ SECOND_HYSTERESIS = Effect(
         equation="n0*z",
         state_equation=f"v - n1*abs(v)*z - min(max(n2, -{_MAX_RATIO}*n1), {_MAX_RATIO}*n1)*v*abs(z)",
     ),
+    formula=Formula("k*z", symbols=("k", "chi", "g"), states=(("z", "v - chi*abs(v)*z - g*v*abs(z)"),)),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
     project=_project_second_hysteresis,
     similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",

@@ -6,8 +6,16 @@ from typing import Any
 import numpy as np
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.effects.interface.effect import (
+    Effect,
+    EffectTemplate,
+    Formula,
+    Signal,
+    SimulationContext,
+    Site,
+)
 from islands.effects.interface.force import ForceLaw
+from islands.effects.interface.formula import Quantity
 from islands.effects.interface.map_equation import MapEquation
 
 
@@ -41,6 +49,7 @@ CUBIC_STIFFNESS = Effect(
     parameters=_cubic_stiffness_parameters,
     starting_points=_cubic_stiffness_starting_points,
     form=ForceLaw(_cubic_stiffness_force, equation="n0*x*x*x"),
+    formula=Formula("k*x**3"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="input-saturation",
     distinguished_by="an odd curve over the coordinate, at all rates",
@@ -78,6 +87,7 @@ EVEN_NONLINEARITY = Effect(
     parameters=_even_nonlinearity_parameters,
     starting_points=_even_nonlinearity_starting_points,
     form=ForceLaw(_even_nonlinearity_force, equation="n0*x*x"),
+    formula=Formula("k*x**2"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="absolute-value-sensor, offset",
     distinguished_by="a parabola over the coordinate",
@@ -127,6 +137,7 @@ DEAD_ZONE = Effect(
     equation=lambda _: MapEquation("sign(x)*max(abs(x) - n0, 0)"),
     is_applicable=_approaches_zero,
     acts_between_samples=True,
+    formula=Formula("sign(x)*max(abs(x) - d, 0)"),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     similar_to="backlash, input-saturation",
     distinguished_by="flat around zero in both directions; a negative `d` is a step at zero",
@@ -142,6 +153,18 @@ _OUTPUT_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 def _write_limit(peak: float) -> str:
     level = f"{peak}*(1 - max(n0, 0))"
     return f"min(max(x, -({level})), {level})"
+
+
+def _write_clip(get_range: Callable[[SimulationContext], tuple[float, str]]) -> Formula:
+    """Return the formula of a saturation, given its peak and unit."""
+
+    def list_quantities(values: Signal, context: SimulationContext) -> tuple[Quantity, ...]:
+        peak, unit = get_range(context)
+        return (Quantity("L", peak * (1.0 - max(float(values[0]), 0.0)), unit),)
+
+    return Formula(
+        "clip(x, -L, L)", quantities=list_quantities, note="clip({x}, -{L}, {L}) is {x}, limited to +-{L}"
+    )
 
 
 def _input_saturation_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
@@ -163,6 +186,7 @@ INPUT_SATURATION = Effect(
     form=_input_saturation_form,
     equation=lambda context: MapEquation(_write_limit(context.input_peak)),
     acts_between_samples=True,
+    formula=_write_clip(lambda context: (context.input_peak, context.input_unit)),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     linear_parameters=0,
     similar_to="cubic-stiffness, output-saturation",
@@ -185,6 +209,7 @@ OUTPUT_SATURATION = Effect(
     starting_points=lambda _context, _residual: tuple((cut,) for cut in _OUTPUT_CUTS),
     form=_output_saturation_form,
     equation=lambda context: MapEquation(f"where(n0, {_write_limit(context.output_peak)}, x)"),
+    formula=_write_clip(lambda context: (context.output_peak, context.output_unit)),
     source="Doebelin, Measurement Systems, section 3",
     linear_parameters=0,
     similar_to="input-saturation, state-clip",
@@ -216,6 +241,7 @@ ABSOLUTE_VALUE_SENSOR = Effect(
     starting_points=_absolute_value_sensor_starting_points,
     form=_absolute_value_sensor_form,
     equation=lambda _: MapEquation("x + n0*abs(x)"),
+    formula=Formula("x + k*abs(x)"),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="even-nonlinearity",
     distinguished_by="a kink at output zero",
@@ -256,6 +282,7 @@ UNSIGNED_SENSOR = Effect(
     form=_unsigned_sensor_form,
     equation=lambda _: MapEquation("(1 - n0)*x + n0*abs(x)"),
     is_applicable=_is_unsigned,
+    formula=Formula("(1 - k)*x + k*abs(x)"),
     source="Doebelin, Measurement Systems, section 3",
     linear_parameters=0,
     similar_to="absolute-value-sensor, output-curve",
@@ -282,6 +309,7 @@ def outflow_law(state: str) -> Effect:
         parameters=parameters,
         starting_points=starting_points,
         form=None,
+        formula=Formula(symbols=(f"l_{state}",)),
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
     )
 
@@ -310,6 +338,7 @@ def _make_state_limit(
     template: EffectTemplate,
     parameters: Callable[[SimulationContext], tuple[Parameter, ...]],
     starting_points: Callable[[SimulationContext, Signal], Sequence[tuple[float, ...]]],
+    formula: Formula,
 ) -> Effect:
     """Return an effect that limits a state."""
     return Effect(
@@ -320,6 +349,7 @@ def _make_state_limit(
         parameters=parameters,
         starting_points=starting_points,
         form=None,
+        formula=formula,
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
         linear_parameters=0,
     )
@@ -343,7 +373,12 @@ def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = Tru
             tuple((level, caught) for level in levels for caught in _CAUGHT) if spills else tuple(zip(levels))
         )
 
-    return _make_state_limit(label, STATE_CLIP, parameters, starting_points)
+    limit, caught = f"limit_{state}", f"caught_{state}"
+    formula = Formula(symbols=(limit,), conditions=(f"abs(x) <= {limit}",))
+    if spills:
+        note = f"The part {{{caught}}} of what {{{limit}}} cuts off flows into the next state"
+        formula = Formula(symbols=(limit, caught), conditions=(f"x <= {limit}",), note=note)
+    return _make_state_limit(label, STATE_CLIP, parameters, starting_points, formula)
 
 
 #: Starting points of the limits of a range, as parts of the range of the output by which they narrow it.
@@ -376,7 +411,9 @@ def state_range(state: str, unit: str) -> Effect:
         cuts = [-_FREE * (high - low), *(cut * (high - low) for cut in _CUTS)]
         return tuple((low + below, high - above) for below in cuts for above in cuts)[1:]
 
-    return _make_state_limit(label, STATE_RANGE, parameters, starting_points)
+    lower, upper = f"lower_{state}", f"upper_{state}"
+    formula = Formula(symbols=(lower, upper), conditions=(f"{lower} <= x", f"x <= {upper}"))
+    return _make_state_limit(label, STATE_RANGE, parameters, starting_points, formula)
 
 
 STATE_RANGE = EffectTemplate(

@@ -1,7 +1,7 @@
 """Effects on scale: gain errors of input and output, and wrong parameters."""
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, EffectTemplate, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
 
 
@@ -28,6 +28,7 @@ INPUT_GAIN = Effect(
     starting_points=_input_gain_starting_points,
     form=_input_gain_form,
     equation=lambda _: MapEquation("(1 + n0)*x"),
+    formula=Formula("(1 + k)*x"),
     source="Doebelin, Measurement Systems, section 3",
     is_gain=True,
     similar_to="sensor-gain, wrong-parameter",
@@ -59,6 +60,7 @@ SENSOR_GAIN = Effect(
     starting_points=_sensor_gain_starting_points,
     form=_sensor_gain_form,
     equation=lambda _: MapEquation("(1 + n0)*x"),
+    formula=Formula("(1 + k)*x"),
     source="Doebelin, Measurement Systems, section 3",
     is_gain=True,
     similar_to="input-gain, wrong-parameter",
@@ -85,6 +87,7 @@ def wrong_parameter(parameter: Parameter) -> Effect:
         parameters=parameters,
         starting_points=starting_points,
         form=None,
+        formula=Formula("x*(1 + r)", symbols=("r",)),
         source="Ljung, System Identification, 2nd ed., section 7",
     )
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
 
 #: Least number of periods of cogging within the range of the position; fewer are a static curve.
@@ -149,6 +149,7 @@ COGGING = Effect(
     parameters=_cogging_parameters,
     starting_points=_cogging_starting_points,
     form=ForceLaw(_cogging_force, equation=_WAVE),
+    formula=Formula("a*cos(2*pi*f*x) + b*sin(2*pi*f*x)", symbols=("a", "b", "f")),
     source="Jahns and Soong, Pulsating torque minimization techniques for AC motor drives, 1996",
     is_applicable=lambda context: context.force_coordinate.is_output and _has_range(context),
     linear_parameters=2,
@@ -188,6 +189,7 @@ CYCLIC_ERROR = Effect(
     starting_points=_cyclic_error_starting_points,
     form=_cyclic_error_form,
     equation=lambda _: MapEquation(f"x + {_WAVE}"),
+    formula=Formula("x + a*cos(2*pi*f*x) + b*sin(2*pi*f*x)", symbols=("a", "b", "f")),
     source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
     is_applicable=_has_range,
     linear_parameters=2,

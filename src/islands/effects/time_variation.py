@@ -6,9 +6,10 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from islands.effects.channels import channel, channel_range, channel_unit, has_channel
+from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
+from islands.effects.interface.formula import Quantity
 from islands.effects.interface.map_equation import MapEquation
 
 #: Names of the effects that change the gain.
@@ -16,6 +17,9 @@ GAIN_EFFECTS = frozenset(("gain-step", "ageing"))
 
 #: Number of candidate instants of a change.
 INSTANTS = 27
+
+#: Note on the formula of a step.
+STEP_NOTE = "step(t - {t0}) is 0 before {t0}, and 1 after it"
 
 #: Margin at each end of the estimation part, relative to its duration. Changes are not searched for in it,
 #: since too few samples would show them.
@@ -85,6 +89,7 @@ GAIN_STEP = Effect(
     parameters=_gain_step_parameters,
     starting_points=_gain_step_starting_points,
     form=None,
+    formula=Formula("x*(1 + k*step(t - t0))", symbols=("k", "t0"), note=STEP_NOTE),
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     equation=lambda context: MapEquation(f"x*(1 + n0*{write_step(context, 'n1')})"),
     extra_degrees_of_freedom=1,
@@ -111,6 +116,13 @@ AGEING = Effect(
     parameters=_ageing_parameters,
     starting_points=_ageing_starting_points,
     form=None,
+    formula=Formula(
+        "x*(1 + k*t/T)",
+        quantities=lambda values, context: (
+            Quantity("k", float(values[0]), "", "ageing"),
+            Quantity("T", context.duration, "s"),
+        ),
+    ),
     source="Doebelin, Measurement Systems, section 3",
     equation=lambda context: MapEquation(f"x*(1 + n0*t/{context.duration})"),
     depends_on_time=True,
@@ -143,6 +155,7 @@ TEMPERATURE_GAIN = Effect(
     starting_points=_temperature_gain_starting_points,
     form=_temperature_gain_form,
     equation=lambda _: MapEquation("x*(1 + n0*z0)", (("temperature",),)),
+    formula=Formula("x*(1 + k*(T - T_0))", names=("T", "T_0"), note=TEMPERATURE_NOTE),
     source="Doebelin, Measurement Systems, section 2",
     is_applicable=lambda context: has_channel(context, True),
     similar_to="ageing if the temperature only rises, thermal-drift",

@@ -4,7 +4,7 @@ import numpy as np
 
 from islands.effects.filters import low_pass
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.input_spectrum import find_single_frequency
 from islands.effects.interface.map_equation import MapEquation
 from islands.kernels.lagrange import interpolate_at
@@ -45,6 +45,7 @@ DELAY = Effect(
     starting_points=_delay_starting_points,
     form=_delay_form,
     equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0"),)),
+    formula=Formula("at(x, t - tau)"),
     source="Ljung, System Identification, 2nd ed., section 16",
     similar_to="sensor-lag, resonance, viscous",
     distinguished_by="the phase grows with the frequency at constant amplitude; hysteresis is delayed too",
@@ -75,6 +76,7 @@ CLOCK_SKEW = Effect(
     starting_points=_clock_skew_starting_points,
     form=_clock_skew_form,
     equation=lambda _: MapEquation("z0", (("interpolate", "n0", "0"),)),
+    formula=Formula("at(x, t*(1 + e))"),
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
     similar_to="delay",
     distinguished_by="a delay that grows along the record",
@@ -129,6 +131,11 @@ RATE_LIMIT = Effect(
     form=_rate_limit_form,
     equation=lambda _: MapEquation("z0", (("limit-rate", "n0"),)),
     is_applicable=_has_rates_to_limit,
+    formula=Formula(
+        "limit_rate(x, 1/r)",
+        symbols=("r",),
+        note="limit_rate({x}, 1/{r}) follows {x} with a rate of at most 1/{r}",
+    ),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     linear_parameters=0,
     similar_to="sensor-lag, delay, input-saturation",
@@ -160,6 +167,7 @@ SENSOR_LAG = Effect(
     starting_points=_sensor_lag_starting_points,
     form=_sensor_lag_form,
     equation=lambda _: MapEquation("z0", (("low-pass", "n0"),)),
+    formula=Formula("y", states=(("y", "(x - y)/tau"),)),
     source="Doebelin, Measurement Systems, section 3",
     similar_to="delay, resonance, viscous",
     distinguished_by="the amplitude falls with the frequency",
@@ -210,6 +218,9 @@ RESONANCE = Effect(
     starting_points=_resonance_starting_points,
     form=_resonance_form,
     equation=lambda _: MapEquation("z0", (("resonance", "n0", "n1"),)),
+    formula=Formula(
+        "y", symbols=("P", "zeta"), states=(("y", "w"), ("w", "(2*pi/P)**2*(x - y) - 4*pi*zeta/P*w"))
+    ),
     source="Ljung, System Identification, 2nd ed., section 4",
     similar_to="delay, sensor-lag",
     distinguished_by="ringing after fast changes",

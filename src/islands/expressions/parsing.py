@@ -35,6 +35,7 @@ from islands.expressions.tree import (
     Primitive,
     Shift,
     Symbol,
+    name_function,
 )
 
 #: Largest depth of an expression in an equation.
@@ -171,6 +172,21 @@ def parse_expression(text: str, place: str = "") -> Expression:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         detail = f": {error.msg}" if isinstance(error, SyntaxError) else ""
         raise ModelError(f"{place}: this is not an expression such as (F - c*v - k*x)/m{detail}") from error
+
+
+def parse_formula(text: str) -> Expression:
+    """Parse an expression of names, in which functions may have any name, for printing only.
+
+    Raises
+    ------
+    ModelError
+        The text is not an expression.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+        return _Parser(replace(EQUATION_SYNTAX, call=_call_by_name), f"{text!r}: ").read(tree.body, MAX_DEPTH)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ModelError(f"{text!r}: this is not an expression such as clip(x, -L, L)") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,6 +338,11 @@ def _call_in_equation(parser: _Parser, name: str, nodes: Sequence[ast.expr], dep
             arguments = (Apply(function, (first, second)), *others)
     parser.check_arity(name, len(arguments))
     return Apply(function, arguments)
+
+
+def _call_by_name(parser: _Parser, name: str, nodes: Sequence[ast.expr], depth: int) -> Expression:
+    """Read a function of any name."""
+    return Apply(name_function(name), tuple(parser.read(node, depth) for node in nodes))
 
 
 #: Syntax of regressors: ``2*u(k-1)^2/(1 + abs(y(k-1)))``.

@@ -68,6 +68,11 @@ class Primitive:
     protected_text: str = field(default="", compare=False)
 
 
+def name_function(name: str) -> Primitive:
+    """Return a function that is printed by its name, and not evaluated."""
+    return Primitive(name, 1, _read_signal, is_protected=False)
+
+
 def _read_signal(*_: float) -> float:
     raise ModelError("a rate, a delay and a value of an FMU are given, not computed from numbers")
 

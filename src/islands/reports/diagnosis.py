@@ -4,9 +4,11 @@ from functools import partial
 from math import floor
 
 import numpy as np
+from markupsafe import Markup
 
 from islands.data.loops import has_loops
 from islands.diagnosis.detectability import NOTHING, SelfTest
+from islands.diagnosis.documents.extended_equations import write_extended_equations
 from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.finding import list_free_forms
@@ -14,8 +16,11 @@ from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
 from islands.effects.interface.context import Signal
 from islands.io.result_text.diagnosis_statements import (
+    EXTENDED,
+    DiagnosisFacts,
     describe_causes,
     describe_details,
+    describe_extended_values,
     describe_verdict,
     label_effect,
     name_reference,
@@ -158,6 +163,16 @@ def _list_values(document: Document) -> list[tuple[str, ...]]:
     ]
 
 
+def _show_extension(document: Document, found: Diagnosis) -> tuple[str, str, str] | None:
+    """Return the equations of the extended simulation, their values and notes; None if there are none."""
+    if DiagnosisFacts(document).extended is None:
+        return None
+    return (
+        Markup(write_extended_equations(found.best, found.effects, found.record).mathml),
+        *describe_extended_values(document),
+    )
+
+
 def diagnosis_report(
     origin: Origin,
     found: Diagnosis,
@@ -189,7 +204,8 @@ def diagnosis_report(
         headline=describe_verdict(document),
         lead=write_diagnosis_headline(document),
         causes=describe_causes(document),
-        details=describe_details(document),
+        details=describe_details(document, (EXTENDED,)),
+        extended=_show_extension(document, found),
         error_columns=columns,
         errors=errors,
         error_remark=remark,

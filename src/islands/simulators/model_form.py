@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
 from islands.effects.model_form import CORE_SHAPE, MODEL_FORM
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.printing import plain
@@ -193,12 +193,21 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         parameters=parameters,
         starting_points=starting_points,
         form=None,
+        formula=_write_terms(terms),
         source="Ikhouane and Rodellar, Systems with Hysteresis, section 2; Billings, Nonlinear System "
         "Identification, section 2",
         linear_parameters=len(terms),
         extra_degrees_of_freedom=_DEGREES_OF_FREEDOM - len(terms) - 1,
         is_applicable=lambda context: not context.has_resting_input,
     )
+
+
+def _write_terms(terms: Sequence[MissingTerm]) -> Formula:
+    """Return the formula of terms in the equation of a model, with a number for each coefficient."""
+    symbols = tuple(f"k{number}" for number in range(1, len(terms) + 1))
+    texts = (re.sub(r"\bc\b", "{c}", each.name.removeprefix(CORE_SHAPE).strip()) for each in terms)
+    listed = " + ".join(f"{{{symbol}}}*({text})" for symbol, text in zip(symbols, texts, strict=True))
+    return Formula(symbols=(*symbols, "c"), note=f"G contains also {listed}")
 
 
 def _simulate_shapes(

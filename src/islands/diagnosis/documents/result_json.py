@@ -9,8 +9,10 @@ import numpy as np
 from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
+from islands.diagnosis.documents.extended_equations import write_extended_equations
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.exchanged_parts import ExchangedParts
+from islands.diagnosis.inference.extension_trial import ExtensionTrial
 from islands.diagnosis.inference.finding import Finding, Value, list_free_forms
 from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
@@ -67,7 +69,7 @@ def diagnosis_document(
         "equations": diagnosis.best.simulation.simulator.equations,
         **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None or diagnosis.refusal else "extended.json",
-        "extension": None if diagnosis.trial is None else asdict(diagnosis.trial),
+        "extension": None if diagnosis.trial is None else _describe_extension(diagnosis, diagnosis.trial),
         "exchange": None if diagnosis.exchange is None else _describe_exchange(diagnosis.exchange),
         "record_findings": [each.as_document() for each in diagnosis.record_findings],
         "left_out": list(diagnosis.left_out),
@@ -87,6 +89,11 @@ def _describe_experiment(experiment: NextExperiment | None) -> dict[str, Any]:
         "decisive_experiment": write_advice(experiment) or None,
         "next_experiment": describe_next_experiment(experiment),
     }
+
+
+def _describe_extension(diagnosis: Diagnosis, trial: ExtensionTrial) -> dict[str, Any]:
+    written = write_extended_equations(diagnosis.best, diagnosis.effects, diagnosis.record)
+    return {**asdict(trial), **written.as_document()}
 
 
 def _measure_output(diagnosis: Diagnosis) -> float:

@@ -8,10 +8,11 @@ import numpy as np
 
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.force import ForceLaw
+from islands.effects.interface.formula import Formula
 from islands.effects.interface.map_equation import MakeEquation
 from islands.errors import SettingsError
 
-__all__ = ["Effect", "EffectTemplate", "ForceLaw", "Signal", "SimulationContext", "Site"]
+__all__ = ["Effect", "EffectTemplate", "ForceLaw", "Formula", "Signal", "SimulationContext", "Site"]
 
 
 class Site(StrEnum):
@@ -54,6 +55,8 @@ class Effect:
     equation : callable or None
         ``context -> MapEquation``: the same map as an equation, from which programs in other languages are
         written. An effect on the gain has one as well, which maps the gain. None if there is no program.
+    formula : Formula or None
+        What readers see in the equations of an extended simulation. None if it is only a function.
     is_applicable : callable
         ``context -> bool``: whether the record can show the effect.
     linear_parameters : int
@@ -97,6 +100,7 @@ class Effect:
     form: Map | ForceLaw | None
     source: str
     equation: MakeEquation | None = None
+    formula: Formula | None = None
     is_applicable: Callable[[SimulationContext], bool] = lambda _: True
     linear_parameters: int = 1
     project: Callable[[Signal], Signal] | None = None

@@ -85,6 +85,9 @@ _COEFFICIENTS: Final = {
     "difference order": "order of the long memory",
 }
 
+#: Name of the statement of the extended simulation.
+EXTENDED: Final = "extended-simulation"
+
 #: Effect of a wrong form of an identified model.
 _FORM = "core-shape"
 
@@ -144,6 +147,12 @@ class DiagnosisFacts:
         """Whether several errors without a cause are stated. The terms have one in common."""
         shares = sum(each["family"] not in (_TERM, _GROSS) for each in self.causes)
         return shares + bool(shares and self.terms) > 1
+
+    @property
+    def extended(self) -> Document | None:
+        """The extension, if its equations are known."""
+        extension: Document | None = self.document.get("extension")
+        return extension if extension and extension.get("equations") else None
 
     @property
     def input_limits(self) -> list[tuple[str, float]]:
@@ -427,9 +436,10 @@ def describe_causes(document: Document) -> list[str]:
     return [_describe_cause(facts, cause) for cause in facts.causes]
 
 
-def describe_details(document: Document) -> list[str]:
-    """Describe noise, record, errors, and next steps."""
-    texts = write_statements(DETAILS, DiagnosisFacts(document))
+def describe_details(document: Document, without: Sequence[str] = ()) -> list[str]:
+    """Describe noise, record, errors, and next steps, without the statements of these names."""
+    chosen = (each for each in DETAILS if each.name not in without)
+    texts = write_statements(chosen, DiagnosisFacts(document))
     return [line for text in texts for line in text.splitlines()]
 
 
@@ -690,6 +700,31 @@ def _describe_equations(facts: DiagnosisFacts) -> str:
         return f"Equations: {equations}"
     names = " and ".join(facts.discovered["effects"])
     return f"Equations that explain the record as well{f', with {names}' if names else ''}: {equations}"
+
+
+def _describe_extended_equations(facts: DiagnosisFacts) -> str:
+    assert facts.extended is not None
+    values, notes = describe_extended_values(facts.document)
+    parts = [f"Extended simulation: {'; '.join(facts.extended['equations'])}.", values, notes]
+    return " ".join(filter(None, parts))
+
+
+def describe_extended_values(document: Document) -> tuple[str, str]:
+    """State the values in the equations of the extended simulation, and what these contain.
+
+    Returns
+    -------
+    str, str
+        Sentences; empty if there is nothing to state.
+    """
+    facts = DiagnosisFacts(document)
+    assert facts.extended is not None
+    own = [each for term in facts.terms for each in term["parameters"].items()]
+    own += [(each["name"], each) for each in facts.extended["values"]]
+    listed = [facts.calibrated, *(f"{name} = {write_value(each, facts.is_exact)}" for name, each in own)]
+    values = ", ".join(filter(None, listed))
+    notes = "".join(f"{note}. " for note in facts.extended["notes"]).strip()
+    return f"Its values: {values}." if values else "", notes
 
 
 def _describe_extended_simulation(facts: DiagnosisFacts) -> str:
@@ -958,17 +993,27 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: facts.terms and facts.terms[0].get("error_share") is not None,
         lambda facts: f"Without all terms and effects, the RMSE is {_compare_errors(facts.terms[0])}.",
     ),
-    Statement("equations", lambda facts: facts.discovered is not None, _describe_equations),
     Statement(
-        "extended-simulation",
+        "equations",
+        lambda facts: facts.discovered is not None and not (facts.verdict == "discovered" and facts.extended),
+        _describe_equations,
+    ),
+    Statement(EXTENDED, lambda facts: facts.extended, _describe_extended_equations),
+    Statement(
+        "extended-without-effects",  # a document of an earlier version
         lambda facts: (
-            facts.gain is not None and facts.verdict != "discovered" and facts.document.get("equations")
+            facts.gain is not None
+            and not facts.extended
+            and facts.verdict != "discovered"
+            and facts.document.get("equations")
         ),
         _describe_extended_simulation,
     ),
     Statement(
         "calibrated",
-        lambda facts: _has("discovered", "nothing", "noise")(facts) and facts.calibrated,
+        lambda facts: (
+            _has("discovered", "nothing", "noise")(facts) and not facts.extended and facts.calibrated
+        ),
         lambda facts: f"Calibrated{'' if facts.gain is None else ' with them'}: {facts.calibrated}.",
     ),
     Statement(

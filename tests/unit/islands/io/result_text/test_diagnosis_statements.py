@@ -1,5 +1,6 @@
 """Statements about a diagnosis: each follows from the numbers of its document."""
 
+import re
 from itertools import product
 
 import pytest
@@ -136,6 +137,36 @@ def test_the_extended_simulation_is_stated_with_its_values():
     found = text("discovered", effects=[term], gain=GAIN, calibrated={**states, "a1": 4.0})
     assert "Calibrated with them: k = 2." in found
     assert "Extended simulation" not in text("unknown", equations="dx/dt = u - k*x", calibrated={"k": 2.0})
+
+
+EXTENSION = {
+    "equations": ["dx/dt = u(t - tau) - k*x", "output = x"],
+    "values": [{"name": "tau", "effect": "delay", "value": 0.03, "unit": "s", "ci95": [0.02, 0.04]}],
+    "notes": ["u is force_N"],
+}
+
+
+def test_the_equations_of_the_extended_simulation_contain_its_effects():
+    said = text("named", effects=[CAUSE], gain=GAIN, calibrated={"k": 2.0}, extension=EXTENSION)
+    assert (
+        "Extended simulation: dx/dt = u(t - tau) - k*x; output = x. Its values: k = 2, tau = 0.03 s (0.02 to "
+        "0.04). u is force_N."
+    ) in said
+    assert "with delay" not in said
+
+
+def test_equations_with_terms_have_their_coefficients_and_replace_the_terms_alone():
+    term = {**CAUSE, "name": "missing-term", "family": "discovered", "term": "a1*u in output"}
+    term["parameters"] = {"a1": _value(4.0, "N")}
+    extension = {**EXTENSION, "equations": ["output = y_sim + a1*u"], "values": [], "notes": []}
+    said = text(
+        "discovered", effects=[term], gain=GAIN, extension=extension, calibrated={"k": 2.0, "a1": 4.0}
+    )
+    assert "Extended simulation: output = y_sim + a1*u. Its values: k = 2, a1 = 4 N" in said
+    assert not re.search("^Equations:|Calibrated with them", said, re.MULTILINE)
+    other = {"equations": "output = y_sim + a1*u", "effects": [], "nearest": [], "worse_by": -1.0}
+    said = text("named", effects=[CAUSE], gain=GAIN, extension=EXTENSION, discovered=other)
+    assert "Equations that explain the record as well: output = y_sim + a1*u" in said
 
 
 def test_effects_of_states_are_named_with_the_state():
