@@ -90,6 +90,7 @@ class DiscrepancyResult(ResponseModel):
         "input that separates them, with its limits.",
     )
     candidates: tuple[dict[str, Any], ...] = Field(description="All screened effects, the best first.")
+    titles: dict[str, str] = Field(default={}, description="Plain names of the causes, by their names.")
     calibrated: dict[str, float] = Field(description="Values of the parameters of the simulation.")
     values: tuple[dict[str, Any], ...] = Field(
         default=(), description="The same with units and intervals, before and after the calibration."

@@ -78,6 +78,8 @@ def _entry(entry: Entry) -> str:
 
 
 def _properties(entry: Entry) -> Iterator[tuple[str, str]]:
+    if not isinstance(entry, NoiseDetector):
+        yield "In sentences", entry.title
     if isinstance(entry, Effect):
         yield "Acts on", str(entry.site)
         yield "Parameters", escape(_parameters(entry.parameters(symbolic_context())))

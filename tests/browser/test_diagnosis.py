@@ -24,7 +24,9 @@ from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
-WORDS = "The simulation lacks something <b>that has a name</b>.\n  thermal-drift: k = 1 um/K\nThe RMSE falls."
+WORDS = (
+    "The simulation lacks something `<b>that has a name</b>`.\n  thermal-drift: k = 1 um/K\nThe RMSE falls."
+)
 
 #: The headline without the last sentence, which belongs to the details.
 HEADLINE = "\n".join(line.strip() for line in WORDS.split("\n")[:2])
@@ -51,6 +53,7 @@ RESULT = make_document(
     candidates=CANDIDATES,
     estimation_samples=300,
     decisive_experiment="hold the input",
+    titles={"thermal-drift": "thermal drift of the output"},
 )
 RESULT["record"] |= {"samples": 400, "dt": 0.01}
 
@@ -99,7 +102,7 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
         store.leases.finish(lease, make_outcome(desk))
     expect(page.locator(".status .progress-text")).to_have_text("named: thermal-drift")
     findings = page.locator(".findings")
-    expect(findings.locator(":scope > p")).to_have_text(HEADLINE.split("\n"))
+    expect(findings.locator(":scope > p")).to_have_text(HEADLINE.replace("`", "").split("\n"))
     expect(page.locator(".sentences p")).to_have_text("The RMSE falls.")
     assert page.locator(".findings b, .sentences b").count() == 0
     facts = page.locator(".about .facts").first
@@ -142,7 +145,7 @@ def test_the_list_shows_the_verdict_of_a_diagnosis(
         store.leases.finish(taken(store, jobs[0]), make_outcome(desk))
         store.leases.finish(taken(store, jobs[1]), make_outcome(desk, **nothing))
     page = quiet(desk.url).go()
-    sentence = desk.job(jobs[0])["summary"]["words"].splitlines()[0]
+    sentence = desk.job(jobs[0])["summary"]["words"].splitlines()[0].replace("`", "")
     for job, cause in zip(jobs, ("thermal-drift", ""), strict=True):
         expect(page.locator(f"tr[data-job='{job}'] .verdict")).to_have_text(sentence)
         assert page.locator(f"tr[data-job='{job}'] .line").text_content() == cause
@@ -188,7 +191,11 @@ def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
     expect(rows).to_have_text(
         [
             re.compile(text)
-            for text in ("drift40.0\\s*99 %0.98exponential-creep", "drift10.0\\s*50 %$", "jump−2.00")
+            for text in (
+                "output thermal-drift40.0\\s*99 %0.98exponential-creep",
+                "drift10.0\\s*50 %$",
+                "jump−2.00",
+            )
         ]
     )
     widths = [float(bar.get_attribute("width")) for bar in rows.locator("rect").all()]

@@ -3,7 +3,7 @@
 from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, EffectTemplate, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.formula import Quantity
+from islands.effects.interface.formula import FormulaQuantity
 from islands.effects.interface.map_equation import MapEquation
 from islands.effects.time_variation import (
     STEP_NOTE,
@@ -28,6 +28,7 @@ def _offset_starting_points(context: SimulationContext, _residual: Signal) -> tu
 
 OFFSET = Effect(
     name="offset",
+    title="offset of the output",
     summary="Zero offset of the output: y + c",
     family="baseline",
     site=Site.OUTPUT,
@@ -72,6 +73,8 @@ def input_offset(state: str, unit: str = "", size: float = 0.0) -> Effect:
 INPUT_OFFSET = EffectTemplate(
     "input-offset",
     "Constant flow or force in addition to the input: + c in the balance of one state",
+    title="offset of the input",
+    placed_title="offset of the input at {}",
     similar_to="offset, outflow-law",
     distinguished_by="an offset filtered by the equation; in tanks it shifts with the level",
     occurs_in="gravity, preload, leakage, zero of a valve or amplifier",
@@ -94,6 +97,7 @@ def _linear_drift_starting_points(
 
 LINEAR_DRIFT = Effect(
     name="linear-drift",
+    title="linear drift of the output",
     summary="Linear drift of the output: y + c t / T over the record's duration T",
     family="baseline",
     site=Site.OUTPUT,
@@ -104,8 +108,8 @@ LINEAR_DRIFT = Effect(
     formula=Formula(
         "x + c*t/T",
         quantities=lambda values, context: (
-            Quantity("c", float(values[0]), context.output_unit, "c"),
-            Quantity("T", context.duration, "s"),
+            FormulaQuantity("c", float(values[0]), context.output_unit, "c"),
+            FormulaQuantity("T", context.duration, "s"),
         ),
     ),
     source="Doebelin, Measurement Systems, section 3",
@@ -133,6 +137,7 @@ def _jump_starting_points(context: SimulationContext, _residual: Signal) -> tupl
 
 JUMP = Effect(
     name="jump",
+    title="jump of the output",
     summary="Jump of the output's zero: y + c after an instant",
     family="baseline",
     site=Site.OUTPUT,
@@ -173,6 +178,7 @@ def _thermal_drift_starting_points(
 
 THERMAL_DRIFT = Effect(
     name="thermal-drift",
+    title="thermal drift of the output",
     summary="The output follows a temperature: y + k (T - T(0)), where T is a given channel",
     family="baseline",
     site=Site.OUTPUT,

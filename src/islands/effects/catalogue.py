@@ -111,6 +111,17 @@ def get_summary(name: str) -> str:
     return entry.summary
 
 
+def get_title(name: str) -> str:
+    """Return the plain name of an effect, given its name with or without a state or parameter.
+
+    It is empty for an effect that is not in the catalogue.
+    """
+    entry, place = find_entry(name), name.partition(":")[2]
+    if isinstance(entry, EffectTemplate) and place and entry.placed_title:
+        return entry.placed_title.format(place)
+    return "" if entry is None else entry.title
+
+
 def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Sort effects in the order in which they act: that of the catalogue, then other maps by name."""
     places = {name: place for place, name in enumerate(CATALOGUE)}

@@ -8,7 +8,7 @@ from islands.data.segments import is_resting
 from islands.effects.filters import low_pass
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.formula import Quantity
+from islands.effects.interface.formula import FormulaQuantity
 from islands.effects.interface.map_equation import MapEquation
 
 #: Largest step before the first sample, times the fraction that creeps, relative to the largest output.
@@ -67,6 +67,7 @@ def _exponential_creep_starting_points(
 
 EXPONENTIAL_CREEP = Effect(
     name="exponential-creep",
+    title="exponential creep",
     summary="Exponential creep of the output: y + kappa times y after a low-pass with time constant tau",
     family="memory",
     site=Site.OUTPUT,
@@ -77,8 +78,8 @@ EXPONENTIAL_CREEP = Effect(
     formula=Formula(
         "x + kappa*(z - z(0))",
         quantities=lambda values, _: (
-            Quantity("kappa", float(values[0]), "", "kappa"),
-            Quantity("tau", float(np.exp(values[1])), "s"),
+            FormulaQuantity("kappa", float(values[0]), "", "kappa"),
+            FormulaQuantity("tau", float(np.exp(values[1])), "s"),
         ),
         states=(("z", "(x - z)/tau"),),
     ),
@@ -108,6 +109,7 @@ def _logarithmic_creep_starting_points(
 
 LOGARITHMIC_CREEP = Effect(
     name="logarithmic-creep",
+    title="logarithmic creep",
     summary="Logarithmic creep of the output: y + kappa times a sum of low-passes, two per decade",
     family="memory",
     site=Site.OUTPUT,

@@ -34,6 +34,7 @@ def _second_input_starting_points(
 
 SECOND_INPUT = Effect(
     name="second-input",
+    title="second input",
     summary="A second input acts where the first one does: u + k w, where w is a given channel",
     family="disturbance",
     site=Site.INPUT,
@@ -69,6 +70,7 @@ def _cross_coupling_starting_points(
 
 CROSS_COUPLING = Effect(
     name="cross-coupling",
+    title="coupling of a channel into the output",
     summary="Another signal couples into the output: y + k w, where w is a given channel",
     family="disturbance",
     site=Site.OUTPUT,
@@ -141,6 +143,7 @@ def _periodic_disturbance_starting_points(
 
 PERIODIC_DISTURBANCE = Effect(
     name="periodic-disturbance",
+    title="sinusoidal disturbance",
     summary="Sinusoidal disturbance of unknown frequency, added to the output",
     family="disturbance",
     site=Site.OUTPUT,

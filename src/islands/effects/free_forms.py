@@ -29,6 +29,7 @@ _Number = Callable[[SimulationContext], float]
 
 def _make_free_form(
     name: str,
+    title: str,
     summary: str,
     family: str,
     site: Site,
@@ -56,6 +57,7 @@ def _make_free_form(
 
     return Effect(
         name=name,
+        title=title,
         summary=summary,
         family=family,
         site=site,
@@ -110,6 +112,7 @@ _SCALED = write_curve_formula("x*(1 + f(t))", "a curve over the time")
 FREE_FORMS: tuple[Effect, ...] = (
     _make_free_form(
         "input-filter",
+        "linear dynamics of the input",
         "Any slow linear dynamics of the input: a sum of low-passes with six time constants",
         "timing",
         Site.INPUT,
@@ -124,6 +127,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "input-lag-curve",
+        "uneven lag of the input",
         "Any uneven lag of the input: time constants rising and falling, above a typical rate and below",
         "timing",
         Site.INPUT,
@@ -141,6 +145,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "input-memory",
+        "hysteresis of the input",
         "Any hysteresis of the input: a sum of plays with five half widths",
         "memory",
         Site.INPUT,
@@ -155,6 +160,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "input-curve",
+        "curve of the input",
         "Any static characteristic of the input: a curve through seven values",
         "shape",
         Site.INPUT,
@@ -172,6 +178,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "input-gain-curve",
+        "changing gain of the input",
         "Any change of the gain of the input over time: a curve through eight values",
         "change",
         Site.INPUT,
@@ -186,6 +193,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "damping-curve",
+        "force over the rate",
         "Any force that depends on the rate: a curve through seven values",
         "memory",
         Site.FORCE,
@@ -206,6 +214,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "stiffness-curve",
+        "force over the coordinate",
         "Any force that depends on the coordinate: a curve through seven values",
         "shape",
         Site.FORCE,
@@ -225,6 +234,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "output-filter",
+        "linear dynamics of the output",
         "Any slow linear dynamics of the output: a sum of low-passes with six time constants",
         "timing",
         Site.OUTPUT,
@@ -239,6 +249,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "output-lag-curve",
+        "uneven lag of the output",
         "Any uneven lag of the output: time constants rising and falling, above a typical rate and below",
         "timing",
         Site.OUTPUT,
@@ -256,6 +267,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "output-memory",
+        "hysteresis of the output",
         "Any hysteresis of the output: a sum of plays with five half widths",
         "memory",
         Site.OUTPUT,
@@ -270,6 +282,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "output-curve",
+        "curve of the output",
         "Any static characteristic of the output: a curve through seven values",
         "shape",
         Site.OUTPUT,
@@ -286,6 +299,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "output-gain-curve",
+        "changing gain of the output",
         "Any change of the gain of the output over time: a curve through eight values",
         "change",
         Site.OUTPUT,
@@ -300,6 +314,7 @@ FREE_FORMS: tuple[Effect, ...] = (
     ),
     _make_free_form(
         "baseline-curve",
+        "drift of the output, of any shape",
         "Any drift of the output: a curve over time through eight values",
         "baseline",
         Site.OUTPUT,

@@ -29,6 +29,7 @@ def _coulomb_friction_starting_points(
 
 COULOMB_FRICTION = Effect(
     name="coulomb-friction",
+    title="dry friction",
     summary="Dry friction: - F sign(x')",
     family="memory",
     site=Site.FORCE,
@@ -71,6 +72,7 @@ def _viscous_starting_points(context: SimulationContext, _residual: Signal) -> t
 
 VISCOUS = Effect(
     name="viscous",
+    title="viscous friction",
     summary="Viscous friction: - c x'",
     family="timing",
     site=Site.FORCE,
@@ -103,6 +105,7 @@ def _viscous_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter
 
 VISCOUS_ASYMMETRY = Effect(
     name="viscous-asymmetry",
+    title="asymmetric viscous friction",
     summary="Friction that differs between the directions: - c |x'|",
     family="memory",
     site=Site.FORCE,
@@ -135,6 +138,7 @@ def _quadratic_drag_starting_points(
 
 QUADRATIC_DRAG = Effect(
     name="quadratic-drag",
+    title="quadratic drag",
     summary="Quadratic drag, as in turbulent flow: - c |x'| x'",
     family="shape",
     site=Site.FORCE,

@@ -34,6 +34,7 @@ def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> 
 
 STICTION = Effect(
     name="stiction",
+    title="stick-slip of the input",
     summary="Stick-slip of the input: it moves only after a breakaway distance",
     family="memory",
     site=Site.INPUT,
@@ -70,6 +71,7 @@ def _backlash_starting_points(context: SimulationContext, _residual: Signal) -> 
 
 BACKLASH = Effect(
     name="backlash",
+    title="backlash of the input",
     summary="Backlash of the input: a play of half width b",
     family="memory",
     site=Site.INPUT,
@@ -98,6 +100,7 @@ def _relaxation_starting_points(
 
 RELAXATION = Effect(
     name="relaxation",
+    title="decay of the hysteresis",
     summary="The hysteretic state decays: - h / tau in h'",
     family="memory",
     site=Site.CORE,
@@ -133,6 +136,7 @@ def _rate_dependent_loop_starting_points(
 
 RATE_DEPENDENT_LOOP = Effect(
     name="rate-dependent-loop",
+    title="hysteresis that depends on the rate",
     summary="The shape of the loop depends on the rate: beta and gamma times (1 + k |u'|)",
     family="memory",
     site=Site.CORE,
@@ -168,6 +172,7 @@ def _loop_asymmetry_starting_points(
 
 LOOP_ASYMMETRY = Effect(
     name="loop-asymmetry",
+    title="asymmetric hysteresis",
     summary="The loop is not symmetric: - delta |u'| |h| in h'",
     family="memory",
     site=Site.CORE,
@@ -247,6 +252,7 @@ def _second_hysteresis_starting_points(
 
 SECOND_HYSTERESIS = Effect(
     name="second-hysteresis",
+    title="second hysteresis",
     summary=f"Another hysteretic element: + k z, z' = x' - chi |x'| z - g x' |z|, |g| <= {_MAX_RATIO} chi",
     family="memory",
     site=Site.FORCE,

@@ -15,7 +15,7 @@ from islands.effects.interface.effect import (
     Site,
 )
 from islands.effects.interface.force import ForceLaw
-from islands.effects.interface.formula import Quantity
+from islands.effects.interface.formula import FormulaQuantity
 from islands.effects.interface.map_equation import MapEquation
 
 
@@ -43,6 +43,7 @@ def _cubic_stiffness_starting_points(
 
 CUBIC_STIFFNESS = Effect(
     name="cubic-stiffness",
+    title="cubic stiffness",
     summary="Odd term of the characteristic: + k x^3 in the restoring force or in the output",
     family="shape",
     site=Site.FORCE,
@@ -81,6 +82,7 @@ def _even_nonlinearity_starting_points(
 
 EVEN_NONLINEARITY = Effect(
     name="even-nonlinearity",
+    title="even nonlinearity",
     summary="Even term of the characteristic: + k x^2 in the restoring force or in the output",
     family="shape",
     site=Site.FORCE,
@@ -128,6 +130,7 @@ def _approaches_zero(context: SimulationContext) -> bool:
 
 DEAD_ZONE = Effect(
     name="dead-zone",
+    title="dead zone of the input",
     summary="Dead zone of the input: |u| is reduced by d, and u is zero if |u| < d",
     family="shape",
     site=Site.INPUT,
@@ -158,9 +161,9 @@ def _write_limit(peak: float) -> str:
 def _write_clip(get_range: Callable[[SimulationContext], tuple[float, str]]) -> Formula:
     """Return the formula of a saturation, given its peak and unit."""
 
-    def list_quantities(values: Signal, context: SimulationContext) -> tuple[Quantity, ...]:
+    def list_quantities(values: Signal, context: SimulationContext) -> tuple[FormulaQuantity, ...]:
         peak, unit = get_range(context)
-        return (Quantity("L", peak * (1.0 - max(float(values[0]), 0.0)), unit),)
+        return (FormulaQuantity("L", peak * (1.0 - max(float(values[0]), 0.0)), unit),)
 
     return Formula(
         "clip(x, -L, L)", quantities=list_quantities, note="clip({x}, -{L}, {L}) is {x}, limited to +-{L}"
@@ -178,6 +181,7 @@ def _saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]
 
 INPUT_SATURATION = Effect(
     name="input-saturation",
+    title="saturation of the input",
     summary="Saturation of the amplifier: u is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.INPUT,
@@ -202,6 +206,7 @@ def _output_saturation_form(y: Signal, values: Signal, context: SimulationContex
 
 OUTPUT_SATURATION = Effect(
     name="output-saturation",
+    title="saturation of the output",
     summary="Saturation of the sensor: y is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.OUTPUT,
@@ -234,6 +239,7 @@ def _absolute_value_sensor_starting_points(
 
 ABSOLUTE_VALUE_SENSOR = Effect(
     name="absolute-value-sensor",
+    title="sensor gain that differs with the sign",
     summary="The sensor adds a fraction of the absolute value: y + k |y|",
     family="shape",
     site=Site.OUTPUT,
@@ -274,6 +280,7 @@ def _is_unsigned(context: SimulationContext) -> bool:
 
 UNSIGNED_SENSOR = Effect(
     name="unsigned-sensor",
+    title="sensor without sign",
     summary="The sensor shows the output without its sign: (1 - k) y + k |y|",
     family="shape",
     site=Site.OUTPUT,
@@ -317,6 +324,8 @@ def outflow_law(state: str) -> Effect:
 OUTFLOW_LAW = EffectTemplate(
     "outflow-law",
     "The outflow has a linear term in addition to Bernoulli's law: + l x in the flow out of one state",
+    title="linear outflow",
+    placed_title="linear outflow of {}",
     similar_to="state-clip, input-offset, a nonlinear sensor",
     distinguished_by="the outflow grows more steeply with the level than a square root",
     occurs_in="pipes and valves with laminar flow",
@@ -419,6 +428,8 @@ def state_range(state: str, unit: str) -> Effect:
 STATE_RANGE = EffectTemplate(
     "state-range",
     "A state is limited to a range from a lower to an upper level, or in one direction only",
+    title="range of a state",
+    placed_title="range of {}",
     similar_to="state-clip, output-saturation",
     distinguished_by="the output flattens later than the state, at two levels that are not opposite",
     occurs_in="end stops on both sides of a position, valves between closed and open",
@@ -427,6 +438,8 @@ STATE_RANGE = EffectTemplate(
 STATE_CLIP = EffectTemplate(
     "state-clip",
     "A state is limited to a level, as in a tank that overflows; the next state may receive a fraction",
+    title="limit of a state",
+    placed_title="limit of {}",
     similar_to="output-saturation, input-offset, outflow-law",
     distinguished_by="the output flattens later than the state: an unmeasured state is clipped",
     occurs_in="tanks that overflow, end stops, limited integrators",

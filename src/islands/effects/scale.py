@@ -21,6 +21,7 @@ def _input_gain_starting_points(
 
 INPUT_GAIN = Effect(
     name="input-gain",
+    title="gain error of the input",
     summary="Gain error of the amplifier: (1 + k) u",
     family="scale",
     site=Site.INPUT,
@@ -53,6 +54,7 @@ def _sensor_gain_starting_points(
 
 SENSOR_GAIN = Effect(
     name="sensor-gain",
+    title="gain error of the sensor",
     summary="Gain error of the sensor: (1 + k) y",
     family="scale",
     site=Site.OUTPUT,
@@ -95,6 +97,8 @@ def wrong_parameter(parameter: Parameter) -> Effect:
 WRONG_PARAMETER = EffectTemplate(
     "wrong-parameter",
     "A parameter of the simulation differs from its nominal value by more than its tolerance",
+    title="wrong parameter",
+    placed_title="wrong parameter {}",
     similar_to="input-gain, sensor-gain, other parameters",
     distinguished_by="only tolerances distinguish them; the name says which parameter",
     occurs_in="data sheets, estimates of mass and geometry, a part that was exchanged",

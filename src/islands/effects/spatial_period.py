@@ -143,6 +143,7 @@ def _cogging_starting_points(context: SimulationContext, residual: Signal) -> tu
 
 COGGING = Effect(
     name="cogging",
+    title="force periodic in the position",
     summary="Force that is periodic in the position, as of magnets: + a cos(2 pi f x) + b sin(2 pi f x)",
     family="shape",
     site=Site.FORCE,
@@ -182,6 +183,7 @@ def _cyclic_error_starting_points(
 
 CYCLIC_ERROR = Effect(
     name="cyclic-error",
+    title="cyclic error of the sensor",
     summary="Periodic error of an encoder or interferometer: y + a cos(2 pi f y) + b sin(2 pi f y)",
     family="shape",
     site=Site.OUTPUT,

@@ -9,7 +9,7 @@ import scipy
 from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.formula import Quantity
+from islands.effects.interface.formula import FormulaQuantity
 from islands.effects.interface.map_equation import MapEquation
 
 #: Names of the effects that change the gain.
@@ -83,6 +83,7 @@ def _gain_step_starting_points(
 
 GAIN_STEP = Effect(
     name="gain-step",
+    title="step of the gain",
     summary="Step of the gain at an instant: gain (1 + k) after it",
     family="change",
     site=Site.CORE,
@@ -110,6 +111,7 @@ def _ageing_starting_points(_context: SimulationContext, _residual: Signal) -> t
 
 AGEING = Effect(
     name="ageing",
+    title="drift of the gain",
     summary="Drift of the gain: gain (1 + k t / T) over the record's duration T",
     family="change",
     site=Site.CORE,
@@ -119,8 +121,8 @@ AGEING = Effect(
     formula=Formula(
         "x*(1 + k*t/T)",
         quantities=lambda values, context: (
-            Quantity("k", float(values[0]), "", "ageing"),
-            Quantity("T", context.duration, "s"),
+            FormulaQuantity("k", float(values[0]), "", "ageing"),
+            FormulaQuantity("T", context.duration, "s"),
         ),
     ),
     source="Doebelin, Measurement Systems, section 3",
@@ -148,6 +150,7 @@ def _temperature_gain_starting_points(
 
 TEMPERATURE_GAIN = Effect(
     name="temperature-gain",
+    title="gain that depends on the temperature",
     summary="The gain depends on a temperature: u (1 + k (T - T(0))), where T is a given channel",
     family="change",
     site=Site.INPUT,

@@ -38,6 +38,7 @@ def _delay_starting_points(context: SimulationContext, _residual: Signal) -> tup
 
 DELAY = Effect(
     name="delay",
+    title="delay of the input",
     summary="The input acts later than it is recorded, or earlier if tau is negative: u(t - tau)",
     family="timing",
     site=Site.INPUT,
@@ -69,6 +70,7 @@ def _clock_skew_starting_points(
 
 CLOCK_SKEW = Effect(
     name="clock-skew",
+    title="different clock rates",
     summary="The clocks of input and output differ in rate: u(t (1 + e))",
     family="timing",
     site=Site.INPUT,
@@ -123,6 +125,7 @@ def _has_rates_to_limit(context: SimulationContext) -> bool:
 
 RATE_LIMIT = Effect(
     name="rate-limit",
+    title="rate limit of the input",
     summary="Rate limit of the actuator (slew rate): |u'| is at most 1/inverse_rate",
     family="timing",
     site=Site.INPUT,
@@ -160,6 +163,7 @@ def _sensor_lag_starting_points(
 
 SENSOR_LAG = Effect(
     name="sensor-lag",
+    title="lag of the sensor",
     summary="First-order lag of the sensor: tau y' + y = v",
     family="timing",
     site=Site.OUTPUT,
@@ -211,6 +215,7 @@ def _resonance_starting_points(
 
 RESONANCE = Effect(
     name="resonance",
+    title="resonance at the output",
     summary="Second-order mode in series with the output: y'' + 2 zeta w y' + w^2 y = w^2 v",
     family="timing",
     site=Site.OUTPUT,

@@ -28,7 +28,7 @@ from islands.expressions.tree import Apply, Expression, Primitive
 SIMULATION = "G"
 
 
-class EquationText(Printer):
+class EquationTextPrinter(Printer):
     """Printer of an equation as text."""
 
     def number(self, number: float) -> str:
@@ -46,7 +46,7 @@ class EquationText(Printer):
 _APPLY = "<mo>&#x2061;</mo>"
 
 
-class EquationMathml(Printer):
+class EquationMathmlPrinter(Printer):
     """Printer of an equation as presentation MathML in ASCII; each expression is one element."""
 
     operators: Mapping[str, Operator] = {

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.data.segments import fill_gaps, map_segments
 from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import get_title
 from islands.effects.interface.context import Signal
 from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import VERTICES, downsample
@@ -159,7 +160,8 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     places, gains = np.arange(len(shown)), [candidate.score for candidate in shown]
     colours = [colour_of.get((candidate.name, candidate.place), FRAME) for candidate in shown]
     axes.barh(places, gains, color=colours, height=0.7)
-    names = [f"{each.name} of {each.place}" if each.place else each.name for each in shown]
+    placed = [f"{each.name}:{each.place}" if each.place else each.name for each in shown]
+    names = [get_title(each) or each for each in placed]
     axes.set_yticks(places, names)
     axes.axvline(0.0, color=FRAME, lw=0.6)
     for place, candidate in zip(places, shown, strict=True):

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.inference.finding import list_free_forms
 from islands.diagnosis.result import Diagnosis
+from islands.effects.catalogue import get_title
 from islands.figures.style import FRAME, MEASURED, SIMULATED, blank, finish, house_style, label
 
 
@@ -25,16 +26,17 @@ def draw_free_forms(diagnosis: Diagnosis) -> Figure:
         axes.errorbar(range(len(values)), middle, errors, color=SIMULATED, marker="o", ms=4, capsize=3)
         axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
         axes.set_xticks(range(len(values)), list(form.parameters))
-        axes.set_ylabel(label(form.name, values[0].unit))
+        axes.set_ylabel(label(get_title(form.name) or form.name, values[0].unit))
     return finish(figure)
 
 
 @house_style()
 def draw_effect_shape(shape: EffectShape) -> Figure:
     """Draw the curve of an effect, and the values of the free curve with their 95 % intervals."""
-    figure = blank(2.8, f"Shape of {shape.name}, without gain and offset")
+    name, form = (get_title(each) or each for each in (shape.name, shape.form))
+    figure = blank(2.8, f"Shape of the effect, without gain and offset: {name}")
     axes = figure.subplots()
-    axes.plot(shape.places, shape.named, color=SIMULATED, label=shape.name)
+    axes.plot(shape.places, shape.named, color=SIMULATED, label=name)
     axes.errorbar(
         shape.free_places,
         shape.free,
@@ -44,7 +46,7 @@ def draw_effect_shape(shape: EffectShape) -> Figure:
         marker="o",
         ms=4,
         capsize=3,
-        label=f"{shape.form}, 95 % intervals",
+        label=f"{form}, 95 % intervals",
     )
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
     axes.set_xlabel(label(shape.signal, shape.signal_unit))

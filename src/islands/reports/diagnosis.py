@@ -1,5 +1,6 @@
 """HTML report of a diagnosis: sentences, numbers and figures."""
 
+from collections.abc import Callable
 from functools import partial
 from math import floor
 
@@ -22,12 +23,12 @@ from islands.io.result_text.diagnosis_statements import (
     describe_details,
     describe_extended_values,
     describe_verdict,
-    label_effect,
     name_reference,
     write_value,
 )
 from islands.io.result_text.headlines import write_diagnosis_headline
 from islands.io.result_text.statements import Document
+from islands.io.result_text.text_layout import write_html
 from islands.parallel import ParallelMap
 from islands.reports.origin import Origin
 from islands.reports.record_table import list_record
@@ -58,12 +59,12 @@ _EXTENDED = "calibrated, with the effects"
 _MAX_CANDIDATES = 15
 
 
-def _limits(tested: SelfTest) -> list[tuple[str, str, str]]:
+def _limits(tested: SelfTest, label: Callable[[str], str]) -> list[tuple[str, str, str]]:
     """Return for each effect its name, the smallest detected strength, and the misfit at this strength."""
     return [
-        (name, f"not up to {STRENGTHS[-1]:g} times the noise", "")
+        (label(name), f"not up to {STRENGTHS[-1]:g} times the noise", "")
         if limit is None
-        else (name, _amount(limit.strength, limit.unit), f"{limit.misfit:.2g} times the noise")
+        else (label(name), _amount(limit.strength, limit.unit), f"{limit.misfit:.2g} times the noise")
         for name, limit in tested.detection_limits.items()
     ]
 
@@ -142,10 +143,15 @@ def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[st
     return columns, rows, f"All but the noise floor are errors over {document['held_out_part']}."
 
 
+def _show_code(sentence: str) -> Markup:
+    return Markup(write_html(sentence))
+
+
 def _list_candidates(document: Document) -> list[tuple[str, str, str]]:
     """Return the name, the gain and the share of the misfit of the best screened effects."""
+    facts = DiagnosisFacts(document)
     return [
-        (label_effect(each), f"{each['score']:.1f}", f"{floor(100 * each['eta'])} %")
+        (_show_code(facts.label_effect(each)), f"{each['score']:.1f}", f"{floor(100 * each['eta'])} %")
         for each in document["candidates"][:_MAX_CANDIDATES]
     ]
 
@@ -201,10 +207,10 @@ def diagnosis_report(
         origin=origin,
         sha256=document["record"]["sha256"],
         document=document,
-        headline=describe_verdict(document),
+        headline=_show_code(describe_verdict(document)),
         lead=write_diagnosis_headline(document),
-        causes=describe_causes(document),
-        details=describe_details(document, (EXTENDED,)),
+        causes=list(map(_show_code, describe_causes(document))),
+        details=list(map(_show_code, describe_details(document, (EXTENDED,)))),
         extended=_show_extension(document, found),
         error_columns=columns,
         errors=errors,
@@ -214,7 +220,7 @@ def diagnosis_report(
         candidates=_list_candidates(document),
         record=list_record(document["record"]),
         strengths=STRENGTHS,
-        limits=[] if tested is None else _limits(tested),
+        limits=[] if tested is None else _limits(tested, DiagnosisFacts(document).label),
         mistaken=[] if tested is None else _mistaken(tested),
     )
     return text.encode()

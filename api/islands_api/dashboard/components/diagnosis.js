@@ -28,7 +28,10 @@ function splitWords({ headline, words }) {
   return [first, lines.filter((line) => !first.includes(line))];
 }
 
-const makeLines = (lines) => lines.map((line) => el("p", {}, line));
+/** Return the parts of a sentence; names between backticks are code. */
+const splitCode = (line) => line.split("`").map((part, at) => (at % 2 ? el("code", {}, part) : part));
+
+const makeLines = (lines) => lines.map((line) => el("p", {}, ...splitCode(line)));
 
 /** Make the equation of an extended simulation that is one difference equation, and its exports. */
 function makeExtendedEquation(job, signal) {
@@ -64,7 +67,7 @@ export function makeFindingsPanels(job, signal) {
     "section",
     { class: "card findings" },
     el("h2", {}, "Findings"),
-    el("p", { class: "verdict" }, verdict),
+    el("p", { class: "verdict" }, ...splitCode(verdict)),
     makeLines(headline),
     figureHost,
     summary.equation && isDiagnosis(job) ? makeExtendedEquation(job, signal) : null,

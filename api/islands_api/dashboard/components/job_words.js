@@ -19,7 +19,10 @@ export const getFinding = ({ summary }) =>
 /** Return the verdict of a job in words; empty if it has none. */
 export function getVerdict({ summary, ...job }) {
   if (!summary) return "";
-  if (!isSearch(job)) return (summary.words ?? "").split("\n")[0] || formatVerdict(summary);
+  if (!isSearch(job)) {
+    const [first] = (summary.words ?? "").split("\n");
+    return first.replaceAll("`", "") || formatVerdict(summary);
+  }
   const [, verdict = ""] = /^As a simulation: ([^(\n]+)/m.exec(summary.words ?? "") ?? [];
   return verdict.trim().replace(/\.$/, "");
 }

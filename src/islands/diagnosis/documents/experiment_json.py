@@ -9,6 +9,7 @@ from islands.diagnosis.planning.next_experiment import (
     SeparatedPair,
 )
 from islands.diagnosis.planning.planned_input import InputLimits
+from islands.effects.catalogue import get_title
 
 #: File of the designed input in the folder of a diagnosis.
 NEXT_EXPERIMENT_FILE = "next-experiment.csv"
@@ -85,8 +86,13 @@ def _write_input(designed: DesignedInput) -> str:
     return f"{played}, with {factors} of the record, since no input within it separates as many causes"
 
 
+def _label(name: str) -> str:
+    title = get_title(name)
+    return f"{title} (`{name}`)" if title else name
+
+
 def _write_pair(pair: SeparatedPair) -> str:
-    names = " and ".join(pair.causes)
+    names = " and ".join(map(_label, pair.causes))
     if pair.recorded is None:
         return f"{names}: {_UNKNOWN_INPUT}"
     apart = f"{names} are {pair.recorded.distance:.1f} standard deviations of the noise apart in this record"

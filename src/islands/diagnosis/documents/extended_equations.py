@@ -10,9 +10,9 @@ from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.inference.finding import Finding, Value
 from islands.effects.interface.effect import Effect, ForceLaw, Formula, Site
-from islands.effects.interface.formula import Quantity
+from islands.effects.interface.formula import FormulaQuantity
 from islands.effects.time_variation import GAIN_EFFECTS
-from islands.expressions.equation_printing import SIMULATION, EquationMathml, EquationText
+from islands.expressions.equation_printing import SIMULATION, EquationMathmlPrinter, EquationTextPrinter
 from islands.expressions.parsing import parse_formula
 from islands.expressions.primitives import ADD, DIV, MUL, NEG, SUB
 from islands.expressions.tree import (
@@ -47,10 +47,10 @@ _X = Symbol("x")
 #: Cell of a table of equations: its alignment and its content.
 _CELL = '<mtd style="text-align: {}">{}</mtd>'
 
-_TEXT, _MATHML = EquationText(), EquationMathml()
+_TEXT, _MATHML = EquationTextPrinter(), EquationMathmlPrinter()
 
 
-class Line(NamedTuple):
+class WrittenLine(NamedTuple):
     """An equation, or a condition.
 
     Attributes
@@ -103,19 +103,19 @@ class WrittenValue(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ExtendedEquations:
+class WrittenExtension:
     """Equations of an extended simulation.
 
     Attributes
     ----------
-    lines : tuple of Line
+    lines : tuple of WrittenLine
     values : tuple of WrittenValue
         Values of the effects; those of the simulation have their own names.
     notes : tuple of str
         Sentences on what the equations contain, without periods.
     """
 
-    lines: tuple[Line, ...]
+    lines: tuple[WrittenLine, ...]
     values: tuple[WrittenValue, ...]
     notes: tuple[str, ...]
 
@@ -137,7 +137,7 @@ class ExtendedEquations:
 
 def write_extended_equations(
     fit: CalibrationResult, findings: Sequence[Finding], record: Dataset
-) -> ExtendedEquations:
+) -> WrittenExtension:
     """Write the equations of a calibrated simulation with its effects.
 
     A simulation without equations is the function ``G`` of its input.
@@ -196,7 +196,7 @@ class _EquationWriter:
     _values: list[WrittenValue] = field(default_factory=list)
     _notes: list[str] = field(default_factory=list)
 
-    def write(self) -> ExtendedEquations:
+    def write(self) -> WrittenExtension:
         simulation = self.fit.simulation
         simulator = _unwrap(simulation.simulator)
         system = simulator.system if isinstance(simulator, OdeSimulator | OutputEquation) else None
@@ -212,7 +212,7 @@ class _EquationWriter:
         lines += self._write_output(output, [each for each in placed if each.effect.site == Site.OUTPUT])
         tidy = (each._replace(right=_tidy(each.right)) for each in lines)
         notes = dict.fromkeys((*self._name_signals(), *self._notes))
-        return ExtendedEquations(tuple(tidy), tuple(self._values), tuple(notes))
+        return WrittenExtension(tuple(tidy), tuple(self._values), tuple(notes))
 
     def _name_signals(self) -> list[str]:
         """Return a note on the names of the record, if the equations have others."""
@@ -234,7 +234,7 @@ class _EquationWriter:
         ]
         return _PlacedFormula(effect, formula, names)
 
-    def _find_estimate(self, effect: Effect, quantity: Quantity) -> Value:
+    def _find_estimate(self, effect: Effect, quantity: FormulaQuantity) -> Value:
         for each in self.findings:
             if (each.name, each.place) == (effect.cause, effect.place) and quantity.parameter:
                 return each.parameters.get(quantity.parameter) or Value(quantity.value, quantity.unit, None)
@@ -255,13 +255,13 @@ class _EquationWriter:
 
     def _write_system(
         self, system: OdeSystem, placed: Sequence[_PlacedFormula]
-    ) -> tuple[list[Line], Expression]:
+    ) -> tuple[list[WrittenLine], Expression]:
         """Return the equations of a system and its output, with all effects but those of the output."""
         system, conditions = self._insert_into_states(system, placed)
         forces = [each for each in placed if each.effect.site == Site.FORCE]
         named = [*system.variables, *system.derivatives]
         sides = [*(right for _, right in named), system.output]
-        states: list[Line] = []
+        states: list[WrittenLine] = []
         if system.force is not None and system.force.rate:
             laws, states = self._write_forces(
                 forces, Symbol(system.force.coordinate), Symbol(system.force.rate)
@@ -272,7 +272,7 @@ class _EquationWriter:
         *sides, output = (substitute(side, {system.input: driving}) for side in sides)
         first = len(system.variables)
         lines = [
-            Line(name, side, at >= first)
+            WrittenLine(name, side, at >= first)
             for at, ((name, _), side) in enumerate(zip(named, sides, strict=True))
         ]
         output, further = self._add_forces(output, driving, forces)
@@ -280,11 +280,11 @@ class _EquationWriter:
 
     def _insert_into_states(
         self, system: OdeSystem, placed: Sequence[_PlacedFormula]
-    ) -> tuple[OdeSystem, list[Line]]:
+    ) -> tuple[OdeSystem, list[WrittenLine]]:
         """Insert the effects on states, parameters and the gain; return the conditions on states as well."""
         listed = {each.name: each for each in list_terms(system) if each.term is not None}
         replaced: dict[str, Expression] = {}
-        conditions: list[Line] = []
+        conditions: list[WrittenLine] = []
         for each in placed:
             effect = each.effect
             if effect.name in listed:
@@ -297,7 +297,8 @@ class _EquationWriter:
                 replaced[name] = substitute(each.parse(each.formula.text), {"x": before})
             state = Symbol(effect.place)
             conditions += [
-                Line("", substitute(each.parse(text), {"x": state})) for text in each.formula.conditions
+                WrittenLine("", substitute(each.parse(text), {"x": state}))
+                for text in each.formula.conditions
             ]
             if effect.site in (Site.CORE, Site.PARAMETER):
                 self._note(each, state)
@@ -311,8 +312,8 @@ class _EquationWriter:
 
     def _write_core(
         self, simulator: Simulator, placed: Sequence[_PlacedFormula]
-    ) -> tuple[list[Line], Expression]:
-        """Return the equations around a simulation that has none of its own, and its output."""
+    ) -> tuple[list[WrittenLine], Expression]:
+        """Return the equations around a simulation that has none, and its output."""
         inner = simulator
         terms: Expression = Symbol(SIMULATED)
         if isinstance(simulator, OutputEquation):
@@ -333,11 +334,11 @@ class _EquationWriter:
         lines += further
         if terms == Symbol(SIMULATED):
             return lines, core
-        return [*lines, Line(SIMULATED, core)], substitute(terms, {INPUT: driving})
+        return [*lines, WrittenLine(SIMULATED, core)], substitute(terms, {INPUT: driving})
 
     def _write_input(
         self, u: Symbol, placed: Sequence[_PlacedFormula], sides: Sequence[Expression]
-    ) -> tuple[Expression, list[Line]]:
+    ) -> tuple[Expression, list[WrittenLine]]:
         """Return the input after its maps, and the lines that define it."""
         maps = [each for each in placed if each.effect.site == Site.INPUT]
         if not self._gain:
@@ -346,12 +347,12 @@ class _EquationWriter:
         uses = sum(part == u for side in sides for part in walk(side))
         if uses > 1 and not self._is_signal(driving):
             name = self._take_name(u.name)
-            return Symbol(name), [*lines, Line(name, driving)]
+            return Symbol(name), [*lines, WrittenLine(name, driving)]
         return driving, lines
 
-    def _write_output(self, output: Expression, maps: Sequence[_PlacedFormula]) -> list[Line]:
+    def _write_output(self, output: Expression, maps: Sequence[_PlacedFormula]) -> list[WrittenLine]:
         output, lines = self._apply_maps(output, maps, _BEFORE)
-        return [*lines, Line(_OUTPUT, output)]
+        return [*lines, WrittenLine(_OUTPUT, output)]
 
     def _is_signal(self, expression: Expression) -> bool:
         """Return whether an expression is a name, or the input at another time, which may be repeated."""
@@ -360,32 +361,32 @@ class _EquationWriter:
 
     def _apply_maps(
         self, signal: Expression, maps: Sequence[_PlacedFormula], name: str
-    ) -> tuple[Expression, list[Line]]:
-        """Return a signal after maps, and the lines that define what they need more than once."""
-        lines = list[Line]()
+    ) -> tuple[Expression, list[WrittenLine]]:
+        """Return a signal after maps, and the lines that define signals which occur more than once."""
+        lines = list[WrittenLine]()
         for each in maps:
             form = each.parse(each.formula.text)
             states = [(each.names[state], each.parse(right)) for state, right in each.formula.states]
             sides = (form, *(side for _, side in states))
             if sum(part == _X for side in sides for part in walk(side)) > 1 and not self._is_signal(signal):
                 own = self._take_name(name)
-                lines.append(Line(own, signal))
+                lines.append(WrittenLine(own, signal))
                 signal = Symbol(own)
             self._note(each, signal)
-            lines += [Line(state, _insert_signal(right, signal), True) for state, right in states]
+            lines += [WrittenLine(state, _insert_signal(right, signal), True) for state, right in states]
             signal = _insert_signal(form, signal)
         return signal, lines
 
     def _write_forces(
         self, placed: Sequence[_PlacedFormula], x: Expression, v: Expression
-    ) -> tuple[list[Expression], list[Line]]:
+    ) -> tuple[list[Expression], list[WrittenLine]]:
         """Return the forces on a coordinate, and the equations of their states."""
-        laws, lines = list[Expression](), list[Line]()
+        laws, lines = list[Expression](), list[WrittenLine]()
         signals = {"x": x, "v": v}
         for each in placed:
             laws.append(substitute(each.parse(each.formula.text), signals))
             lines += [
-                Line(each.names[state], substitute(each.parse(right), signals), True)
+                WrittenLine(each.names[state], substitute(each.parse(right), signals), True)
                 for state, right in each.formula.states
             ]
             self._note(each, x, v)
@@ -393,7 +394,7 @@ class _EquationWriter:
 
     def _add_forces(
         self, output: Expression, driving: Expression, placed: Sequence[_PlacedFormula]
-    ) -> tuple[Expression, list[Line]]:
+    ) -> tuple[Expression, list[WrittenLine]]:
         """Add forces on the input to an output, as a simulation without inertia does."""
         laws, lines = self._write_forces(placed, driving, Apply(RATE, (driving,)))
         is_against = self.fit.simulation.context.force_coordinate.sign < 0.0

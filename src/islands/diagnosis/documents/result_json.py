@@ -8,6 +8,7 @@ import numpy as np
 
 from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
+from islands.diagnosis.discovery.missing_terms import MISSING_TERM
 from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
 from islands.diagnosis.documents.extended_equations import write_extended_equations
 from islands.diagnosis.findings import ResidualFormula
@@ -18,8 +19,11 @@ from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.diagnosis.result import CalibratedValue, Candidate, Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
-from islands.effects.catalogue import find_entry
+from islands.effects.catalogue import find_entry, get_title
 from islands.io.result_folder import record_document
+
+#: Plain name of a missing term.
+TERM_TITLE = "missing term"
 
 SCHEMA = "islands.discrepancy/1"
 
@@ -52,6 +56,7 @@ def diagnosis_document(
         "gain": None if diagnosis.gain is None else asdict(diagnosis.gain),
         **_describe_experiment(diagnosis.next_experiment),
         "candidates": [_describe_candidate(each) for each in diagnosis.candidates],
+        "titles": _list_titles(diagnosis, tested),
         "remainder": dict(diagnosis.residual_structure),
         "proposal": None if proposal is None else asdict(proposal),
         "estimation_samples": diagnosis.estimation_samples,
@@ -89,6 +94,21 @@ def _describe_experiment(experiment: NextExperiment | None) -> dict[str, Any]:
         "decisive_experiment": write_advice(experiment) or None,
         "next_experiment": describe_next_experiment(experiment),
     }
+
+
+def _list_titles(diagnosis: Diagnosis, tested: SelfTest | None) -> dict[str, str]:
+    """Return the plain name of each cause, by its name, with the state or parameter that it acts on."""
+    listed = [(each.name, each.place) for each in diagnosis.effects]
+    listed += [(each.name, each.place) for each in diagnosis.candidates]
+    names = [f"{name}:{place}" if place else name for name, place in listed]
+    names += [name for each in diagnosis.effects for name in each.equivalents]
+    if diagnosis.discovery is not None:
+        names += [*diagnosis.discovery.effects, *diagnosis.discovery.nearest]
+    if diagnosis.next_experiment is not None:
+        names += [name for each in diagnosis.next_experiment.pairs for name in each.causes]
+    names += [] if tested is None else tested.detection_limits
+    titles = {name: TERM_TITLE if name == MISSING_TERM else get_title(name) for name in names}
+    return {name: title for name, title in titles.items() if title}
 
 
 def _describe_extension(diagnosis: Diagnosis, trial: ExtensionTrial) -> dict[str, Any]:

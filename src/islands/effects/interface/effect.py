@@ -89,6 +89,8 @@ class Effect:
         Observation that distinguishes the effect from those, for results and the reference.
     occurs_in : str
         Parts of machines that have the effect, for results and the reference; empty for a free form.
+    title : str
+        Plain name in sentences, which the name of the effect follows in brackets; empty for the name alone.
     """
 
     name: str
@@ -114,6 +116,7 @@ class Effect:
     similar_to: str = ""
     distinguished_by: str = ""
     occurs_in: str = ""
+    title: str = ""
 
     @property
     def cause(self) -> str:
@@ -135,12 +138,16 @@ class EffectTemplate:
     name, summary : str
         As in `Effect`. The name of an effect is this name, usually with a colon and the name of a state or
         parameter.
-    similar_to, distinguished_by, occurs_in : str
+    title, similar_to, distinguished_by, occurs_in : str
         As in `Effect`.
+    placed_title : str
+        The same as a format string of the state or parameter; empty for the title without it.
     """
 
     name: str
     summary: str
+    title: str = ""
+    placed_title: str = ""
     similar_to: str = ""
     distinguished_by: str = ""
     occurs_in: str = ""

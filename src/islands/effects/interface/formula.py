@@ -7,7 +7,7 @@ from typing import NamedTuple
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 
 
-class Quantity(NamedTuple):
+class FormulaQuantity(NamedTuple):
     """A number in a formula.
 
     Attributes
@@ -55,7 +55,7 @@ class Formula:
 
     text: str = ""
     symbols: tuple[str, ...] = ()
-    quantities: Callable[[Signal, SimulationContext], Sequence[Quantity]] | None = None
+    quantities: Callable[[Signal, SimulationContext], Sequence[FormulaQuantity]] | None = None
     states: tuple[tuple[str, str], ...] = ()
     conditions: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ class Formula:
 
     def list_quantities(
         self, parameters: Sequence[Parameter], values: Signal, context: SimulationContext
-    ) -> tuple[Quantity, ...]:
+    ) -> tuple[FormulaQuantity, ...]:
         """Return the numbers of the formula, given the parameters of the effect and their values."""
         if self.quantities is not None:
             return tuple(self.quantities(values, context))
@@ -74,7 +74,7 @@ class Formula:
         ]
         symbols = self.symbols or tuple(each.name for each, _ in given)
         return tuple(
-            Quantity(symbol, value, each.unit, each.name)
+            FormulaQuantity(symbol, value, each.unit, each.name)
             for symbol, (each, value) in zip(symbols, given, strict=True)
         )
 

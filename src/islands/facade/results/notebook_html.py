@@ -1,9 +1,9 @@
 """HTML of a result in a notebook: the equation of a model, sentences and a figure."""
 
 from collections.abc import Iterable
-from html import escape
 from typing import TYPE_CHECKING
 
+from islands.io.result_text.text_layout import write_html
 from islands.models.protocol import DynamicModel
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ def render_sentences(
     sentences: Iterable[str], figure: "Figure | None", alternative: str, heading: str = ""
 ) -> str:
     """Return HTML, sentences as paragraphs, and a figure as an image with an alternative text."""
-    paragraphs = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
+    paragraphs = "".join(f"<p>{write_html(sentence)}</p>" for sentence in sentences)
     image = ""
     if figure is not None:
         from islands.figures.style import image_html  # noqa: PLC0415 - matplotlib takes half a second

@@ -109,6 +109,17 @@ class DiagnosisFacts:
         self.floor: float = document["noise_floor_rmse"]
         self.remainder: Document = document.get("remainder", {})
 
+    def label(self, name: str, term: str = "", place: str = "") -> str:
+        """Name a cause: its plain name, and that of the program in brackets, if it has both."""
+        title = self.document.get("titles", {}).get(f"{name}:{place}" if place else name)
+        if title is None:
+            return " ".join(filter(None, (name, term, f"of {place}" if place else "")))
+        return f"{title} {term} (`{name}`)" if term else f"{title} (`{name}`)"
+
+    def label_effect(self, effect: Document) -> str:
+        """Name an effect with its term, or with the state or the parameter that it acts on."""
+        return self.label(effect["name"], effect.get("term", ""), effect.get("place", ""))
+
     def write_error(self, value: float) -> str:
         """Write an error with the unit of the output."""
         return write_amount(value, self.document["record"]["units"]["output"])
@@ -204,7 +215,7 @@ class DiagnosisFacts:
         """Pairs of causes with similar scores that the record would separate if one of them were right."""
         pairs = (self.document.get("next_experiment") or {}).get("pairs", ())
         return [
-            " or ".join(each["causes"])
+            " or ".join(map(self.label, each["causes"]))
             for each in pairs
             if each["recorded"] is not None and each["recorded"]["is_sufficient"]
         ]
@@ -230,7 +241,7 @@ class DiagnosisFacts:
     @property
     def free_forms(self) -> list[str]:
         """Names of the causes without an assumed shape."""
-        return [each["name"] for each in self.claimed if each.get("free_form")]
+        return [self.label_effect(each) for each in self.claimed if each.get("free_form")]
 
     @property
     def is_certain(self) -> bool:
@@ -386,7 +397,7 @@ class DiagnosisFacts:
     def time_dependent(self) -> list[str]:
         """Names of the causes that are functions of the time, or their terms."""
         found = [each for each in self.causes if each.get("depends_on_time")]
-        return list(dict.fromkeys(each.get("term") or each["name"] for each in found))
+        return list(dict.fromkeys(each.get("term") or self.label_effect(each) for each in found))
 
     @property
     def is_one_record(self) -> bool:
@@ -478,7 +489,7 @@ def _describe_noise_claim(facts: DiagnosisFacts) -> str:
 def _describe_named(facts: DiagnosisFacts) -> str:
     extent = f"{_describe_extent(facts)}{_describe_rest(facts)}"
     probably = "" if facts.is_sure else "probably "
-    names = _list_names([label_effect(each) for each in facts.claimed])
+    names = _list_names([facts.label_effect(each) for each in facts.claimed])
     if all(each["name"] == _FORM for each in facts.claimed):
         return f"The form of the model is {probably}wrong, which explains {extent}."
     if all(each["family"] == _SCALE for each in facts.claimed):
@@ -524,7 +535,9 @@ def _describe_discovered(facts: DiagnosisFacts) -> str:
 def _describe_cause(facts: DiagnosisFacts, cause: Document) -> str:
     parts = [f"{_describe_confidence(cause)}{_describe_share(facts, cause)}"]
     if cause["equivalents"]:
-        parts.append(f"this record does not distinguish it from {', '.join(cause['equivalents'])}")
+        parts.append(
+            f"this record does not distinguish it from {', '.join(map(facts.label, cause['equivalents']))}"
+        )
     if not cause.get("claimed", True):
         parts.append("improves the fit, but is not claimed as a cause")
     return f"{_name_values(facts, cause)}; {'; '.join(parts)}{_explain_cause(cause)}"
@@ -569,11 +582,6 @@ def _compare_errors(cause: Document) -> str:
     return f"{ratio:.3g} times as large" if ratio >= _TIMES else f"{100 * (ratio - 1.0):.2g} % larger"
 
 
-def label_effect(effect: Document) -> str:
-    """Name an effect with the state or the parameter that it acts on."""
-    return f"{effect['name']} of {place}" if (place := effect.get("place")) else str(effect["name"])
-
-
 def _list_names(names: Sequence[str]) -> str:
     """Write names as a list: ``A, B and C``."""
     names = list(dict.fromkeys(names))
@@ -587,7 +595,7 @@ def _name_values(facts: DiagnosisFacts, effect: Document) -> str:
         for name, each in effect["parameters"].items()
     ]
     values = ", ".join(f"{name} = {value}" if name else value for name, value in named)
-    name = f"{effect['name']} {effect['term']}" if effect.get("term") else label_effect(effect)
+    name = facts.label_effect(effect)
     if law := effect.get("resembles"):
         article = "an" if law["law"].startswith("a") else "a"
         return f"{name}, which resembles {article} {law['law']}: {law['formula']}; {values}"
@@ -624,8 +632,8 @@ def _describe_input_limits(facts: DiagnosisFacts) -> str:
     texts = []
     for cause, value in facts.input_limits:
         of, per = ("", unit) if cause == _SATURATION else ("the rate of ", f"{unit or '1'}/s")
-        texts.append(f"{cause} limits {of}{name} to {write_amount(float(f'{value:.4g}'), per)}")
-    return f"{'; '.join(texts)}."
+        texts.append(f"{facts.label(cause)} limits {of}{name} to {write_amount(float(f'{value:.4g}'), per)}")
+    return f"Limits of the input: {'; '.join(texts)}."
 
 
 def _describe_growth(facts: DiagnosisFacts) -> str:
@@ -698,7 +706,7 @@ def _describe_equations(facts: DiagnosisFacts) -> str:
     equations = facts.discovered["equations"]
     if facts.verdict == "discovered":
         return f"Equations: {equations}"
-    names = " and ".join(facts.discovered["effects"])
+    names = " and ".join(map(facts.label, facts.discovered["effects"]))
     return f"Equations that explain the record as well{f', with {names}' if names else ''}: {equations}"
 
 
@@ -728,21 +736,21 @@ def describe_extended_values(document: Document) -> tuple[str, str]:
 
 
 def _describe_extended_simulation(facts: DiagnosisFacts) -> str:
-    names = _list_names([label_effect(each) for each in facts.causes])
+    names = _list_names([facts.label_effect(each) for each in facts.causes])
     calibrated = f"; {facts.calibrated}" if facts.calibrated else ""
     return f"Extended simulation: {facts.document['equations']}{calibrated}; with {names}."
 
 
 def _describe_nearest_to_terms(facts: DiagnosisFacts) -> str:
     assert facts.discovered is not None
-    others = " and ".join(facts.discovered["nearest"])
+    others = " and ".join(map(facts.label, facts.discovered["nearest"]))
     worse = f"{facts.discovered['worse_by']:.0f}"
     return f"With {others} instead of the terms, the score is worse by {worse} (BIC; 10 is decisive)."
 
 
 def _describe_nearest(facts: DiagnosisFacts) -> str:
-    listed = ", ".join(f"{label_effect(each)} (score {each['score']:.1f})" for each in facts.nearest)
-    return f"Nearest effects, none of which is confirmed (score: decrease of the BIC): {listed}."
+    listed = ", ".join(f"{facts.label_effect(each)}: {each['score']:.1f}" for each in facts.nearest)
+    return f"Nearest effects, none of which is confirmed, with their scores (decrease of the BIC): {listed}."
 
 
 def _describe_remainder(facts: DiagnosisFacts) -> str:

@@ -1,5 +1,6 @@
 """Layout of text for a terminal: wrapped paragraphs, and an equation with one term in each line."""
 
+from html import escape
 from textwrap import fill
 
 from islands.models.equations import signal_names
@@ -81,3 +82,9 @@ def _split_factors(text: str) -> list[str]:
             parts.append("")
         parts[-1] += character
     return parts
+
+
+def write_html(sentence: str) -> str:
+    """Write a sentence as HTML; names between backticks are code."""
+    parts = map(escape, sentence.split("`"))
+    return "".join(f"<code>{part}</code>" if at % 2 else part for at, part in enumerate(parts))

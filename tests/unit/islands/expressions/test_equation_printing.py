@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import pytest
 
 from islands.errors import ModelError
-from islands.expressions.equation_printing import EquationMathml, EquationText
+from islands.expressions.equation_printing import EquationMathmlPrinter, EquationTextPrinter
 from islands.expressions.parsing import parse_expression, parse_formula
 
 
@@ -21,7 +21,7 @@ from islands.expressions.parsing import parse_expression, parse_formula
 )
 def test_the_text_of_an_equation_is_what_was_read(text: str) -> None:
     read = parse_formula(text.replace("[", "(").replace("]", ")"))
-    assert EquationText().write(read) == text
+    assert EquationTextPrinter().write(read) == text
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_the_text_of_an_equation_is_what_was_read(text: str) -> None:
     ],
 )
 def test_mathml_is_one_element_with_the_structure_of_the_expression(text: str, shown: list[str]) -> None:
-    written = EquationMathml().write(parse_expression(text))
+    written = EquationMathmlPrinter().write(parse_expression(text))
     assert written.isascii()
     tags = [each.tag for each in ElementTree.fromstring(f"<math>{written}</math>").iter()]
     assert len(ElementTree.fromstring(f"<math>{written}</math>")) == 1
@@ -43,13 +43,13 @@ def test_mathml_is_one_element_with_the_structure_of_the_expression(text: str, s
 
 
 def test_a_difference_keeps_the_brackets_of_its_second_part() -> None:
-    written = EquationMathml().write(parse_expression("a - (b + c)"))
+    written = EquationMathmlPrinter().write(parse_expression("a - (b + c)"))
     assert written.count("<mo>(</mo>") == 1
-    assert "<mo>(</mo>" not in EquationMathml().write(parse_expression("(a - b)/(c + d)"))
+    assert "<mo>(</mo>" not in EquationMathmlPrinter().write(parse_expression("(a - b)/(c + d)"))
 
 
 def test_a_name_from_a_user_is_escaped() -> None:
-    assert EquationMathml().symbol("a<b") == "<mi>a&lt;b</mi>"
+    assert EquationMathmlPrinter().symbol("a<b") == "<mi>a&lt;b</mi>"
 
 
 def test_a_formula_that_is_no_expression_is_an_error() -> None:

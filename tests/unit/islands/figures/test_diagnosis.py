@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import islands
+from islands.effects.catalogue import get_title
 from islands.figures.diagnosis import DIAGNOSIS_FIGURES, draw_residual, draw_screening
 from islands.figures.style import save
 
@@ -149,8 +150,8 @@ def test_screening_figure_colours_the_named_effects() -> None:
     axes = draw_screening(found).axes[0]
     names = [text.get_text() for text in axes.get_yticklabels()]
     orange = [name for name, bar in zip(names, axes.patches, strict=True) if bar.get_facecolor()[0] > 0.8]
-    assert orange == ["coulomb-friction"]
-    assert names[-1] == found.candidates[0].name
+    assert orange == ["dry friction"]
+    assert names[-1] == get_title(found.candidates[0].name)
 
 
 @pytest.mark.ci

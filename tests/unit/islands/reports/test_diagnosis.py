@@ -35,7 +35,8 @@ def summarise(found: Diagnosis) -> str:
 
 @pytest.mark.ci
 def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis: Diagnosis) -> None:
-    as_cause = replace(diagnosis, verdict=Verdict.DISCOVERED, discovery=EQUATIONS)
+    # Without an extension, the equations of the terms are all that is known.
+    as_cause = replace(diagnosis, verdict=Verdict.DISCOVERED, discovery=EQUATIONS, trial=None)
     as_equivalent = replace(diagnosis, verdict=Verdict.NAMED, discovery=EQUATIONS)
     given = as_cause, as_equivalent, replace(diagnosis, discovery=None)
     for texts in (
@@ -45,7 +46,17 @@ def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis
         assert ["a1*x**3" in text for text in texts] == [True, True, False]
         assert ["explain the record as well" in text for text in texts] == [False, True, False]
         assert ["instead of the terms" in text for text in texts] == [True, False, False]
-        assert [", with jump:" in text for text in texts] == [False, True, False]
+        assert ["with jump of the output" in text for text in texts] == [False, True, False]
+
+
+@pytest.mark.ci
+def test_report_typesets_the_extended_simulation_and_states_its_values(diagnosis: Diagnosis) -> None:
+    page = diagnosis_report(Origin("record"), diagnosis).decode()
+    (equations,) = re.findall(r'<div class="equation"><math .*?</math></div>', page, re.DOTALL)
+    assert all(part in equations for part in ("<mi>G</mi>", "<mi>tau</mi>", "<mi>output</mi>"))
+    assert re.search(r"Its values: .*tau = 0\.0\d+ s \(", page)
+    assert "Extended simulation: output = G[u(t - tau)]." in summarise(diagnosis).replace("\n    ", " ")
+    assert "delay of the input (<code>delay</code>)" in page
 
 
 @pytest.mark.ci

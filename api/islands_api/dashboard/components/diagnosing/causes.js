@@ -23,10 +23,16 @@ function formatConfidence(value) {
   return value < 0.005 ? "below 0.01" : value.toFixed(2);
 }
 
-function makeRow({ name, score, eta }, effect, most, hasEffects) {
+/** Write the plain name of a cause, then that of the program; results of earlier versions have the last alone. */
+function makeName(name, place, titles) {
+  const title = titles[place ? `${name}:${place}` : name];
+  return title ? [`${title} `, el("code", {}, name)] : [name];
+}
+
+function makeRow({ name, place, score, eta }, effect, most, hasEffects, titles) {
   const isNamed = effect !== undefined && effect.claimed !== false;
   return [
-    el("span", { class: isNamed ? "named" : null }, name),
+    el("span", { class: isNamed ? "named" : null }, ...makeName(name, place, titles)),
     el("span", { class: "score" }, makeBar(score, most), formatNumber(score)),
     `${Math.floor(100 * eta)} %`,
     // No cause that passed all tests: both columns would be empty.
@@ -36,23 +42,25 @@ function makeRow({ name, score, eta }, effect, most, hasEffects) {
   ];
 }
 
-function makeCauseTable(candidates, effects, most) {
+function makeCauseTable(candidates, effects, most, titles) {
   const headings = [
     ...["Cause", "Score", ["Explained", "figure"]],
     ...(effects.length ? [["Confidence", "figure"], "Equivalent causes"] : []),
   ];
   const findEffect = (cause) => effects.find(({ name }) => name === cause);
-  const rows = candidates.map((each) => makeRow(each, findEffect(each.name), most, effects.length > 0));
+  const hasEffects = effects.length > 0;
+  const rows = candidates.map((each) => makeRow(each, findEffect(each.name), most, hasEffects, titles));
   const table = makeTable("Screened causes, the best first", headings, rows);
   table.classList.add("causes");
   return makeScrollable("Screened causes", table);
 }
 
 /** Make the section of the causes of a result. */
-export function makeCauses({ candidates, effects, decisive_experiment: words, next_experiment: next }) {
+export function makeCauses({ candidates, effects, titles = {}, ...others }) {
+  const { decisive_experiment: words, next_experiment: next } = others;
   if (!candidates.length) return null;
   const most = Math.max(...candidates.map(({ score }) => score), 1e-9);
-  const make = (part) => makeCauseTable(part, effects, most);
+  const make = (part) => makeCauseTable(part, effects, most, titles);
   const rest = candidates.slice(SHOWN);
   // Results of earlier versions have the experiment in words alone.
   const isUnsure = next === undefined && effects.some(({ equivalents }) => equivalents.length);

@@ -71,7 +71,10 @@ def test_curve_with_the_shape_of_a_power_says_so(monkeypatch: pytest.MonkeyPatch
     assert form.resembles.value == pytest.approx(2.5, rel=0.1)
     (entry, *_) = diagnosis_document(found)["effects"]
     assert entry["resembles"]["formula"] == form.resembles.formula
-    assert f"output-curve, which resembles a power law: {form.resembles.formula};" in found.summary
+    assert (
+        f"curve of the output (`output-curve`), which resembles a power law: {form.resembles.formula};"
+        in found.summary
+    )
 
 
 @pytest.mark.ci

@@ -10,7 +10,7 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
-from islands.diagnosis.documents.extended_equations import ExtendedEquations, write_extended_equations
+from islands.diagnosis.documents.extended_equations import WrittenExtension, write_extended_equations
 from islands.diagnosis.inference.finding import Finding, Value
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect
@@ -43,7 +43,7 @@ RECORD = _make_record()
 
 def write(
     simulation: str | Simulator, names: Sequence[str], findings: Sequence[Finding] = ()
-) -> ExtendedEquations:
+) -> WrittenExtension:
     simulator = make_simulator(simulation, RECORD, {}) if isinstance(simulation, str) else simulation
     of_states = {effect.name: effect for effect in simulator.state_effects}
     parameters = {f"wrong-parameter:{each.name}": wrong_parameter(each) for each in simulator.parameters}
@@ -151,7 +151,7 @@ def test_an_effect_that_is_only_a_function_is_named() -> None:
     assert "f is the effect own-map: Map of a user" in written.notes
 
 
-def test_values_have_the_interval_of_the_finding_if_they_are_those_of_the_calibration() -> None:
+def test_calibrated_values_have_the_interval_of_the_finding() -> None:
     interval = Value(0.4, "V", (0.3, 0.5))
     finding = Finding("coulomb-friction", "memory", 0.9, (), {"F": interval}, 30.0, 0.9)
     written = write("second-order", ["coulomb-friction", "output-saturation"], [finding])

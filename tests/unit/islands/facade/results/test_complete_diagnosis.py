@@ -96,8 +96,9 @@ def test_an_extension_that_may_diverge_is_refused(found, tmp_path):
 def test_a_notebook_shows_the_sentences_and_a_figure(found):
     html = found._repr_html_()
     assert (
-        "<p>The simulation probably lacks a known effect, delay, which explains the discrepancy.</p>" in html
-    )
+        "<p>The simulation probably lacks a known effect, delay of the input (<code>delay</code>), which "
+        "explains the discrepancy.</p>"
+    ) in html
     assert 'alt="measured and simulated output"' in html
     assert found.plot("residual").axes
     with pytest.raises(islands.SettingsError, match="unknown figure 'loop'"):

@@ -155,7 +155,7 @@ def test_the_equations_of_the_extended_simulation_contain_its_effects():
     assert "with delay" not in said
 
 
-def test_equations_with_terms_have_their_coefficients_and_replace_the_terms_alone():
+def test_equations_with_terms_have_their_coefficients():
     term = {**CAUSE, "name": "missing-term", "family": "discovered", "term": "a1*u in output"}
     term["parameters"] = {"a1": _value(4.0, "N")}
     extension = {**EXTENSION, "equations": ["output = y_sim + a1*u"], "values": [], "notes": []}
@@ -167,6 +167,32 @@ def test_equations_with_terms_have_their_coefficients_and_replace_the_terms_alon
     other = {"equations": "output = y_sim + a1*u", "effects": [], "nearest": [], "worse_by": -1.0}
     said = text("named", effects=[CAUSE], gain=GAIN, extension=EXTENSION, discovered=other)
     assert "Equations that explain the record as well: output = y_sim + a1*u" in said
+
+
+def test_causes_have_plain_names_before_those_of_the_program():
+    titles = {
+        "delay": "delay of the input",
+        "sensor-lag": "lag of the sensor",
+        "input-offset:upper": "offset of the input at upper",
+        "missing-term": "missing term",
+    }
+    causes = [
+        {**CAUSE, "equivalents": ["sensor-lag", "own-effect"]},
+        {**CAUSE, "name": "input-offset", "place": "upper", "parameters": {}},
+    ]
+    said = text("named", effects=causes, gain=GAIN, titles=titles)
+    assert said.startswith(
+        "The simulation lacks known effects, delay of the input (`delay`) and offset of the input at upper "
+        "(`input-offset`), which explain"
+    )
+    assert "  delay of the input (`delay`): tau = 0.03 s" in said
+    assert "does not distinguish it from lag of the sensor (`sensor-lag`), own-effect" in said
+    term = {**CAUSE, "name": "missing-term", "family": "discovered", "term": "a1*u in output"}
+    said = text("discovered", effects=[term], gain=GAIN, titles=titles)
+    assert "  missing term a1*u in output (`missing-term`): tau = 0.03 s" in said
+    candidates = [{"name": "sensor-lag", "score": 3.0, "eta": 1.0}]
+    said = text("unknown", candidates=candidates, titles=titles)
+    assert "(decrease of the BIC): lag of the sensor (`sensor-lag`): 3.0." in said
 
 
 def test_effects_of_states_are_named_with_the_state():
@@ -383,8 +409,8 @@ def test_the_nearest_effects_of_an_unknown_cause_improve_the_fit():
         {"name": name, "score": score, "eta": 1.0} for name, score in (("delay", 3.0), ("jump", -1.0))
     )
     said = text("unknown", candidates=[near, far], remainder={"output": 5.3})
-    nearest = "Nearest effects, none of which is confirmed (score: decrease of the BIC):"
-    assert f"{nearest} delay (score 3.0)." in said
+    nearest = "Nearest effects, none of which is confirmed, with their scores (decrease of the BIC):"
+    assert f"{nearest} delay: 3.0." in said
     assert "The remaining residual depends on (standard deviations beyond chance): output (5.3)." in said
     assert "No effect alone improves the fit" in text("unknown", candidates=[far])
 

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from islands.expressions.parsing import parse
-from islands.io.result_text.text_layout import term_table
+from islands.io.result_text.text_layout import term_table, write_html
 from islands.models.equations import named_equation
 from islands.models.narx import make_model
 
@@ -34,6 +34,12 @@ def test_the_lines_fit_into_a_terminal_and_end_with_the_standard_errors(model):
     assert [line.split()[-1] for line in lines if line.startswith("  ") and len(line) == 80] == [
         "fixed" if theta == 1.0 else "0.001" for theta in model.parameters
     ]
+
+
+def test_names_between_backticks_are_code_in_html():
+    assert write_html("a < b: dry friction (`coulomb-friction`)") == (
+        "a &lt; b: dry friction (<code>coulomb-friction</code>)"
+    )
 
 
 def test_a_model_without_standard_errors_has_no_column_for_them(model):
