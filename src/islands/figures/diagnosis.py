@@ -1,6 +1,6 @@
 """Figures of a diagnosis: simulation and residual before and after extension, and screened effects."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import floor
 from types import MappingProxyType
 
@@ -133,7 +133,7 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
         (axes[1, 0], rate, label("rate of the input", f"{unit}/s" if unit else "")),
         (axes[1, 1], diagnosis.best.output, label("output of the best simulation", record.output_unit)),
     ):
-        _draw_cells(panel, signal, diagnosis)
+        draw_cells(panel, signal, _residuals(diagnosis))
         panel.set(xlabel=name, ylabel=label("residual", record.output_unit))
     _draw_directions(axes[0, 1], u, rate, diagnosis)
     _draw_spectrum(axes[2, 0], diagnosis)
@@ -248,10 +248,17 @@ def _draw_over_time_panels(
     below.set_ylabel(label("residual", record.output_unit))
 
 
-def _draw_cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
-    is_known = ~np.isnan(diagnosis.record.y)
+def draw_cells(axes: Axes, signal: Signal, residuals: Sequence[tuple[str, str, Signal]]) -> None:
+    """Draw mean and standard deviation of residuals over a signal.
+
+    Parameters
+    ----------
+    residuals : sequence of (str, str, ndarray)
+        Name, colour and values of each residual, NaN where the output is unknown.
+    """
+    is_known = ~np.isnan(residuals[0][2])
     middle, cell, count = _sort_into_cells(signal[is_known])
-    for name, colour, residual in _residuals(diagnosis):
+    for name, colour, residual in residuals:
         mean, square = (np.bincount(cell, weights=residual[is_known] ** p) / count for p in (1, 2))
         spread = np.sqrt(np.maximum(square - mean**2, 0.0))
         axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.25, lw=0)

@@ -13,6 +13,7 @@ from islands.diagnosis.documents.extended_equations import write_extended_equati
 from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.finding import list_free_forms
+from islands.diagnosis.rate_effect import find_rate_effect
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
 from islands.effects.interface.context import Signal
@@ -39,6 +40,11 @@ _CAPTIONS = {
     "over-time": (
         "Measured output, simulated output without and with the effects (extended), the residual of each "
         "(measured minus simulated), and the input"
+    ),
+    "rate": (
+        "Mean and band of one standard deviation of the residual over the rate that a cause acts on, without "
+        "the cause, all other values being those of the extended simulation, and with it; below, what the "
+        "cause adds"
     ),
     "shape": "Shape of the effect, and of a free curve in its place",
     "free-forms": "Values of the free forms",
@@ -91,6 +97,7 @@ def _varies_smoothly(u: Signal) -> bool:
 def _list_figures(found: Diagnosis) -> list[str]:
     """Return the names of the figures that a diagnosis has, in the order of the report."""
     has = {
+        "rate": find_rate_effect(found) is not None,
         "loops": has_loops(found.record) and _varies_smoothly(found.record.u[:, 0]),
         "shape": found.shape is not None,
         "free-forms": bool(list_free_forms(found.effects)),
@@ -104,7 +111,10 @@ def _draw(found: Diagnosis, name: str) -> str:
     # matplotlib takes half a second to import, and other processes may draw.
     from islands.figures.diagnosis import DIAGNOSIS_FIGURES  # noqa: PLC0415
     from islands.figures.form_values import draw_effect_shape, draw_free_forms  # noqa: PLC0415
+    from islands.figures.residual_over_rate import draw_residual_over_rate  # noqa: PLC0415
 
+    if name == "rate":
+        return inline_figure(draw_residual_over_rate(found))
     if name == "shape" and found.shape is not None:
         return inline_figure(draw_effect_shape(found.shape))
     draw = draw_free_forms if name == "free-forms" else DIAGNOSIS_FIGURES[name]
