@@ -273,15 +273,32 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
             raise RecordError(
                 f"recordings were sampled at {first.dt:.10g} s and {other.dt:.10g} s: resample one of them"
             )
+    names = _name_recordings(recordings)
     return replace(
         first,
         u=np.concatenate([recording.u for recording in recordings]),
         y=np.concatenate([recording.y for recording in recordings]),
         segments=tuple(length for recording in recordings for length in recording.segments),
-        recordings=_name_recordings(recordings),
+        recordings=names,
         sha256="",
         held_out=0,
-        reading=tuple(step for recording in recordings for step in recording.reading),
+        reading=_join_reading(recordings, names),
+    )
+
+
+def _join_reading(recordings: tuple[Dataset, ...], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what was done to the samples, with the names of the recordings if it was not done to all."""
+    ends = np.cumsum([len(recording.recordings) for recording in recordings])
+    found: dict[str, list[str]] = {}
+    for recording, end in zip(recordings, ends.tolist(), strict=True):
+        own = dict.fromkeys(names[end - len(recording.recordings) : end])
+        for step in dict.fromkeys(recording.reading):
+            # A recording that was joined before has a step of one of its parts with the name of that part.
+            is_named = any(step.startswith(f"{name}: ") for name in own)
+            found.setdefault(step, []).extend(() if is_named else own)
+    return tuple(
+        step if not labels or len(labels) == len(set(names)) else f"{', '.join(labels)}: {step}"
+        for step, labels in found.items()
     )
 
 

@@ -1,7 +1,7 @@
 """Records: validation, read-only arrays, segments, slices and joins."""
 
 import warnings
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -200,6 +200,18 @@ def test_joined_recordings_have_different_names():
         "b.csv": slice(5, 15),
         "a.csv (3)": slice(15, 20),
     }
+
+
+def test_what_was_done_to_one_of_several_recordings_has_its_name():
+    common, own = "time in column t", "level is flat in 5 % of the samples"
+    one, two = (
+        replace(record(20), recordings=(name,), reading=(common, *steps))
+        for name, steps in (("a.csv", ()), ("b.csv", (own,)))
+    )
+    assert join((one, two)).reading == (common, f"b.csv: {own}")
+    assert join((two,)).reading == two.reading
+    third = replace(record(20), recordings=("c.csv",))
+    assert join((join((one, two)), third)).reading == (f"a.csv, b.csv: {common}", f"b.csv: {own}")
 
 
 def test_recordings_with_different_columns_or_units_are_not_joined():
