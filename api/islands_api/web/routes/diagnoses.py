@@ -117,7 +117,7 @@ async def next_experiment(job: Id, caller: Reader, state: AppStateDep) -> Respon
 def _explain_absence(document: dict[str, Any]) -> str:
     if "next_experiment" not in document:
         return "an earlier version of islands has run it: submit it again"
-    if document["next_experiment"] is None:
+    if document["next_experiment"] is None or document["decisive_experiment"] is None:
         return "the record tells its causes apart, or no cause was named"
     return "see its decisive_experiment in /result"
 

@@ -24,10 +24,16 @@ _UNKNOWN_INPUT = (
 
 def describe_next_experiment(experiment: NextExperiment) -> dict[str, Any]:
     """Return the next experiment as a JSON document, without the samples of its input."""
+    designed = get_suggested_input(experiment)
     return {
         "pairs": [_describe_pair(each) for each in experiment.pairs],
-        "input": None if experiment.input is None else _describe_input(experiment.input),
+        "input": None if designed is None else _describe_input(designed),
     }
+
+
+def get_suggested_input(experiment: NextExperiment) -> DesignedInput | None:
+    """Return the designed input; None if there is none, or if the record separates all pairs already."""
+    return None if all(map(_is_separated, experiment.pairs)) else experiment.input
 
 
 def write_advice(experiment: NextExperiment) -> str:
@@ -37,9 +43,8 @@ def write_advice(experiment: NextExperiment) -> str:
     imitate another one.
     """
     pairs = "; ".join(_write_pair(each) for each in experiment.pairs if not _is_separated(each))
-    if not pairs:
-        return ""
-    return pairs if experiment.input is None else f"{_write_input(experiment.input)}: {pairs}"
+    designed = get_suggested_input(experiment)
+    return pairs if designed is None else f"{_write_input(designed)}: {pairs}"
 
 
 def _is_separated(pair: SeparatedPair) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from islands.diagnosis.detectability import SelfTest
-from islands.diagnosis.documents.experiment_json import NEXT_EXPERIMENT_FILE
+from islands.diagnosis.documents.experiment_json import NEXT_EXPERIMENT_FILE, get_suggested_input
 from islands.diagnosis.documents.extension_json import extended_document, extended_json
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
@@ -88,12 +88,12 @@ class DiagnosisResult(Diagnosis):
         """Text of ``next-experiment.csv``: time in seconds, and the input of the next experiment.
 
         The column of the input has its name in the record, so that the new record is read with the same
-        options. None if there is no such input.
+        options. None if there is no such input, or if the record separates all causes.
         """
         experiment = self.next_experiment
-        if experiment is None or experiment.input is None:
+        designed = None if experiment is None else get_suggested_input(experiment)
+        if designed is None:
             return None
-        designed = experiment.input
         return input_csv(designed.u, designed.dt, designed.name)
 
     def write_report(self, origin: Origin, parallel_map: ParallelMap = map) -> bytes:

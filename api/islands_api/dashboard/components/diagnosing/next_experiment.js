@@ -68,7 +68,8 @@ function makePairTable(pairs) {
 
 /** Make the section of the next experiment of a result; null if there is nothing to separate. */
 export function makeNextExperiment(job, { next_experiment: experiment, decisive_experiment: words }, signal) {
-  if (!experiment) return null;
+  // Without an input and words, the record separates all causes.
+  if (!experiment || !(experiment.input || words)) return null;
   const { pairs, input } = experiment;
   const file = `next-experiment-${job.id.slice(0, 8)}.csv`;
   return el(

@@ -9,7 +9,11 @@ import islands
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
-from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
+from islands.diagnosis.documents.experiment_json import (
+    describe_next_experiment,
+    get_suggested_input,
+    write_advice,
+)
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.planning.next_experiment import NextExperiment, design_next_experiment
 from islands.effects.interface.effect import Signal
@@ -75,6 +79,8 @@ def test_a_record_with_a_fast_part_needs_no_input_beyond_it() -> None:
     # The record itself separates the causes.
     assert pair.recorded.sufficiency >= 1.0
     assert not write_advice(experiment)
+    assert describe_next_experiment(experiment)["input"] is None
+    assert get_suggested_input(experiment) is None
     slow = replace(pair, recorded=replace(pair.recorded, distance=0.0))
     advice = write_advice(replace(experiment, pairs=(slow,)))
     assert "within the range and the rate of the record" in advice
