@@ -9,6 +9,7 @@ import numpy as np
 from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.discovery.missing_terms import MISSING_TERM
+from islands.diagnosis.documents.contradictions import list_contradictions
 from islands.diagnosis.documents.experiment_json import describe_next_experiment, write_advice
 from islands.diagnosis.documents.extended_equations import write_extended_equations
 from islands.diagnosis.findings import ResidualFormula
@@ -113,7 +114,8 @@ def _list_titles(diagnosis: Diagnosis, tested: SelfTest | None) -> dict[str, str
 
 def _describe_extension(diagnosis: Diagnosis, trial: ExtensionTrial) -> dict[str, Any]:
     written = write_extended_equations(diagnosis.best, diagnosis.effects, diagnosis.record)
-    return {**asdict(trial), **written.as_document()}
+    contradictions = list(list_contradictions(diagnosis.best))
+    return {**asdict(trial), **written.as_document(), "contradictions": contradictions}
 
 
 def _measure_output(diagnosis: Diagnosis) -> float:

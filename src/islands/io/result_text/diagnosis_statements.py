@@ -1083,6 +1083,11 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         lambda facts: (facts.document.get("extension") or {}).get("refusal"),
         lambda facts: str(facts.document["extension"]["refusal"]),
     ),
+    Statement(
+        "contradictions",
+        lambda facts: (facts.document.get("extension") or {}).get("contradictions"),
+        lambda facts: "\n".join(facts.document["extension"]["contradictions"]),
+    ),
     Statement("noise-floor", lambda facts: not facts.is_gross, _describe_noise_floor),
     Statement(
         "stated-noise",

@@ -155,6 +155,12 @@ def test_the_equations_of_the_extended_simulation_contain_its_effects():
     assert "with delay" not in said
 
 
+def test_contradictions_of_the_extension_are_stated():
+    found = {**EXTENSION, "contradictions": ["Offset: an empty tank loses 1 V/s.", "Another one."]}
+    lines = text("named", effects=[CAUSE], gain=GAIN, extension=found).splitlines()
+    assert found["contradictions"] == [line for line in lines if line in found["contradictions"]]
+
+
 def test_equations_with_terms_have_their_coefficients():
     term = {**CAUSE, "name": "missing-term", "family": "discovered", "term": "a1*u in output"}
     term["parameters"] = {"a1": _value(4.0, "N")}
