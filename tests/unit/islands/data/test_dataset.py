@@ -202,7 +202,7 @@ def test_joined_recordings_have_different_names():
     }
 
 
-def test_what_was_done_to_one_of_several_recordings_has_its_name():
+def test_a_step_of_reading_has_the_names_of_its_recordings():
     common, own = "time in column t", "level is flat in 5 % of the samples"
     one, two = (
         replace(record(20), recordings=(name,), reading=(common, *steps))
