@@ -61,7 +61,7 @@ def test_diagnose_names_the_missing_effect(folder: Path) -> None:
 
 def test_report_is_a_single_file_with_a_summary(folder: Path) -> None:
     text = (folder / "out/report.html").read_text()
-    assert "thermal-drift: k = " in text
+    assert "thermal drift of the output (<code>thermal-drift</code>): k = " in text
     assert "On the last quarter of the record, excluded from fitting" in text
     assert text.count("<img ") == 4
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
@@ -224,7 +224,10 @@ def test_self_test_reports_detection_limits_and_false_alarms(
     assert f"Of {clean} surrogate records without an effect" in printed
     text = (offset_record / out / "report.html").read_text()
     assert "smallest detected strength" in text
-    assert re.search(r'<th scope="row">offset</th><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
+    row = (
+        r"offset of the output \(<code>offset</code>\)</th><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>"
+    )
+    assert re.search(row, text)
 
 
 @pytest.mark.nightly

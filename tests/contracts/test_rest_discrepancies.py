@@ -255,7 +255,7 @@ def test_a_diagnosis_names_the_injected_effect(finished):
     summary = service.client.get(f"/v1/jobs/{job}").json()["summary"]
     assert (summary["verdict"], summary["effects"]) == ("named", [HIDDEN])
     assert summary["reduction_percent"] == result["gain"]["reduction_percent"] > 10
-    assert "thermal-drift: k = " in summary["words"]
+    assert "thermal drift of the output (`thermal-drift`): k = " in summary["words"]
     extended = service.client.get(f"/v1/jobs/{job}/extended")
     assert extended.headers["content-type"] == "application/json"
     assert [effect["name"] for effect in extended.json()["effects"]] == [HIDDEN]

@@ -68,9 +68,13 @@ _MAX_CANDIDATES = 15
 def _limits(tested: SelfTest, label: Callable[[str], str]) -> list[tuple[str, str, str]]:
     """Return for each effect its name, the smallest detected strength, and the misfit at this strength."""
     return [
-        (label(name), f"not up to {STRENGTHS[-1]:g} times the noise", "")
+        (_show_code(label(name)), f"not up to {STRENGTHS[-1]:g} times the noise", "")
         if limit is None
-        else (label(name), _amount(limit.strength, limit.unit), f"{limit.misfit:.2g} times the noise")
+        else (
+            _show_code(label(name)),
+            _amount(limit.strength, limit.unit),
+            f"{limit.misfit:.2g} times the noise",
+        )
         for name, limit in tested.detection_limits.items()
     ]
 
