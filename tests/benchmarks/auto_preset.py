@@ -36,6 +36,7 @@ BY_HAND: Mapping[str, Mapping[str, Any]] = {
     "narx": {"preset": "narx"},
     "narx, sign": {"preset": "narx", "primitives": ("mul", "sign")},
     "narx, sqrt, abs": {"preset": "narx", "primitives": ("mul", "sqrt", "abs")},
+    "latent": {"preset": "latent"},
 }
 
 #: Error as a fraction of the output's range below which errors count as equal.

@@ -98,11 +98,11 @@ def _evaluate_units(theta, at_w, at_b, codes, signals, h, slope):
 
 
 @kernel(forceinline=True)
-def _compute_output(theta, n, signals, h):
-    """Return the output of a row."""
-    _, at_c, _, _, at_f, _, _, _, at_level = place_blocks(n, signals.size - n, h.size)
+def compute_output(theta, n, inputs, signals, h):
+    """Return the output of a row; ``signals`` begins with the states and the inputs."""
+    _, at_c, _, _, at_f, _, _, _, at_level = place_blocks(n, inputs, h.size)
     y = theta[at_level]
-    for j in range(signals.size):
+    for j in range(n + inputs):
         y += theta[at_c + j] * signals[j]
     for unit in range(h.size):
         y += theta[at_f + unit] * h[unit]
@@ -145,7 +145,7 @@ def simulate_state_space(
     for k in range(u.shape[0]):
         signals[n:] = u[k]
         _evaluate_units(theta, at_w, at_bias, codes, signals, h, slope)
-        y[k] = _compute_output(theta, n, signals, h)
+        y[k] = compute_output(theta, n, inputs, signals, h)
         if not _advance(theta, n, signals, h, after):
             return k
         signals[:n] = after

@@ -26,7 +26,7 @@ from islands.kernels.simd import (
     store,
 )
 from islands.kernels.simd_functions import absolute, select_less
-from islands.kernels.state_space import place_blocks
+from islands.kernels.state_space import compute_output, place_blocks
 from islands.kernels.summation import CHUNK
 
 #: No derivatives of single rows are written.
@@ -102,18 +102,6 @@ def _find_matrix(traces, k, lane, n, units, slopes, size, matrices, at):
             slope = broadcast(traces[k, n + units + unit, lane], 1)
             total = multiply_add(slope, load(slopes, (unit + 1) * size + p, 1), total)
         store(matrices, at + p, total)
-
-
-@kernel(forceinline=True)
-def _compute_output(theta, n, inputs, units, signals):
-    """Return the output of a row."""
-    _, at_c, _, _, at_f, _, _, _, at_level = place_blocks(n, inputs, units)
-    y = theta[at_level]
-    for j in range(n + inputs):
-        y += theta[at_c + j] * signals[j]
-    for unit in range(units):
-        y += theta[at_f + unit] * signals[signals.size - units + unit]
-    return y
 
 
 @kernel(forceinline=True, constants=("count",))
@@ -243,6 +231,7 @@ def accumulate_products(
     signals = padded_size((units + 1) * step + units)
     signals[:] = 0.0
     signals[n + inputs] = 1.0
+    h = signals[signals.size - units :]
     _prepare(theta, places, n, inputs, units, width, size, sources, factors, slopes)
     matrices, values = padded_size(VECTOR * size), padded_size(VECTOR * width)
     states, staged = padded_size(2 * (n + 1) * width), padded_size(VECTOR * width)
@@ -264,7 +253,7 @@ def accumulate_products(
             _find_matrix(traces, k, lane, n, units, slopes, size, matrices, row * size)
             for p in range(width):
                 values[row * width + p] = signals[sources[p]]
-            errors[row] = _find_error(y[k], _compute_output(theta, n, inputs, units, signals), lower, upper)
+            errors[row] = _find_error(y[k], compute_output(theta, n, inputs, signals, h), lower, upper)
         for p in range(0, wide, 4 * VECTOR):
             _propagate(matrices, size, n, factors, values, width, p, rows, states, staged, 4)
         for p in range(wide, width, 2 * VECTOR):

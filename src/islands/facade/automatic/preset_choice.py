@@ -19,6 +19,9 @@ from islands.facade.trials.library import make_trial_library, take_library
 from islands.models.candidate_library import LIBRARIES
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 
+#: Why latent models are not compared with models of hysteresis.
+_NO_CONTINUUM = "Latent models, which have no continuum of equilibria, were not compared."
+
 
 def choose_preset(
     record: Dataset,
@@ -60,8 +63,10 @@ def choose_preset(
     settings = resolve_latent(changes)
     # Models of hysteresis keep a property that latent models do not have.
     constrained = constraint(libraries[choice.kind].constraints).sums
-    if settings is None or constrained or not record.output_range > 0.0:
+    if settings is None or not record.output_range > 0.0:
         return choice
+    if constrained:
+        return replace(choice, reasons=(*choice.reasons, _NO_CONTINUUM))
     try:
         fit = fits.get(choice.kind) or fit_kind(libraries[choice.kind].with_delays(choice.delays))
     except (SettingsError, RecordError, ModelError):
