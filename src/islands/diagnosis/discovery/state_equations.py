@@ -78,6 +78,17 @@ def make_fitted_record(context: SimulationContext, target: Target) -> Dataset:
     return Dataset(context.u[part], fill_gaps(target.y)[part], context.dt, ("u",))
 
 
+def transfer_linear_values(found: LinearSimulator, linear: LinearSimulator) -> Signal:
+    """Return the values of a linear model for another one, which counts its input from another value."""
+    values = np.array([each.nominal for each in found.parameters])
+    numerator, denominator, level, _ = found.split_values(values)
+    distance = found.reference_input - linear.reference_input
+    gain = float(numerator.sum()) / (1.0 - float(denominator.sum()))
+    state = distance * (found.state_at_rest - linear.state_at_rest)
+    first = 0 if linear.has_direct_term else 1
+    return np.concatenate([numerator[first:], denominator, [level - gain * distance], state])
+
+
 def calibrate_states(fit: CalibrationResult, target: Target) -> CalibrationResult:
     """Calibrate equations with the step size and the intersample behaviour that suit them."""
     fit = calibrate(fit.simulation, target, fit.values)

@@ -14,7 +14,11 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.discovery.state_equations import get_linear, make_fitted_record
+from islands.diagnosis.discovery.state_equations import (
+    get_linear,
+    make_fitted_record,
+    transfer_linear_values,
+)
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Signal
@@ -64,20 +68,9 @@ def fit_unsigned_output(base: CalibrationResult, target: Target, run: DiagnosisR
         return None
     simulation = base.simulation.with_effects((UNSIGNED_SENSOR,))
     start = simulation.nominal
-    start[: len(linear.parameters)] = _transfer_values(found, linear)
+    start[: len(linear.parameters)] = transfer_linear_values(found, linear)
     start[simulation.get_slice(UNSIGNED_SENSOR)] = 1.0
     return ScreenedEffect(UNSIGNED_SENSOR, calibrate(simulation, target, start))
-
-
-def _transfer_values(found: LinearSimulator, linear: LinearSimulator) -> Signal:
-    """Return the values of a linear model for another one, which counts its input from another value."""
-    values = np.array([each.nominal for each in found.parameters])
-    numerator, denominator, level, _ = found.split_values(values)
-    distance = found.reference_input - linear.reference_input
-    gain = float(numerator.sum()) / (1.0 - float(denominator.sum()))
-    state = distance * (found.state_at_rest - linear.state_at_rest)
-    first = 0 if linear.has_direct_term else 1
-    return np.concatenate([numerator[first:], denominator, [level - gain * distance], state])
 
 
 def _estimate(order: int, delay: int, record: Dataset) -> LinearSimulator | None:

@@ -19,13 +19,13 @@ from islands.data.segments import delay_samples, find_runs, map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.gross_errors.closed_loop import PULSE
 from islands.diagnosis.inference.noise_floor import split_periods
 from islands.diagnosis.inference.noise_surrogates import (
     Randomisation,
     draw_surrogates,
     list_noise_models,
 )
+from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.residual_structure import MIN_DISTANCE, SHIFTS
 from islands.effects.interface.effect import Signal
 from islands.estimation.noise_model import fit_noise
@@ -92,7 +92,7 @@ def _compare_with_shifts(
     """
     if fit.simulation.context.has_resting_input:
         return {}
-    response = _respond_to_pulse(fit)
+    response = respond_to_pulse(fit)
     if response is None:
         return {}
     unweighted = (target.y - fit.output)[target.estimation_part]
@@ -126,7 +126,7 @@ def _list_functions(fit: CalibrationResult, target: Target, response: Signal) ->
         "memory of the input": delayed,
     }
     responses = {
-        name: [_convolve(each, response, context.segments) for each in signals]
+        name: [convolve(each, response, context.segments) for each in signals]
         for name, signals in functions.items()
     }
     return {**responses, "curve of a lag of the input": _list_curves(context.u, context.segments, fitted)}
@@ -154,34 +154,6 @@ def _divide_into_cells(signal: Signal, most: int, fitted: int) -> list[Signal]:
     edges = np.unique(np.quantile(signal[:fitted], np.linspace(0.0, 1.0, count + 1)[1:-1]))
     cells = np.searchsorted(edges, signal, side="right")
     return [(cells == cell).astype(np.float64) for cell in range(edges.size + 1)]
-
-
-def _respond_to_pulse(fit: CalibrationResult) -> Signal | None:
-    """Return the response of a simulation to a pulse of one; None if there is none, or if it diverges.
-
-    The output of another program does not respond: functions of the input are added to it.
-    """
-    simulation, context = fit.simulation, fit.simulation.context
-    if simulation.simulator.is_recorded:
-        return np.ones(1)
-    first, last = max(context.bounds, key=lambda bounds: bounds[1] - bounds[0])
-    middle, size = (first + last) // 2, PULSE * context.input_peak
-    u = context.u.copy()
-    u[middle] += size
-    pulsed = replace(simulation, context=replace(context, u=u))
-    response: Signal = ((pulsed.simulate(fit.values) - fit.output) / size)[middle:last]
-    return response if np.isfinite(response).all() and response.any() else None
-
-
-def _convolve(signal: Signal, response: Signal, segments: Sequence[int]) -> Signal:
-    """Return a signal filtered by an impulse response; before each recording it has its first value."""
-
-    def convolve(part: Signal) -> Signal:
-        size = part.size + response.size - 1
-        spectrum = np.fft.rfft(part - part[0], size) * np.fft.rfft(response, size)
-        return np.asarray(np.fft.irfft(spectrum, size)[: part.size] + part[0] * response.sum())
-
-    return map_segments(convolve, signal, segments)
 
 
 def _span(columns: Signal) -> Signal:

@@ -1,0 +1,39 @@
+"""Linear response of a simulation to its input: the response to a pulse, and signals filtered by it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.segments import map_segments
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.gross_errors.closed_loop import PULSE
+from islands.effects.interface.effect import Signal
+
+
+def respond_to_pulse(fit: CalibrationResult) -> Signal | None:
+    """Return the response of a simulation to a pulse of one; None if there is none, or if it diverges.
+
+    The output of another program does not respond: functions of the input are added to it.
+    """
+    simulation, context = fit.simulation, fit.simulation.context
+    if simulation.simulator.is_recorded:
+        return np.ones(1)
+    first, last = max(context.bounds, key=lambda bounds: bounds[1] - bounds[0])
+    middle, size = (first + last) // 2, PULSE * context.input_peak
+    u = context.u.copy()
+    u[middle] += size
+    pulsed = replace(simulation, context=replace(context, u=u))
+    response: Signal = ((pulsed.simulate(fit.values) - fit.output) / size)[middle:last]
+    return response if np.isfinite(response).all() and response.any() else None
+
+
+def convolve(signal: Signal, response: Signal, segments: Sequence[int]) -> Signal:
+    """Return a signal filtered by an impulse response; before each recording it has its first value."""
+
+    def convolve(part: Signal) -> Signal:
+        size = part.size + response.size - 1
+        spectrum = np.fft.rfft(part - part[0], size) * np.fft.rfft(response, size)
+        return np.asarray(np.fft.irfft(spectrum, size)[: part.size] + part[0] * response.sum())
+
+    return map_segments(convolve, signal, segments)
