@@ -85,7 +85,7 @@ def test_the_response_is_proportional_to_the_linear_parameters(
 
 def test_a_hundredth_of_a_scale_is_a_suitable_step_of_a_derivative(extended: ExtendedSimulator) -> None:
     """Steps of a hundredth and of a fiftieth of a parameter's scale agree within a fifth."""
-    if extended.effects[0].name == "stiction":
+    if extended.effects[0].centre is not None:
         pytest.skip("the response is discontinuous")
     points = starting_points(extended)
     base = make_values(extended, points[len(points) // 2])

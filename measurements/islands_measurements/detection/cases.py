@@ -132,6 +132,7 @@ _INPUT_FAULTS = frozenset(
         "dead-zone",
         "input-saturation",
         "rate-limit",
+        "quantised-input",
         "backlash",
         "stiction",
     )

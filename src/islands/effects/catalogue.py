@@ -37,6 +37,7 @@ from islands.effects.nonlinearity import (
     STATE_RANGE,
     UNSIGNED_SENSOR,
 )
+from islands.effects.quantiser import QUANTISED_INPUT
 from islands.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
 from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
 from islands.effects.time_variation import AGEING, GAIN_STEP, TEMPERATURE_GAIN
@@ -52,6 +53,7 @@ EFFECTS: tuple[Effect, ...] = (
     DEAD_ZONE,
     INPUT_SATURATION,
     RATE_LIMIT,
+    QUANTISED_INPUT,
     BACKLASH,
     STICTION,
     RELAXATION,

@@ -7,46 +7,77 @@ import numpy as np
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
-from islands.kernels.memory_operators import play_from, slider
+from islands.kernels.memory_operators import jumper, play_from, slider
+
+#: Largest breakaway distance, relative to the peak of the input.
+_MAX_BREAKAWAY = 0.6
+
+#: Breakaway distances of a held input that are compared, and most of those with different responses.
+_BREAKAWAYS, _MAX_STARTS = np.linspace(0.01, _MAX_BREAKAWAY, 119), 40
 
 
-def _stiction_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
+def _stiction_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
     if values[0] <= 0.0:
         return u
     moved = np.empty_like(u)
-    slider(u, values[0], moved)
+    if context.has_held_input:
+        jumper(u, values[0], moved)
+    else:
+        slider(u, values[0], moved)
     return moved
 
 
 def _stiction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "breakaway", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak
-        ),
-    )
+    peak = context.input_peak
+    return (Parameter("breakaway", context.input_unit, 0.0, 0.005 * peak, 0.0, _MAX_BREAKAWAY * peak),)
 
 
 def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     # The response to the breakaway distance is discontinuous, so that derivatives do not lead to the optimum:
     # a fine grid replaces them.
-    return tuple((float(part) * context.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
+    if not context.has_held_input:
+        return tuple((float(part) * context.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
+    alike: dict[bytes, list[float]] = {}
+    for breakaway in (_BREAKAWAYS * context.input_peak).tolist():
+        moved = _stiction_form(context.u, np.array([breakaway]), context)
+        alike.setdefault(moved.tobytes(), []).append(breakaway)
+    most = sorted(alike.values(), key=len, reverse=True)[:_MAX_STARTS]
+    return tuple((float(np.mean(each)),) for each in sorted(most))
+
+
+def _centre_breakaway(values: Signal, context: SimulationContext) -> Signal:
+    """Return the middle between the largest distance of a held input that does not move it, and the next."""
+    if not context.has_held_input or values[0] <= 0.0:
+        return values
+    least, most = 0.0, np.inf
+    for part in context.split():
+        u = part.u[part.time < context.fit_end_time]
+        if u.size == 0:
+            break
+        moved = _stiction_form(u, values, part)
+        distances = np.abs(u[1:] - moved[:-1])
+        has_moved = distances > values[0]
+        least = max(least, float(np.max(distances[~has_moved], initial=0.0)))
+        most = min(most, float(np.min(distances[has_moved], initial=np.inf)))
+    return np.array([(least + most) / 2.0]) if most < np.inf else values
 
 
 STICTION = Effect(
     name="stiction",
     title="stick-slip of the input",
-    summary="Stick-slip of the input: it moves only after a breakaway distance",
+    summary="Stick-slip of the input: it moves only if it differs from u by a breakaway distance, then to u",
     family="memory",
     site=Site.INPUT,
     parameters=_stiction_parameters,
     starting_points=_stiction_starting_points,
     form=_stiction_form,
-    equation=lambda _: MapEquation("z0", (("slider", "n0"),)),
+    equation=lambda context: MapEquation("z0", (("slider", "n0", str(int(context.has_held_input))),)),
     formula=Formula(
         "stick(x, s)",
         symbols=("s",),
-        note="stick({x}, {s}) follows {x} only after that has moved by {s}",
+        note="stick({x}, {s}) follows {x} only after that differs from it by {s}",
     ),
+    centre=_centre_breakaway,
     source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
     linear_parameters=0,
     similar_to="backlash, dead-zone, coulomb-friction",

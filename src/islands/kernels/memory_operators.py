@@ -36,6 +36,19 @@ def slider(u, breakaway, x):
 
 
 @kernel
+def jumper(u, breakaway, x):
+    """Apply a stick-slip slider to an input ``u`` that is held between samples; write ``x``.
+
+    ``x`` is constant until ``u`` differs from it by more than ``breakaway``, and then jumps to ``u``.
+    """
+    at = u[0]
+    for k in range(u.size):
+        if abs(u[k] - at) > breakaway:
+            at = u[k]
+        x[k] = at
+
+
+@kernel
 def _limit_steps(u, step, x):
     at = u[0]
     x[0] = at

@@ -156,6 +156,7 @@ OSCILLATOR = Rig(
         Fault("cogging", 0.002, 0.2, (add_force(force_faults.cogging),)),
         Fault("input-saturation", 0.04, 0.5, (before_plant(signal_faults.input_saturation),)),
         Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
+        Fault("quantised-input", 0.5, 8.0, (before_plant(signal_faults.quantise),)),
         Fault("cyclic-error", 0.003, 0.03, (after_plant(signal_faults.cyclic_error(1.0, 3.0)),)),
         Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
         Fault("dead-zone", 0.05, 2.5, (before_plant(signal_faults.dead_zone),)),

@@ -178,6 +178,7 @@ PIEZO = Rig(
         Fault("cubic-stiffness", 0.004, 0.2, (add_force(force_faults.cube),)),
         Fault("input-saturation", 0.04, 0.4, (before_plant(signal_faults.input_saturation),)),
         Fault("rate-limit", 0.4, 5.0, (before_plant(signal_faults.rate_limit),)),
+        Fault("quantised-input", 1.0, 20.0, (before_plant(signal_faults.quantise),)),
         Fault("cyclic-error", 0.003, 0.03, (after_plant(signal_faults.cyclic_error(2.0, 4.0)),)),
         Fault("output-saturation", 0.03, 0.35, (after_plant(signal_faults.output_saturation),)),
         Fault("dead-zone", 0.1, 5.0, (before_plant(signal_faults.dead_zone),)),

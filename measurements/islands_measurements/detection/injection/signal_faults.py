@@ -150,6 +150,11 @@ def stiction(_rng: np.random.Generator, strength: float) -> Map:
     return follow
 
 
+def quantise(_rng: np.random.Generator, strength: float) -> Map:
+    """Actuator that moves to multiples of a step of ``strength``."""
+    return lambda _drive, u: strength * np.floor(u / strength + 0.5)
+
+
 def input_saturation(_rng: np.random.Generator, strength: float) -> Map:
     """Saturation of the input, at a fraction of its typical largest value."""
     return lambda drive, u: np.clip(u, -drive.peak_input * (1 - strength), drive.peak_input * (1 - strength))

@@ -18,6 +18,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
+from islands.diagnosis.discovery.jumping_inputs import fit_jumping_inputs
 from islands.diagnosis.discovery.state_equations import list_process_fits, list_state_fits
 from islands.diagnosis.discovery.unsigned_output import fit_unsigned_output
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
@@ -139,6 +140,7 @@ def _find_best_effect(
     least -= EQUIVALENCE_MARGIN
     unsigned = fit_unsigned_output(base, target, run)
     screened = [] if unsigned is None else [unsigned]
+    screened += fit_jumping_inputs(base, target, run)
     starts = [base, alone.fit] if alone.effects else [base]
     fits = [states for start in starts for states in list_state_fits(start, target)]
     for states in [*fits, *list_process_fits(base, target)]:

@@ -37,9 +37,9 @@ def _may_be_zero(fit: CalibrationResult, effect: Effect, covariance: Signal) -> 
     The shape of the effect, as the time constant of a creep, is given: without it, a short record that shows
     the effect determines its strength less than its response. Of an effect without a strength all values
     count: one limit of a range may not be reached. A free form has none: a gain of the simulation may make
-    up for the size of all of its values.
+    up for the size of all of its values. The response to a value that jumps has no derivative.
     """
-    if effect.is_free:
+    if effect.is_free or effect.centre is not None:
         return False
     part = fit.simulation.get_slice(effect)
     parameters = effect.parameters(fit.simulation.context)

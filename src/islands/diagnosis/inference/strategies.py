@@ -19,6 +19,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, make_task_key
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.cancellation import resolve_cancellation
+from islands.diagnosis.inference.central_values import centre_values
 from islands.diagnosis.inference.chance_gain import ForwardSelection
 from islands.diagnosis.inference.curve_ends import flatten_ends
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis
@@ -180,7 +181,7 @@ def assess_evidence(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
         confirmed = withdraw_effects(hypothesis, target, rng)
         if confirmed is not hypothesis:
             hypothesis, rest = confirmed, analyse_residual(confirmed.fit, target, rng)
-    hypothesis = flatten_ends(hypothesis, target)
+    hypothesis = centre_values(flatten_ends(hypothesis, target), target)
     # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
     explained = explained_fraction(
         choose_reference_fit(hypothesis.effects, base, target),

@@ -64,6 +64,10 @@ class Effect:
     project : callable or None
         ``values -> values``: the nearest values that the form admits, if these are not given by the bounds of
         each value. Calibration moves along such a limit and not beyond it, where derivatives would be zero.
+    centre : callable or None
+        ``(values, context) -> values``: the middle of the values with the same response to the input of the
+        estimation part, for a map that jumps. Another input tells such values apart. None if every change of
+        a value changes the response.
     acts_between_samples : bool
         Whether a map of the input acts on each value by itself. In continuous time it is then applied to the
         interpolated input: a dead zone or a limit is not reached at a sample, but between two of them.
@@ -106,6 +110,7 @@ class Effect:
     is_applicable: Callable[[SimulationContext], bool] = lambda _: True
     linear_parameters: int = 1
     project: Callable[[Signal], Signal] | None = None
+    centre: Callable[[Signal, SimulationContext], Signal] | None = None
     acts_between_samples: bool = False
     is_gain: bool = False
     is_free: bool = False

@@ -84,13 +84,15 @@ static void play(const double *x, double *z, size_t samples, double width)
 }
 """,
         "slider": """\
-/* Stick-slip slider: z is constant until x differs from it by the breakaway, and then jumps to x. */
-static void slider(const double *x, double *z, size_t samples, double breakaway)
+/* Stick-slip slider: z is constant until x, held or continuous, differs from it by the breakaway, and then
+   jumps to x. */
+static void slider(const double *x, double *z, size_t samples, double breakaway, double is_held)
 {
     double at = x[0];
     for (size_t k = 0; k < samples; ++k) {
         if (!(breakaway > 0.0)) at = x[k];
-        else at += breakaway*trunc((x[k] - at)/breakaway);
+        else if (!(is_held > 0.0)) at += breakaway*trunc((x[k] - at)/breakaway);
+        else if (fabs(x[k] - at) > breakaway) at = x[k];
         z[k] = at;
     }
 }

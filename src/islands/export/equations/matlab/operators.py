@@ -60,12 +60,17 @@ function z = play(x, width)
 end
 """,
         "slider": """\
-function z = slider(x, breakaway)
-% Stick-slip slider: z is constant until x differs from it by the breakaway, and then jumps to x.
+function z = slider(x, breakaway, is_held)
+% Stick-slip slider: z is constant until x, held or continuous, differs from it by the breakaway, and then
+% jumps to x.
   z = x;
   if ~(breakaway > 0), return; end
   for k = 2:numel(x)
-    z(k) = z(k-1) + breakaway*fix((x(k) - z(k-1))/breakaway);
+    if ~is_held
+      z(k) = z(k-1) + breakaway*fix((x(k) - z(k-1))/breakaway);
+    elseif abs(x(k) - z(k-1)) <= breakaway
+      z(k) = z(k-1);
+    end
   end
 end
 """,

@@ -1,0 +1,93 @@
+"""Actuators that move in jumps: their values are found behind a slow plant, and noise has none."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.jumping_inputs import fit_jumping_inputs
+from islands.diagnosis.procedure import diagnose
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import CATALOGUE
+from islands.effects.hysteresis import STICTION
+from islands.effects.interface.effect import Signal
+from islands.effects.quantiser import QUANTISED_INPUT
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.output_equation import add_output_equation
+from islands.simulators.specification.factory import make_simulator
+
+#: Standard deviation of the noise.
+NOISE = 0.01
+
+
+def stick(u: Signal, band: float) -> Signal:
+    places = [float(u[0])]
+    for command in u.tolist():
+        places.append(command if abs(command - places[-1]) > band else places[-1])
+    return np.array(places[1:])
+
+
+MOVES: dict[str, Callable[[Signal], Signal]] = {
+    "quantised-input": lambda u: 0.5 * np.round(u / 0.5),
+    "stiction": lambda u: stick(u, 0.6),
+    "none": lambda u: u,
+}
+
+
+def make_record(name: str, seed: int) -> Dataset:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-2.0, 2.0, 100), rng.integers(15, 45, 100))[:1200]
+    x = lfilter([0.0, 0.03], [1.0, -1.75, 0.77], MOVES[name](u))
+    noise = lfilter([1.0], [1.0, -0.8 if name == "none" else 0.0], rng.standard_normal(u.size))
+    return Dataset(u, x + NOISE * noise, 0.1, ("u_V",), "y_V", ("V",), "V")
+
+
+def fit(record: Dataset) -> tuple[CalibrationResult, Target]:
+    fitted = count_fitted_samples(record)
+    simulator = make_simulator("linear:2", record)
+    context = make_context(record, simulator, fitted)
+    simulation = ExtendedSimulator(add_output_equation(simulator, context), (), context)
+    target = make_target(record, fitted, {})
+    return calibrate(simulation, target, simulation.nominal), target
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", MOVES)
+def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int) -> None:
+    base, target = fit(make_record(name, seed))
+    found = fit_jumping_inputs(base, target, DiagnosisRun((QUANTISED_INPUT, STICTION)))
+    exact = [each.effect.name for each in found if each.fit.mean_square**0.5 < 1.1 * NOISE]
+    assert exact == ([] if name == "none" else [name])
+
+
+def test_search_is_limited_to_the_effects_of_a_diagnosis() -> None:
+    base, target = fit(make_record("stiction", 0))
+    assert fit_jumping_inputs(base, target, DiagnosisRun(())) == []
+
+
+@pytest.mark.ci
+@pytest.mark.nightly
+@pytest.mark.parametrize(("name", "value"), [("quantised-input", 0.5), ("stiction", 0.6)])
+def test_jumping_actuator_is_named(name: str, value: float) -> None:
+    record = make_record(name, 0)
+    effects = (
+        "dead-zone",
+        "input-saturation",
+        "backlash",
+        "delay",
+        "quantised-input",
+        "stiction",
+        "input-curve",
+    )
+    catalogue = [CATALOGUE[each] for each in effects]
+    found = diagnose(record, make_simulator("linear:2", record), catalogue=catalogue)
+    (cause,) = found.causes
+    assert (cause.name, cause.is_claimed) == (name, True)
+    assert next(iter(cause.parameters.values())).value == pytest.approx(value, abs=0.05)
