@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from islands.data.segments import MAX_RANGE_AT_REST
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
@@ -16,14 +17,18 @@ _MAX_BREAKAWAY = 0.6
 _BREAKAWAYS, _MAX_STARTS = np.linspace(0.01, _MAX_BREAKAWAY, 119), 40
 
 
-def _stiction_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    if values[0] <= 0.0:
+def is_held(signal: Signal) -> bool:
+    """Return whether a signal is constant for most of the time, and jumps between two samples."""
+    rounding = MAX_RANGE_AT_REST * float(np.max(np.abs(signal)))
+    return 2 * int(np.count_nonzero(np.abs(np.diff(signal)) <= rounding)) > signal.size - 1
+
+
+def stick(u: Signal, breakaway: float) -> Signal:
+    """Return the position of a slider that moves to an input if the distance exceeds a breakaway distance."""
+    if breakaway <= 0.0:
         return u
     moved = np.empty_like(u)
-    if context.has_held_input:
-        jumper(u, values[0], moved)
-    else:
-        slider(u, values[0], moved)
+    (jumper if is_held(u) else slider)(u, breakaway, moved)
     return moved
 
 
@@ -35,11 +40,11 @@ def _stiction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
 def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     # The response to the breakaway distance is discontinuous, so that derivatives do not lead to the optimum:
     # a fine grid replaces them.
-    if not context.has_held_input:
+    if not is_held(context.u):
         return tuple((float(part) * context.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
     alike: dict[bytes, list[float]] = {}
     for breakaway in (_BREAKAWAYS * context.input_peak).tolist():
-        moved = _stiction_form(context.u, np.array([breakaway]), context)
+        moved = stick(context.u, breakaway)
         alike.setdefault(moved.tobytes(), []).append(breakaway)
     most = sorted(alike.values(), key=len, reverse=True)[:_MAX_STARTS]
     return tuple((float(np.mean(each)),) for each in sorted(most))
@@ -47,14 +52,14 @@ def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> 
 
 def _centre_breakaway(values: Signal, context: SimulationContext) -> Signal:
     """Return the middle between the largest distance of a held input that does not move it, and the next."""
-    if not context.has_held_input or values[0] <= 0.0:
+    if not is_held(context.u) or values[0] <= 0.0:
         return values
     least, most = 0.0, np.inf
     for part in context.split():
         u = part.u[part.time < context.fit_end_time]
         if u.size == 0:
             break
-        moved = _stiction_form(u, values, part)
+        moved = stick(u, float(values[0]))
         distances = np.abs(u[1:] - moved[:-1])
         has_moved = distances > values[0]
         least = max(least, float(np.max(distances[~has_moved], initial=0.0)))
@@ -70,8 +75,8 @@ STICTION = Effect(
     site=Site.INPUT,
     parameters=_stiction_parameters,
     starting_points=_stiction_starting_points,
-    form=_stiction_form,
-    equation=lambda context: MapEquation("z0", (("slider", "n0", str(int(context.has_held_input))),)),
+    form=lambda u, values, _: stick(u, float(values[0])),
+    equation=lambda _: MapEquation("z0", (("slider", "n0"),)),
     formula=Formula(
         "stick(x, s)",
         symbols=("s",),

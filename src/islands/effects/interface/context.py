@@ -135,12 +135,6 @@ class SimulationContext:
         whole = self.whole or self
         return bool(np.ptp(whole.u[: round(self.fit_end_time / self.dt)]) == 0.0)
 
-    @property
-    def has_held_input(self) -> bool:
-        """Whether the input is constant for most of the time, and jumps between two samples."""
-        whole = self.whole or self
-        return bool(np.mean(whole.take_differences(whole.u) == 0.0) > 0.5)
-
     def split(self) -> "tuple[SimulationContext, ...]":
         """Return the context of each recording; scales, units and durations are those of the whole record."""
         if len(self.bounds) <= 1:

@@ -12,8 +12,7 @@ from islands.effects.interface.context import SimulationContext
 #: * ``low-pass`` (time constant in s): `islands.effects.filters.low_pass`
 #: * ``resonance`` (period in s, damping ratio): mode in series with the signal
 #: * ``play`` (half width): `islands.kernels.memory_operators`
-#: * ``slider`` (breakaway, 1 if the signal is held between samples, otherwise 0): `slider` and `jumper` of
-#:   `islands.kernels.memory_operators`
+#: * ``slider`` (breakaway): `islands.effects.hysteresis.stick`
 #: * ``limit-rate`` (inverse of the rate per second): `islands.kernels.memory_operators`
 #: * ``lag-unevenly`` (rate per second, four time constants in s): `islands.kernels.memory_operators`
 #: * ``interpolate`` (e, tau in s): the signal at the time ``t (1 + e) - tau``

@@ -86,12 +86,15 @@ static void play(const double *x, double *z, size_t samples, double width)
         "slider": """\
 /* Stick-slip slider: z is constant until x, held or continuous, differs from it by the breakaway, and then
    jumps to x. */
-static void slider(const double *x, double *z, size_t samples, double breakaway, double is_held)
+static void slider(const double *x, double *z, size_t samples, double breakaway)
 {
-    double at = x[0];
+    double at = x[0], most = 0.0;
+    size_t equal = 0;
+    for (size_t k = 0; k < samples; ++k) most = fmax(most, fabs(x[k]));
+    for (size_t k = 1; k < samples; ++k) equal += fabs(x[k] - x[k-1]) <= MAX_RANGE_AT_REST*most;
     for (size_t k = 0; k < samples; ++k) {
         if (!(breakaway > 0.0)) at = x[k];
-        else if (!(is_held > 0.0)) at += breakaway*trunc((x[k] - at)/breakaway);
+        else if (2*equal + 1 <= samples) at += breakaway*trunc((x[k] - at)/breakaway);
         else if (fabs(x[k] - at) > breakaway) at = x[k];
         z[k] = at;
     }

@@ -60,13 +60,14 @@ function z = play(x, width)
 end
 """,
         "slider": """\
-function z = slider(x, breakaway, is_held)
+function z = slider(x, breakaway, c)
 % Stick-slip slider: z is constant until x, held or continuous, differs from it by the breakaway, and then
 % jumps to x.
   z = x;
   if ~(breakaway > 0), return; end
+  held = 2*sum(abs(diff(x)) <= c.max_range_at_rest*max(abs(x))) > numel(x) - 1;
   for k = 2:numel(x)
-    if ~is_held
+    if ~held
       z(k) = z(k-1) + breakaway*fix((x(k) - z(k-1))/breakaway);
     elseif abs(x(k) - z(k-1)) <= breakaway
       z(k) = z(k-1);

@@ -49,7 +49,7 @@ class _MatlabProgram(EquationProgram):
         return (text + "\n".join(self.language.definitions[each] for each in called)).rstrip() + "\n"
 
     def apply_operator(self, function: str, result: str, arguments: Sequence[str]) -> list[str]:
-        context = [] if function in ("play", "slider") else ["c"]
+        context = [] if function == "play" else ["c"]
         return [f"{result} = {function}({', '.join(['x', *arguments, *context])});"]
 
     def map_input(self) -> list[str]:

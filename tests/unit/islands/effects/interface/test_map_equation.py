@@ -11,6 +11,7 @@ from islands.data.segments import is_resting
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.channels import channel
 from islands.effects.filters import low_pass
+from islands.effects.hysteresis import stick
 from islands.effects.interface.effect import Effect, SimulationContext, Site
 from islands.effects.interface.map_equation import OPERATORS
 from islands.effects.time_variation import GAIN_EFFECTS, gain_over_time
@@ -18,7 +19,7 @@ from islands.effects.timing import RESONANCE
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.kernels.lagrange import interpolate_at
-from islands.kernels.memory_operators import jumper, lag_unevenly, limit_rate, play_from, slider
+from islands.kernels.memory_operators import lag_unevenly, limit_rate, play_from
 
 Array = NDArray[np.float64]
 
@@ -42,12 +43,6 @@ def resonate(signal: Array, context: SimulationContext, period: float, zeta: flo
     return RESONANCE.form(signal, np.array([period, zeta]), context)
 
 
-def slip(signal: Array, breakaway: float, is_held: float) -> Array:
-    moved = np.empty_like(signal)
-    (jumper if is_held else slider)(signal, breakaway, moved)
-    return moved
-
-
 def rests(signal: Array, context: SimulationContext) -> float:
     return float(is_resting(signal[: round(context.fit_end_time / context.dt)]))
 
@@ -57,7 +52,7 @@ FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "low-pass": lambda x, context, tau: low_pass(x, tau, context.dt) if tau > 0.0 else x,
     "resonance": resonate,
     "play": lambda x, _, width: play_from(x, width) if width > 0.0 else x,
-    "slider": lambda x, _, breakaway, is_held: slip(x, breakaway, is_held) if breakaway > 0.0 else x,
+    "slider": lambda x, _, breakaway: stick(x, breakaway),
     "limit-rate": lambda x, context, inverse: limit_rate(x, context.dt / inverse) if inverse > 0.0 else x,
     "lag-unevenly": lambda x, context, slow, *times: lag_unevenly(x, context.dt, slow, np.array(times)),
     "interpolate": lambda x, context, e, tau: interpolate_at(

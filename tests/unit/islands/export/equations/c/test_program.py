@@ -210,6 +210,14 @@ def test_effects_of_channels_read_their_columns(folder):
 
 
 @needs_compiler
+def test_stiction_of_a_held_input_moves_all_the_way(folder):
+    record = made()["second-order"].record
+    record = replace(record, u=record.u[np.arange(record.samples) // 20 * 20])
+    spec, expected = extend(simulator_of("second-order"), record, [CATALOGUE["stiction"]])
+    compare(run_c(spec, record, folder), expected)
+
+
+@needs_compiler
 def test_an_extension_of_an_extension_has_the_effects_of_both(folder):
     record = made()["bouc-wen-piezo"].record
     inner, _ = extend(

@@ -55,6 +55,16 @@ def test_every_effect_of_a_built_in_system_is_simulated_like_the_package(name, t
 
 @pytest.mark.ci
 @needs_octave
+def test_stiction_of_a_held_input_moves_all_the_way(tmp_path):
+    simulator, record = make_case("second-order")
+    record = replace(record, u=record.u[np.arange(record.samples) // 20 * 20])
+    spec, expected = extend(simulator, record, [CATALOGUE["stiction"]])
+    (found,) = run_matlab([(spec, record)], tmp_path)
+    compare(found, expected)
+
+
+@pytest.mark.ci
+@needs_octave
 @pytest.mark.parametrize(("hold", "times"), [("first-order", 3), ("zero-order", 2), ("band-limited", 2)])
 def test_the_input_between_samples_is_that_of_the_simulation(hold, times, tmp_path):
     programs, outputs = [], []
