@@ -90,4 +90,5 @@ def test_jumping_actuator_is_named(name: str, value: float) -> None:
     found = diagnose(record, make_simulator("linear:2", record), catalogue=catalogue)
     (cause,) = found.causes
     assert (cause.name, cause.is_claimed) == (name, True)
-    assert next(iter(cause.parameters.values())).value == pytest.approx(value, abs=0.05)
+    # The levels of the input do not tell closer values apart.
+    assert next(iter(cause.parameters.values())).value == pytest.approx(value, abs=0.1)
