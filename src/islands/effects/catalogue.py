@@ -40,8 +40,15 @@ from islands.effects.nonlinearity import (
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
 from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
+from islands.effects.sweep import SWEPT_DISTURBANCE, SWEPT_INTERFERENCE
 from islands.effects.time_variation import AGEING, GAIN_STEP, TEMPERATURE_GAIN
-from islands.effects.timing import CLOCK_SKEW, DELAY, RATE_LIMIT, RESONANCE, SENSOR_LAG
+from islands.effects.timing import (
+    CLOCK_SKEW,
+    DELAY,
+    RATE_LIMIT,
+    RESONANCE,
+    SENSOR_LAG,
+)
 
 #: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
 #: scale of an encoder, so that they act before its cyclic error. A second input acts behind the actuator of
@@ -83,7 +90,9 @@ EFFECTS: tuple[Effect, ...] = (
     CROSS_COUPLING,
     TEMPERATURE_GAIN,
     SECOND_INPUT,
+    SWEPT_DISTURBANCE,
     PERIODIC_DISTURBANCE,
+    SWEPT_INTERFERENCE,
     CYCLIC_ERROR,
     SENSOR_GAIN,
     *FREE_FORMS,

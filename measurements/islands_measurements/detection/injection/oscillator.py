@@ -165,6 +165,8 @@ OSCILLATOR = Rig(
         Fault(
             "periodic-disturbance", 5e-4, 0.03, (after_plant(signal_faults.periodic_disturbance(25.0, 90.0)),)
         ),
+        Fault("swept-disturbance", 0.002, 0.3, (before_plant(signal_faults.swept_disturbance(1.0, 20.0)),)),
+        Fault("swept-interference", 5e-4, 0.03, (after_plant(signal_faults.swept_interference(1.0, 90.0)),)),
         Fault("cross-coupling", 0.002, 0.1, (after_plant(signal_faults.cross_coupling),)),
     ),
     unknown={

@@ -193,6 +193,37 @@ def periodic_disturbance(lower: float, upper: float) -> Make:
     return make
 
 
+def _draw_sweep(rng: np.random.Generator, lower: float, upper: float) -> Callable[[Excitation], Signal]:
+    """Draw a sweep between two frequencies of a range in Hz, as a function of the excitation."""
+    first, last, phase = rng.uniform(lower, upper), rng.uniform(lower, upper), rng.uniform(0.0, 2 * np.pi)
+
+    def wave(drive: Excitation) -> Signal:
+        cycles = first * drive.time + 0.5 * (last - first) * drive.time**2 / drive.time[-1]
+        return np.asarray(np.sin(2 * np.pi * cycles + phase))
+
+    return wave
+
+
+def swept_disturbance(lower: float, upper: float) -> Make:
+    """Sinusoidal disturbance of the input with a frequency that runs through a range, in Hz."""
+
+    def make(rng: np.random.Generator, strength: float) -> Map:
+        wave = _draw_sweep(rng, lower, upper)
+        return lambda drive, u: u + strength * drive.peak_input * wave(drive)
+
+    return make
+
+
+def swept_interference(lower: float, upper: float) -> Make:
+    """Sinusoidal disturbance of the output with a frequency that runs through a range, in Hz."""
+
+    def make(rng: np.random.Generator, strength: float) -> Map:
+        wave = _draw_sweep(rng, lower, upper)
+        return lambda drive, y: y + strength * drive.peak_output * wave(drive)
+
+    return make
+
+
 def cross_coupling(rng: np.random.Generator, strength: float) -> Map:
     """Cross-coupling of the neighbouring channel."""
     c = random_sign(rng) * strength

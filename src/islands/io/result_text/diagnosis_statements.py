@@ -69,6 +69,12 @@ _SATURATION, _RATE_LIMIT = "input-saturation", "rate-limit"
 #: Ratio of the errors on the held-out data and in the samples used for estimation that noise does not have.
 _GROWTH = 1.5
 
+#: Effects with a frequency that changes, and what to look for.
+_SWEEPS: Final = {
+    "swept-disturbance": "a machine nearby that runs {} at that time, and the parts that transmit its force",
+    "swept-interference": "a drive that runs {} at that time, whose cables or vibration reach the sensor",
+}
+
 #: Effect of a channel that acts where the input does.
 _SECOND_INPUT = "second-input"
 
@@ -178,6 +184,16 @@ class DiagnosisFacts:
             if each["name"] == _RATE_LIMIT and values["inverse_rate"]["value"] > 0.0:
                 found.append((_RATE_LIMIT, 1.0 / values["inverse_rate"]["value"]))
         return found
+
+    @property
+    def sweeps(self) -> list[tuple[str, float, float]]:
+        """Name of each claimed disturbance that sweeps, and its frequencies at start and end in Hz."""
+        record, found = self.document["record"], [each for each in self.claimed if each["name"] in _SWEEPS]
+        sweeps = []
+        for each in found:
+            frequency, rate = (each["parameters"][name]["value"] for name in ("frequency", "rate"))
+            sweeps.append((each["name"], frequency, frequency + record["samples"] * record["dt"] * rate))
+        return sweeps
 
     @property
     def small_delay(self) -> float:
@@ -680,6 +696,14 @@ def _describe_second_input(facts: DiagnosisFacts) -> str:
     return f"The input {name} acts on the system where {first} does, and the simulation does not read it."
 
 
+def _describe_sweeps(facts: DiagnosisFacts) -> str:
+    texts = []
+    for name, first, last in facts.sweeps:
+        source = _SWEEPS[name].format("up" if last > first else "down")
+        texts.append(f"{name} sweeps from {first:.3g} to {last:.3g} Hz within the record: look for {source}.")
+    return "\n".join(texts)
+
+
 def _describe_noise(facts: DiagnosisFacts) -> str:
     named = map(_name_coefficients, facts.noise)
     listed = (f"{_name_values(facts, each)}, {_describe_confidence(each)}" for each in named)
@@ -976,6 +1000,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement("small-delay", lambda facts: facts.small_delay, _describe_small_delay),
     Statement("input-limits", lambda facts: facts.input_limits, _describe_input_limits),
     Statement("second-input", lambda facts: facts.second_inputs, _describe_second_input),
+    Statement("sweeps", lambda facts: facts.sweeps, _describe_sweeps),
     Statement("noise", lambda facts: facts.noise, _describe_noise),
     Statement(
         "correlation",

@@ -284,6 +284,18 @@ def test_limits_of_the_input_have_its_unit():
     assert " limits " not in text("named", effects=[saturation], gain=GAIN)
 
 
+@pytest.mark.parametrize(("rate", "said"), [(1.5, "from 0.5 to 15.5 Hz"), (-0.04, "from 0.5 to 0.1 Hz")])
+def test_a_sweep_has_its_frequencies_at_both_ends_of_the_record(rate, said):
+    parameters = {"frequency": _value(0.5, "Hz"), "rate": _value(rate, "Hz/s")}
+    record = {**make_document("named")["record"], "samples": 1000}
+    for name in ("swept-disturbance", "swept-interference"):
+        cause = {**CAUSE, "name": name, "parameters": parameters}
+        stated = text("named", effects=[cause], gain=GAIN, record=record)
+        assert f"{name} sweeps {said} within the record: look for a " in stated
+        assert (" runs up at " in stated, " runs down at " in stated) == (rate > 0.0, rate < 0.0)
+    assert " sweeps " not in text("named", effects=[CAUSE], gain=GAIN)
+
+
 @pytest.mark.parametrize(("error", "stated"), [(0.0184, False), (0.0186, True)])
 def test_an_error_that_grows_is_no_noise_of_constant_size(error, stated):
     said = text("noise", calibrated_rmse=error, noise_floor_rmse=0.0123)

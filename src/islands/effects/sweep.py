@@ -1,0 +1,131 @@
+"""Disturbances whose frequency changes at a constant rate, at the input and at the output."""
+
+from collections.abc import Iterable
+from functools import lru_cache, partial
+
+import numpy as np
+
+from islands.effects.interface.context import Parameter
+from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.input_spectrum import LINE_WIDTH
+from islands.effects.interface.map_equation import MapEquation
+from islands.effects.sweep_search import Sweep, compute_response, find_sweep, measure_line, respond
+
+#: Least change of the frequency within the estimation part, relative to the resolution. A smaller one is a
+#: steady line.
+MIN_CHANGE = 2 * LINE_WIDTH
+
+#: Fraction of the power of the input in one steady or swept line, from which the distortion of the response
+#: to it is such a line as well.
+MAX_LINE_POWER = 0.5
+
+
+def _form(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    cosine, sine = _make_waves(
+        float(values[2]), float(values[3]), context.start_time, context.dt, signal.size
+    )
+    return signal + values[0] * cosine + values[1] * sine
+
+
+@lru_cache(maxsize=8)
+def _make_waves(
+    frequency: float, rate: float, start: float, dt: float, samples: int
+) -> tuple[Signal, Signal]:
+    """Return the cosine and the sine of a sweep over time; most derivatives have it in common."""
+    time = start + dt * np.arange(samples, dtype=np.float64)
+    angle = 2 * np.pi * (frequency + 0.5 * rate * time) * time
+    return np.cos(angle), np.sin(angle)
+
+
+def _list_parameters(context: SimulationContext, unit: str, peak: float) -> tuple[Parameter, ...]:
+    duration, fastest = context.fit_end_time, 0.499 / context.dt
+    return (
+        Parameter("cosine", unit, 0.0, 0.005 * peak),
+        Parameter("sine", unit, 0.0, 0.005 * peak),
+        Parameter("frequency", "Hz", 0.0, 0.1 / duration, 0.0, fastest),
+        Parameter("rate", "Hz/s", 0.0, 0.1 / duration**2, -fastest / duration, fastest / duration),
+    )
+
+
+def _input_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return _list_parameters(context, context.input_unit, context.input_peak)
+
+
+def _output_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return _list_parameters(context, context.output_unit, context.output_peak)
+
+
+def _starting_points(
+    context: SimulationContext, residual: Signal, site: Site
+) -> tuple[tuple[float, ...], ...]:
+    fitted = round(context.fit_end_time / context.dt)
+    residual = residual[:fitted] - residual[:fitted].mean()
+    response = None
+    if site == Site.INPUT:
+        assert context.measured is not None
+        response = compute_response(context.u[:fitted], context.measured[:fitted] - residual)
+        if not response.any():
+            return ()
+    found = find_sweep(residual, response, MIN_CHANGE)
+    return () if found is None else (_fit_amplitudes(found, residual, response, context.dt),)
+
+
+def _fit_amplitudes(
+    sweep: Sweep, residual: Signal, response: Signal | None, dt: float
+) -> tuple[float, float, float, float]:
+    """Return a sweep with the amplitudes of its cosine and its sine that explain most of the residual."""
+    frequency, rate = sweep.frequency / dt, sweep.rate / dt**2
+    waves: Iterable[Signal] = _make_waves(frequency, rate, 0.0, dt, residual.size)
+    if response is not None:
+        waves = [respond(wave, response) for wave in waves]
+    cosine, sine = np.linalg.lstsq(np.column_stack(list(waves)), residual, rcond=None)[0]
+    return float(cosine), float(sine), frequency, rate
+
+
+def _has_many_lines(context: SimulationContext) -> bool:
+    """Return whether the input is not a single line, whose distortions would look like another one."""
+    fitted = round(context.fit_end_time / context.dt)
+    u = context.u[:fitted] - context.u[:fitted].mean()
+    return context.measured is not None and measure_line(u) < MAX_LINE_POWER
+
+
+_EQUATION = f"x + n0*cos({2 * np.pi}*(n2 + 0.5*n3*t)*t) + n1*sin({2 * np.pi}*(n2 + 0.5*n3*t)*t)"
+_SOURCE = "Djuric and Kay, Parameter estimation of chirp signals, 1990"
+
+SWEPT_DISTURBANCE = Effect(
+    name="swept-disturbance",
+    summary="Disturbance that acts where the input does, with a frequency that changes at a constant rate",
+    family="disturbance",
+    site=Site.INPUT,
+    parameters=_input_parameters,
+    starting_points=partial(_starting_points, site=Site.INPUT),
+    form=_form,
+    equation=lambda _: MapEquation(_EQUATION),
+    source=_SOURCE,
+    is_applicable=_has_many_lines,
+    linear_parameters=2,
+    extra_degrees_of_freedom=4,
+    depends_on_time=True,
+    similar_to="swept-interference, resonance, coloured noise",
+    distinguished_by="a line that moves, with the amplitude and the phase of the response at its frequency",
+    occurs_in="force or torque of a neighbouring machine that runs up or down, through a common frame",
+)
+
+SWEPT_INTERFERENCE = Effect(
+    name="swept-interference",
+    summary="Disturbance that is added to the output, with a frequency that changes at a constant rate",
+    family="disturbance",
+    site=Site.OUTPUT,
+    parameters=_output_parameters,
+    starting_points=partial(_starting_points, site=Site.OUTPUT),
+    form=_form,
+    equation=lambda _: MapEquation(_EQUATION),
+    source=_SOURCE,
+    is_applicable=_has_many_lines,
+    linear_parameters=2,
+    extra_degrees_of_freedom=4,
+    depends_on_time=True,
+    similar_to="swept-disturbance, periodic-disturbance, coloured noise",
+    distinguished_by="a line that moves and has the same amplitude at all frequencies",
+    occurs_in="cables near the inverter of a drive that runs up or down, vibration of a sensor mount",
+)

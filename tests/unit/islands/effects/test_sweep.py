@@ -1,0 +1,107 @@
+"""Disturbances that sweep: found in noise, behind a system, and named by the place where they act."""
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+import islands
+from islands.effects.interface.context import SimulationContext
+from islands.effects.sweep import SWEPT_DISTURBANCE, SWEPT_INTERFERENCE
+from islands.effects.sweep_search import compute_response, find_sweep, measure_line, respond
+
+DT, SAMPLES = 0.005, 2000
+
+
+def make_wave(first: float, last: float, samples: int = SAMPLES) -> np.ndarray:
+    """Return a sweep between two frequencies in Hz."""
+    time = DT * np.arange(samples)
+    return np.asarray(np.sin(2 * np.pi * (first * time + (last - first) * time**2 / (2 * time[-1])) + 0.7))
+
+
+def draw_input(seed: int, samples: int = SAMPLES) -> np.ndarray:
+    noise = np.random.default_rng(seed).standard_normal(samples)
+    return np.asarray(lfilter([0.2], [1.0, -0.8], noise))
+
+
+def move(force: np.ndarray) -> np.ndarray:
+    """Return the response of a mass of 8 Hz with a damping ratio of 0.1 to a force."""
+    w = 2 * np.pi * 8.0
+    b, a, _ = cont2discrete(([w * w], [1.0, 0.2 * w, w * w]), DT, method="foh")
+    return np.asarray(lfilter(np.ravel(b), a, force))
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.5, 15.0), (60.0, 10.0), (30.0, 33.0)])
+@pytest.mark.parametrize("samples", [900, 2000, 9000])
+def test_a_sweep_is_found_in_noise(first: float, last: float, samples: int) -> None:
+    signal = 0.3 * make_wave(first, last, samples) + np.random.default_rng(1).standard_normal(samples)
+    found = find_sweep(signal - signal.mean(), None, 4.0)
+    assert found is not None
+    resolution = 1.0 / (samples * DT)
+    assert found.frequency / DT == pytest.approx(first, abs=1.5 * resolution)
+    end = found.frequency / DT + found.rate / DT**2 * samples * DT
+    assert end == pytest.approx(last, abs=2.0 * resolution)
+
+
+def test_noise_and_a_steady_line_are_no_sweep() -> None:
+    noise = np.random.default_rng(2).standard_normal(SAMPLES)
+    assert measure_line(noise) < 0.05
+    steady = np.cos(2 * np.pi * 7.0 * DT * np.arange(SAMPLES))
+    assert measure_line(steady) > 0.9
+    found = find_sweep(steady, None, 4.0)
+    assert found is not None
+    assert found.power < 0.4 * SAMPLES / 2
+    assert find_sweep(np.zeros(SAMPLES), None, 4.0) is None
+
+
+def test_the_response_from_input_to_output_is_that_of_the_system() -> None:
+    u, wave = draw_input(3), make_wave(0.5, 15.0)
+    response = compute_response(u, move(u))
+    error = respond(wave, response) - move(wave)
+    assert error.std() < 0.1 * move(wave).std()
+    assert not compute_response(np.zeros(SAMPLES), u).any()
+
+
+def make_context(u: np.ndarray, measured: np.ndarray) -> SimulationContext:
+    return SimulationContext(u, DT, {}, {}, 1.0, 1.0, "N", "mm", 7.5, measured=measured)
+
+
+def test_a_sweep_behind_a_resonance_starts_with_the_force_that_acts() -> None:
+    u, wave = draw_input(4), 0.4 * make_wave(0.5, 15.0)
+    residual = move(wave)
+    (point,) = SWEPT_DISTURBANCE.starting_points(make_context(u, move(u) + residual), residual)
+    cosine, sine, frequency, rate = point
+    assert (frequency, rate) == (pytest.approx(0.5, abs=0.15), pytest.approx(1.45, abs=0.02))
+    assert np.hypot(cosine, sine) == pytest.approx(0.4, rel=0.2)
+
+
+def test_a_sweep_is_not_searched_for_if_the_input_is_a_line() -> None:
+    """A distortion of the response to a sweep is a sweep as well."""
+    for effect in (SWEPT_DISTURBANCE, SWEPT_INTERFERENCE):
+        for u, is_searched in (
+            (draw_input(5), True),
+            (make_wave(1.0, 20.0), False),
+            (make_wave(3.0, 3.0), False),
+        ):
+            assert effect.is_applicable(make_context(u, u)) == is_searched
+
+
+def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:
+    noise = 0.01 * y.std() * np.random.default_rng(6).standard_normal(y.size)
+    record = islands.Dataset(u[:, None], y + noise, DT, ("F_N",), "x_mm", ("N",), "mm")
+    return islands.diagnose(record, "second-order")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("acts_at_input", [True, False])
+def test_a_sweep_is_named_by_the_place_where_it_acts(acts_at_input: bool) -> None:
+    u, wave = draw_input(7), make_wave(0.5, 15.0)
+    y = move(u + 0.1 * wave) if acts_at_input else move(u) + 0.05 * wave
+    found = diagnose(u, y)
+    name = "swept-disturbance" if acts_at_input else "swept-interference"
+    assert (str(found.verdict), found.claimed_names) == ("named", (name,))
+    assert found.effects[0].confidence > 0.9
+    values = found.effects[0].parameters
+    assert values["frequency"].value == pytest.approx(0.5, abs=0.01)
+    assert values["rate"].value == pytest.approx(14.5 / (SAMPLES * DT), abs=0.01)
+    assert f"{name} sweeps from 0." in found.summary
+    assert found.effects[0].depends_on_time
