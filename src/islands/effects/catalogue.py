@@ -45,9 +45,11 @@ from islands.effects.time_variation import AGEING, GAIN_STEP, TEMPERATURE_GAIN
 from islands.effects.timing import (
     CLOCK_SKEW,
     DELAY,
+    GROWING_LAG,
     RATE_LIMIT,
     RESONANCE,
     SENSOR_LAG,
+    VARYING_DELAY,
 )
 
 #: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
@@ -55,6 +57,7 @@ from islands.effects.timing import (
 #: the first one. The order also breaks ties between scores: another order changes results.
 EFFECTS: tuple[Effect, ...] = (
     DELAY,
+    VARYING_DELAY,
     CLOCK_SKEW,
     INPUT_GAIN,
     DEAD_ZONE,
@@ -79,6 +82,7 @@ EFFECTS: tuple[Effect, ...] = (
     EXPONENTIAL_CREEP,
     LOGARITHMIC_CREEP,
     SENSOR_LAG,
+    GROWING_LAG,
     RESONANCE,
     ABSOLUTE_VALUE_SENSOR,
     UNSIGNED_SENSOR,

@@ -1,4 +1,6 @@
-"""Effects on time: delay, clock skew, rate limit, lag and resonance of the sensor."""
+"""Effects on time: delay, constant or not, clock skew, rate limit, lags and resonance of the sensor."""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +11,7 @@ from islands.effects.interface.input_spectrum import find_single_frequency
 from islands.effects.interface.map_equation import MapEquation
 from islands.kernels.lagrange import interpolate_at
 from islands.kernels.linear_filter import filter_linearly
-from islands.kernels.memory_operators import limit_rate
+from islands.kernels.memory_operators import lag_by_gap, limit_rate
 
 #: Largest negative delay in samples. An output that is sampled after the step of the input is a sample early.
 _LONGEST_LEAD = 1.2
@@ -45,12 +47,86 @@ DELAY = Effect(
     parameters=_delay_parameters,
     starting_points=_delay_starting_points,
     form=_delay_form,
-    equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0"),)),
+    equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0", "0", "0", "0"),)),
     formula=Formula("at(x, t - tau)"),
     source="Ljung, System Identification, 2nd ed., section 16",
     similar_to="sensor-lag, resonance, viscous",
     distinguished_by="the phase grows with the frequency at constant amplitude; hysteresis is delayed too",
     occurs_in="transport of material, sampling and communication of a controller, filters of the data logger",
+)
+
+#: Fewest and most periods of a delay that swings, in the estimation part.
+_FEWEST_SWINGS, _MOST_SWINGS = 0.5, 20.0
+
+#: Step of the numbers of periods from which the calibration starts.
+_SWING_STEP = 0.25
+
+#: Means of a delay that swings from which the calibration starts, relative to the amplitude.
+_SWING_MEANS = (0.0, 1.0, 2.0)
+
+
+def _varying_delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    mean, cosine, sine, frequency = values
+    angle = 2 * np.pi * frequency * context.time
+    late = mean + cosine * np.cos(angle) + sine * np.sin(angle)
+    return interpolate_at(u, np.arange(u.size) - late / context.dt)
+
+
+def _varying_delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    (mean,) = _delay_parameters(context)
+    most, duration = mean.upper, context.fit_end_time
+    return (
+        replace(mean, name="mean"),
+        Parameter("cosine", "s", 0.0, context.dt, -most, most),
+        Parameter("sine", "s", 0.0, context.dt, -most, most),
+        Parameter(
+            "frequency", "Hz", 0.0, 0.1 / duration, _FEWEST_SWINGS / duration, 2 * _MOST_SWINGS / duration
+        ),
+    )
+
+
+def _varying_delay_starting_points(
+    context: SimulationContext, residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    """Return starting points with the frequency at which the residual follows the rate of the output most.
+
+    The residual is that rate times minus the delay, as far as the delay is short for the output.
+    """
+    fitted = round(context.fit_end_time / context.dt)
+    residual = residual[:fitted]
+    assert context.measured is not None
+    simulated = context.measured[:fitted] - residual
+    rate = np.gradient(simulated, context.dt)
+    fixed = np.column_stack([np.ones(fitted), simulated, rate])
+    best, least = (0.0, 0.0, 0.0), np.inf
+    for swings in np.arange(_FEWEST_SWINGS, _MOST_SWINGS, _SWING_STEP):
+        angle = 2 * np.pi * swings * np.arange(fitted) / fitted
+        columns = np.column_stack([fixed, -rate * np.cos(angle), -rate * np.sin(angle)])
+        weights = np.linalg.lstsq(columns, residual, rcond=None)[0]
+        error = float(np.sum((residual - columns @ weights) ** 2))
+        if error < least:
+            best, least = (weights[3], weights[4], swings / context.fit_end_time), error
+    amplitude = float(np.hypot(best[0], best[1]))
+    return tuple((part * amplitude, *map(float, best)) for part in _SWING_MEANS)
+
+
+VARYING_DELAY = Effect(
+    name="varying-delay",
+    summary="The delay of the input swings about its mean: u(t - mean - a cos(2 pi f t) - b sin(2 pi f t))",
+    family="timing",
+    site=Site.INPUT,
+    parameters=_varying_delay_parameters,
+    starting_points=_varying_delay_starting_points,
+    form=_varying_delay_form,
+    equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0", "n1", "n2", "n3"),)),
+    source="Ljung, System Identification, 2nd ed., section 16",
+    is_applicable=lambda context: context.measured is not None,
+    linear_parameters=3,
+    extra_degrees_of_freedom=2,
+    depends_on_time=True,
+    similar_to="delay, clock-skew, sensor-lag, resonance",
+    distinguished_by="a residual proportional to the rate of the output, with a factor that swings over time",
+    occurs_in="transport at a changing speed, networks with a changing load",
 )
 
 
@@ -77,7 +153,7 @@ CLOCK_SKEW = Effect(
     parameters=_clock_skew_parameters,
     starting_points=_clock_skew_starting_points,
     form=_clock_skew_form,
-    equation=lambda _: MapEquation("z0", (("interpolate", "n0", "0"),)),
+    equation=lambda _: MapEquation("z0", (("interpolate", "n0", "0", "0", "0", "0"),)),
     formula=Formula("at(x, t*(1 + e))"),
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
     similar_to="delay",
@@ -176,6 +252,44 @@ SENSOR_LAG = Effect(
     similar_to="delay, resonance, viscous",
     distinguished_by="the amplitude falls with the frequency",
     occurs_in="thermocouples in a sheath, pressure lines, filters of an amplifier",
+)
+
+
+def _growing_lag_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    lagged: Signal = lag_by_gap(y, context.dt, values[0], values[1])
+    return lagged
+
+
+def _growing_lag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    most = context.fit_end_time / 4
+    peak = context.output_peak
+    return (
+        Parameter("tau", "s", 0.0, context.dt, 0.0, most),
+        Parameter("inverse_rate", f"s/{context.output_unit}", 0.0, context.dt / peak, 0.0, most / peak),
+    )
+
+
+def _growing_lag_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    times = (2 * context.dt, 6 * context.dt)
+    return tuple((tau, part * tau / context.output_peak) for tau in times for part in (1.0, 5.0))
+
+
+GROWING_LAG = Effect(
+    name="growing-lag",
+    summary="Lag of the sensor that grows with its error e = v - y: y' = e/(tau + inverse_rate |e|)",
+    family="timing",
+    site=Site.OUTPUT,
+    parameters=_growing_lag_parameters,
+    starting_points=_growing_lag_starting_points,
+    form=_growing_lag_form,
+    equation=lambda _: MapEquation("z0", (("lag-by-gap", "n0", "n1"),)),
+    source="Isermann, Fault-Diagnosis Applications, section 5",
+    linear_parameters=0,
+    similar_to="sensor-lag, rate-limit, output-lag-curve",
+    distinguished_by="large changes are followed more slowly than small ones, relative to their size",
+    occurs_in="sensors behind a film of steam or a deposit, instruments with a largest rate",
 )
 
 #: Largest natural frequency in radians per sample; a faster mode has no effect on the record.

@@ -1,4 +1,4 @@
-"""Operators with memory: play, stick-slip slider, rate limiter and uneven lag."""
+"""Operators with memory: play, stick-slip slider, rate limiter, uneven and growing lag."""
 
 import math
 
@@ -110,6 +110,30 @@ def _follow(u, dt, slow, times, x):
         x[k] = u[k] - gap
 
 
+#: Steps of a lag that grows with its error in a sampling interval.
+GROWING_LAG_STEPS = 4
+
+
+@kernel
+def _follow_by_gap(u, step, tau, inverse_rate, x):
+    ratio = step / tau
+    # The part of a step at which the slope is taken: exact for a constant lag, and stable for a short one.
+    part = -1.0 / math.expm1(-ratio) - 1.0 / ratio
+    gap = 0.0
+    x[0] = u[0]
+    for k in range(1, u.size):
+        change = (u[k] - u[k - 1]) / GROWING_LAG_STEPS
+        for _ in range(GROWING_LAG_STEPS):
+            ahead = gap + part * change
+            # The gap at that part solves gap + part step gap/(tau + inverse_rate |gap|) = ahead.
+            size = abs(ahead)
+            half = 0.5 * (tau + part * step - inverse_rate * size)
+            root = math.sqrt(half * half + inverse_rate * size * tau)
+            middle = size * tau / (half + root) if half > 0.0 else (root - half) / inverse_rate
+            gap += (math.copysign(middle, ahead) - gap) / part
+        x[k] = u[k] - gap
+
+
 def play_from(u, width):
     """Return the output of a play operator of half width ``width`` with input ``u``."""
     x = np.empty_like(u)
@@ -145,4 +169,26 @@ def lag_unevenly(u, dt, slow, times):
     x = np.array(u)
     if np.max(times) > 0.0:
         _follow(np.ascontiguousarray(u), dt, slow, np.maximum(times, LEAST_LAG * dt), x)
+    return x
+
+
+def lag_by_gap(u, dt, tau, inverse_rate):
+    """Return ``u`` (samples,) with a lag that grows with its error: ``x' = e/(tau + inverse_rate |e|)``.
+
+    The error ``e`` is ``u - x``, and the rate of the output is below ``1/inverse_rate``. The output starts at
+    ``u[0]``, and the input is linear between samples.
+
+    Parameters
+    ----------
+    dt : float
+        Sampling time in seconds.
+    tau : float
+        Time constant of a small error, in seconds.
+    inverse_rate : float
+        Seconds for a unit of the input.
+    """
+    x = np.array(u)
+    if tau > 0.0:
+        step = dt / GROWING_LAG_STEPS
+        _follow_by_gap(np.ascontiguousarray(u), step, max(tau, LEAST_LAG * dt), inverse_rate, x)
     return x

@@ -224,6 +224,32 @@ def swept_interference(lower: float, upper: float) -> Make:
     return make
 
 
+def varying_delay(rng: np.random.Generator, strength: float) -> Map:
+    """Delay that swings about its mean, which is the strength in seconds, one to five times in the record."""
+    part, swings, phase = rng.uniform(0.5, 0.9), rng.uniform(1.0, 5.0), rng.uniform(0.0, 2 * np.pi)
+
+    def follow(drive: Excitation, u: Signal) -> Signal:
+        angle = 2 * np.pi * swings * drive.time / drive.time[-1] + phase
+        return np.interp(drive.time - strength * (1.0 + part * np.sin(angle)), drive.time, u)
+
+    return follow
+
+
+def growing_lag(_rng: np.random.Generator, strength: float) -> Map:
+    """Lag that grows with its error, fourfold at a tenth of the peak; the strength is the least constant."""
+
+    def follow(drive: Excitation, y: Signal) -> Signal:
+        shown, reading = [], float(y[0])
+        for target in y.tolist():
+            error = target - reading
+            lag = strength * (1.0 + 30.0 * abs(error) / drive.peak_output)
+            reading += error * (1.0 - np.exp(-1.0 / (drive.rate * lag)))
+            shown.append(reading)
+        return np.array(shown)
+
+    return follow
+
+
 def cross_coupling(rng: np.random.Generator, strength: float) -> Map:
     """Cross-coupling of the neighbouring channel."""
     c = random_sign(rng) * strength

@@ -15,13 +15,15 @@ from islands.effects.interface.context import SimulationContext
 #: * ``slider`` (breakaway): `islands.effects.hysteresis.stick`
 #: * ``limit-rate`` (inverse of the rate per second): `islands.kernels.memory_operators`
 #: * ``lag-unevenly`` (rate per second, four time constants in s): `islands.kernels.memory_operators`
-#: * ``interpolate`` (e, tau in s): the signal at the time ``t (1 + e) - tau``
+#: * ``lag-by-gap`` (time constant in s, inverse of the rate per second): `islands.kernels.memory_operators`
+#: * ``interpolate`` (e, tau in s, cosine in s, sine in s, f in Hz): the signal at the time
+#:   ``t (1 + e) - tau - cosine cos(2 pi f t) - sine sin(2 pi f t)``
 #: * ``first``: number, the first sample
 #: * ``rests``: number, 1 if the signal is constant over the estimation part, otherwise 0
 #: * ``temperature``: the first temperature among the channels, relative to its first value
 #: * ``coupled``: the first other channel
 #:
-#: Without a positive first argument, the first five return the signal itself.
+#: Without a positive first argument, the first six return the signal itself.
 OPERATORS = (
     "low-pass",
     "resonance",
@@ -29,6 +31,7 @@ OPERATORS = (
     "slider",
     "limit-rate",
     "lag-unevenly",
+    "lag-by-gap",
     "interpolate",
     "first",
     "rests",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.kernels.memory_operators import lag_unevenly, limit_rate, play_from, slider
+from islands.kernels.memory_operators import lag_by_gap, lag_unevenly, limit_rate, play_from, slider
 
 Array = NDArray[np.float64]
 
@@ -130,3 +130,31 @@ def test_an_uneven_lag_approaches_a_step_with_the_time_constants_of_its_rate() -
     assert rates.max() > 0.2
     fall = lag_unevenly(np.concatenate([[1.0], np.zeros(80)]), 0.1, 0.1, times)
     assert fall[2:] / fall[1:-1] == pytest.approx(np.exp(-0.1))
+
+
+@given(reals, st.floats(0.01, 5.0), st.floats(0.0, 5.0))
+def test_a_growing_lag_keeps_its_largest_rate_and_the_range_of_the_input(
+    u: Array, tau: float, inverse: float
+) -> None:
+    x = lag_by_gap(u, 1.0, tau, inverse)
+    assert x[0] == u[0]
+    assert x.min() >= u.min() - 1e-6
+    assert x.max() <= u.max() + 1e-6
+    assert np.abs(np.diff(x)).max() * inverse <= 1.0 + 1e-6
+
+
+@given(reals, st.floats(0.01, 5.0))
+def test_a_growing_lag_without_growth_is_a_constant_lag(u: Array, tau: float) -> None:
+    constant = lag_unevenly(u, 1.0, 1.0, np.full(4, tau))
+    assert lag_by_gap(u, 1.0, tau, 0.0) == pytest.approx(constant, abs=1e-6)
+
+
+def test_a_growing_lag_approaches_a_step_at_the_rate_of_its_law() -> None:
+    x = lag_by_gap(np.concatenate([[0.0], np.ones(200)]), 0.02, 0.5, 2.0)
+    error = 1.0 - 0.5 * (x[1:-1] + x[2:])
+    assert np.diff(x)[1:] / 0.02 == pytest.approx(error / (0.5 + 2.0 * error), rel=1e-3)
+
+
+def test_a_growing_lag_with_a_time_constant_of_zero_is_the_input() -> None:
+    u = np.array([0.0, 3.0, -1.0])
+    assert np.array_equal(lag_by_gap(u, 0.1, 0.0, 2.0), u)

@@ -311,7 +311,7 @@ PROCESS_CAUSES = (
         "the lag of the sensor grows with its error",
         "linear:1",
         _jacketed_sensor,
-        "output-lag-curve uneven-lag",
+        "output-lag-curve uneven-lag growing-lag",
         "",
         "timing",
     ),

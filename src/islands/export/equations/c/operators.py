@@ -145,13 +145,37 @@ static void lag_unevenly(const double *x, double *z, size_t samples, double slow
     }
 }
 """,
+        "lag-by-gap": """\
+/* Lag of x, which is linear between samples, that grows with the gap: z' = gap/(tau + inverse_rate*|gap|). */
+static void lag_by_gap(const double *x, double *z, size_t samples, double tau, double inverse_rate)
+{
+    const double step = DT/4.0, least = fmax(tau, 1e-9*DT), ratio = step/least;
+    const double part = -1.0/expm1(-ratio) - 1.0/ratio;
+    double gap = 0.0;
+    z[0] = x[0];
+    for (size_t k = 1; k < samples; ++k) {
+        for (int turn = 0; turn < 4 && tau > 0.0; ++turn) {
+            const double ahead = gap + part*(x[k] - x[k-1])/4.0, size = fabs(ahead);
+            const double half = 0.5*(least + part*step - inverse_rate*size);
+            const double root = sqrt(half*half + inverse_rate*size*least);
+            const double middle = half > 0.0 ? size*least/(half + root) : (root - half)/inverse_rate;
+            gap += (copysign(middle, ahead) - gap)/part;
+        }
+        z[k] = x[k] - gap;
+    }
+}
+""",
         "interpolate": """\
-/* Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held. */
-static void interpolate_at(const double *x, double *z, size_t samples, double e, double tau)
+/* Signal at the time t*(1 + e) - tau - cosine*cos(2*pi*f*t) - sine*sin(2*pi*f*t), by Lagrange's polynomial
+   through six samples; its ends are held. */
+static void interpolate_at(const double *x, double *z, size_t samples, double e, double tau, double cosine,
+                           double sine, double f_Hz)
 {
     const long last = (long)samples - 1;
     for (long k = 0; k <= last; ++k) {
-        const double at = fmin(fmax((double)k*(1.0 + e) - tau/DT, 0.0), (double)last);
+        const double angle = 6.283185307179586*f_Hz*DT*(double)k;
+        const double late = (tau + cosine*cos(angle) + sine*sin(angle))/DT;
+        const double at = fmin(fmax((double)k*(1.0 + e) - late, 0.0), (double)last);
         const long lower = (long)at < last - 1 ? (long)at : last - 1, first = lower > 0 ? lower : 0;
         const double f = at - (double)first;
         double sum = 0.0;

@@ -133,11 +133,38 @@ function z = lag_unevenly(x, slow, falling_fast, falling, rising, rising_fast, c
   end
 end
 """,
+        "lag-by-gap": """\
+function z = lag_by_gap(x, tau, inverse_rate, c)
+% Lag of x, which is linear between samples, that grows with the gap: z' = gap/(tau + inverse_rate*abs(gap)).
+  z = x;
+  if ~(tau > 0), return; end
+  tau = max(tau, 1e-9*c.dt);
+  ratio = c.dt/4/tau;
+  part = -1/expm1(-ratio) - 1/ratio;
+  gap = 0;
+  for k = 2:numel(x)
+    for turn = 1:4
+      ahead = gap + part*(x(k) - x(k-1))/4;
+      half = 0.5*(tau + part*c.dt/4 - inverse_rate*abs(ahead));
+      root = sqrt(half*half + inverse_rate*abs(ahead)*tau);
+      if half > 0
+        middle = abs(ahead)*tau/(half + root);
+      else
+        middle = (root - half)/inverse_rate;
+      end
+      gap = gap + (sign(ahead)*middle - gap)/part;
+    end
+    z(k) = x(k) - gap;
+  end
+end
+""",
         "interpolate": """\
-function z = interpolate_at(x, e, tau, c)
-% Signal at the time t*(1 + e) - tau, by Lagrange's polynomial through six samples; its ends are held.
+function z = interpolate_at(x, e, tau, cosine, sine, f, c)
+% Signal at the time t*(1 + e) - tau - cosine*cos(2*pi*f*t) - sine*sin(2*pi*f*t), by Lagrange's polynomial
+% through six samples; its ends are held.
   last = numel(x) - 1;
-  at = min(max((0:last).'*(1 + e) - tau/c.dt, 0), last);
+  angle = 2*pi*f*c.dt*(0:last).';
+  at = min(max((0:last).'*(1 + e) - (tau + cosine*cos(angle) + sine*sin(angle))/c.dt, 0), last);
   first = min(floor(at), max(last - 1, 0));
   z = zeros(size(x));
   for here = -2:3

@@ -19,7 +19,7 @@ from islands.effects.timing import RESONANCE
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.kernels.lagrange import interpolate_at
-from islands.kernels.memory_operators import lag_unevenly, limit_rate, play_from
+from islands.kernels.memory_operators import lag_by_gap, lag_unevenly, limit_rate, play_from
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,14 @@ def rests(signal: Array, context: SimulationContext) -> float:
     return float(is_resting(signal[: round(context.fit_end_time / context.dt)]))
 
 
+def interpolate(
+    signal: Array, context: SimulationContext, e: float, tau: float, cosine: float, sine: float, f: float
+) -> Array:
+    angle = 2 * np.pi * f * context.time
+    late = tau + cosine * np.cos(angle) + sine * np.sin(angle)
+    return interpolate_at(signal, np.arange(signal.size) * (1.0 + e) - late / context.dt)
+
+
 #: The operators as functions of the signal, the context and the arguments.
 FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "low-pass": lambda x, context, tau: low_pass(x, tau, context.dt) if tau > 0.0 else x,
@@ -55,9 +63,8 @@ FUNCTIONS: dict[str, Callable[..., Array | float]] = {
     "slider": lambda x, _, breakaway: stick(x, breakaway),
     "limit-rate": lambda x, context, inverse: limit_rate(x, context.dt / inverse) if inverse > 0.0 else x,
     "lag-unevenly": lambda x, context, slow, *times: lag_unevenly(x, context.dt, slow, np.array(times)),
-    "interpolate": lambda x, context, e, tau: interpolate_at(
-        x, np.arange(x.size) * (1.0 + e) - tau / context.dt
-    ),
+    "lag-by-gap": lambda x, context, tau, inverse: lag_by_gap(x, context.dt, tau, inverse),
+    "interpolate": interpolate,
     "first": lambda x, _: float(x[0]),
     "rests": rests,
     "temperature": lambda _, context: channel(context, True),
