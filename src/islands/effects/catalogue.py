@@ -21,6 +21,7 @@ from islands.effects.hysteresis import (
     RATE_DEPENDENT_LOOP,
     RELAXATION,
     SECOND_HYSTERESIS,
+    SENSOR_HYSTERESIS,
     STICTION,
 )
 from islands.effects.interface.effect import Effect, EffectTemplate
@@ -84,6 +85,7 @@ EFFECTS: tuple[Effect, ...] = (
     SENSOR_LAG,
     GROWING_LAG,
     RESONANCE,
+    SENSOR_HYSTERESIS,
     ABSOLUTE_VALUE_SENSOR,
     UNSIGNED_SENSOR,
     OUTPUT_SATURATION,

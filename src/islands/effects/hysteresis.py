@@ -124,6 +124,34 @@ BACKLASH = Effect(
 )
 
 
+def _sensor_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    peak = context.output_peak
+    return (Parameter("b", context.output_unit, 0.0, 0.005 * peak, 0.0, 0.3 * peak),)
+
+
+def _sensor_hysteresis_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * context.output_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
+
+
+SENSOR_HYSTERESIS = Effect(
+    name="sensor-hysteresis",
+    summary="Hysteresis of the sensor: the output has a play of half width b",
+    family="memory",
+    site=Site.OUTPUT,
+    parameters=_sensor_hysteresis_parameters,
+    starting_points=_sensor_hysteresis_starting_points,
+    form=_backlash_form,
+    equation=lambda _: MapEquation("z0", (("play", "n0"),)),
+    linear_parameters=0,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    similar_to="backlash, output-memory, coulomb-friction",
+    distinguished_by="the output rests after each reversal of the motion, not of the input",
+    occurs_in="linkages and gears of a position sensor, floats of a level sensor, magnetic sensors",
+)
+
+
 def _relaxation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),)
 

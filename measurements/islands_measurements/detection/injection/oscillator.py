@@ -131,6 +131,7 @@ OSCILLATOR = Rig(
         ),
         Fault("varying-delay", 0.0005, 0.01, (before_plant(signal_faults.varying_delay),)),
         Fault("growing-lag", 0.0005, 0.01, (after_plant(signal_faults.growing_lag),)),
+        Fault("sensor-hysteresis", 0.002, 0.1, (after_plant(signal_faults.sensor_hysteresis),)),
         Fault("offset", 0.001, 0.05, (after_plant(signal_faults.offset),)),
         Fault("linear-drift", 0.002, 0.1, (after_plant(signal_faults.linear_drift),)),
         Fault("jump", 0.002, 0.1, (after_plant(signal_faults.jump),)),

@@ -250,6 +250,11 @@ def growing_lag(_rng: np.random.Generator, strength: float) -> Map:
     return follow
 
 
+def sensor_hysteresis(rng: np.random.Generator, strength: float) -> Map:
+    """Play of the sensor; the strength is its half width relative to the peak of the output."""
+    return lambda drive, y: backlash(rng, strength * drive.peak_output)(drive, y)
+
+
 def cross_coupling(rng: np.random.Generator, strength: float) -> Map:
     """Cross-coupling of the neighbouring channel."""
     c = random_sign(rng) * strength

@@ -19,7 +19,7 @@ from islands_measurements.detection.unusual_trial import Claim, FreshErrors, Unu
 #: Names that the catalogue has not, and that a later analysis may give.
 LATER = {
     *("ignored-input", "quantisation", "quantised-input", "quantiser"),
-    *("sensor-delay", "sensor-hysteresis", "output-backlash", "asymmetric-gain", "uneven-lag"),
+    *("sensor-delay", "output-backlash", "asymmetric-gain", "uneven-lag"),
 }
 
 HELD = FreshErrors(10.0, 1.0, 10.0, 1.0)
