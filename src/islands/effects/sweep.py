@@ -9,7 +9,7 @@ from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
 from islands.effects.interface.input_spectrum import LINE_WIDTH
 from islands.effects.interface.map_equation import MapEquation
-from islands.effects.sweep_search import Sweep, compute_response, find_sweep, measure_line, respond
+from islands.effects.sweep_search import SweptLine, compute_response, find_sweep, measure_line, respond
 
 #: Least change of the frequency within the estimation part, relative to the resolution. A smaller one is a
 #: steady line.
@@ -71,7 +71,7 @@ def _starting_points(
 
 
 def _fit_amplitudes(
-    sweep: Sweep, residual: Signal, response: Signal | None, dt: float
+    sweep: SweptLine, residual: Signal, response: Signal | None, dt: float
 ) -> tuple[float, float, float, float]:
     """Return a sweep with the amplitudes of its cosine and its sine that explain most of the residual."""
     frequency, rate = sweep.frequency / dt, sweep.rate / dt**2
@@ -105,6 +105,7 @@ SWEPT_DISTURBANCE = Effect(
     is_applicable=_has_many_lines,
     linear_parameters=2,
     extra_degrees_of_freedom=4,
+    is_tuned=True,
     depends_on_time=True,
     similar_to="swept-interference, resonance, coloured noise",
     distinguished_by="a line that moves, with the amplitude and the phase of the response at its frequency",
@@ -124,6 +125,7 @@ SWEPT_INTERFERENCE = Effect(
     is_applicable=_has_many_lines,
     linear_parameters=2,
     extra_degrees_of_freedom=4,
+    is_tuned=True,
     depends_on_time=True,
     similar_to="swept-disturbance, periodic-disturbance, coloured noise",
     distinguished_by="a line that moves and has the same amplitude at all frequencies",

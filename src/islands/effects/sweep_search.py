@@ -1,7 +1,7 @@
 """Search for a line in a signal whose frequency changes at a constant rate, behind a linear system or not.
 
 The signal is multiplied by sweeps of the opposite rate, after which the line is a peak in a spectrum. That
-takes windows of up to a thousand samples, whose powers are summed along the line. The windows are then
+takes windows of some hundred samples, whose powers are summed along the line. The windows are then
 doubled, with rates near those found before, until one window is the signal.
 """
 
@@ -13,10 +13,11 @@ import numpy as np
 from islands.effects.interface.effect import Signal
 
 #: Largest length of the first windows, in samples.
-WINDOW = 1024
+WINDOW = 512
 
-#: Step of the rates that are tried, in cycles per window. A line is then at most half a cycle away.
-STEP = 2
+#: Largest step of the rates that are tried, in cycles per window, and in cycles per window between the first
+#: window and the last. A line is then at most half of that away.
+STEP, LINE_STEP = 2.0, 4.0
 
 #: Least frequency in cycles per signal.
 MIN_CYCLES = 2
@@ -29,7 +30,7 @@ MIN_POWER = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
+class SweptLine:
     """A line: frequency at the first sample in cycles per sample, its rate, and its power."""
 
     frequency: float
@@ -54,7 +55,7 @@ def respond(signal: Signal, response: Signal) -> Signal:
     return np.asarray(np.fft.irfft(spectrum, 2 * signal.size)[: signal.size])
 
 
-def find_sweep(signal: Signal, response: Signal | None, min_change: float) -> Sweep | None:
+def find_sweep(signal: Signal, response: Signal | None, min_change: float) -> SweptLine | None:
     """Return the sweep that explains most of a signal; None if there is none.
 
     Parameters
@@ -75,8 +76,9 @@ def find_sweep(signal: Signal, response: Signal | None, min_change: float) -> Sw
         count *= 2
     least, found = min_change / count**2, None
     length = signal.size // count
-    most = length // (2 * count)
-    sweeps = np.arange(-most, most + 1, STEP, dtype=np.float64)
+    step = min(STEP, LINE_STEP / count)
+    most = int(length / (2 * count) / step)
+    sweeps = step * np.arange(-most, most + 1)
     while True:
         sweeps = sweeps[np.abs(sweeps) >= least]
         found = _find_line(signal, energy, count, sweeps)
@@ -85,7 +87,7 @@ def find_sweep(signal: Signal, response: Signal | None, min_change: float) -> Sw
         count //= 2
         least *= 4.0
         length = signal.size // count
-        sweeps = found.rate * length**2 + np.arange(-2 * STEP, 2 * STEP + 1, STEP)
+        sweeps = found.rate * length**2 + min(STEP, LINE_STEP / count) * np.arange(-2, 3)
 
 
 def measure_line(signal: Signal) -> float:
@@ -94,7 +96,7 @@ def measure_line(signal: Signal) -> float:
     return found.power / total if found is not None and total > 0.0 else 0.0
 
 
-def _find_line(signal: Signal, energy: Signal, count: int, sweeps: Iterable[float]) -> Sweep | None:
+def _find_line(signal: Signal, energy: Signal, count: int, sweeps: Iterable[float]) -> SweptLine | None:
     """Return the best line among sweeps in cycles per window, summed over a number of windows."""
     length = signal.size // count
     windows = signal[: count * length].reshape(count, length)
@@ -102,7 +104,7 @@ def _find_line(signal: Signal, energy: Signal, count: int, sweeps: Iterable[floa
     sums = np.concatenate([[0.0], np.cumsum(energy)])
     width = (energy.size - 1) / length  # of a frequency of a window, in those of the energy
     lowest, start = 2 * MIN_CYCLES / count, np.arange(length)
-    best: Sweep | None = None
+    best: SweptLine | None = None
     for sweep in sweeps:
         spectra = np.abs(np.fft.fft(windows * np.exp(-1j * np.pi * sweep * time**2), size)) ** 2
         end = start + 2 * sweep * count
@@ -123,5 +125,5 @@ def _find_line(signal: Signal, energy: Signal, count: int, sweeps: Iterable[floa
         place = int(np.argmax(power))
         # A line of amplitude a has the power a^2/2 in each sample, and a length/2 in the spectrum.
         if power[place] > 0.0 and (best is None or 2.0 * power[place] / length > best.power):
-            best = Sweep(usable[place] / size, sweep / length**2, float(2.0 * power[place] / length))
+            best = SweptLine(usable[place] / size, sweep / length**2, float(2.0 * power[place] / length))
     return best

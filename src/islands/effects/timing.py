@@ -97,15 +97,16 @@ def _varying_delay_starting_points(
     assert context.measured is not None
     simulated = context.measured[:fitted] - residual
     rate = np.gradient(simulated, context.dt)
-    fixed = np.column_stack([np.ones(fitted), simulated, rate])
-    best, least = (0.0, 0.0, 0.0), np.inf
-    for swings in np.arange(_FEWEST_SWINGS, _MOST_SWINGS, _SWING_STEP):
-        angle = 2 * np.pi * swings * np.arange(fitted) / fitted
-        columns = np.column_stack([fixed, -rate * np.cos(angle), -rate * np.sin(angle)])
-        weights = np.linalg.lstsq(columns, residual, rcond=None)[0]
-        error = float(np.sum((residual - columns @ weights) ** 2))
-        if error < least:
-            best, least = (weights[3], weights[4], swings / context.fit_end_time), error
+    absorbed, _ = np.linalg.qr(np.column_stack([np.ones(fitted), simulated, rate]))
+    residual = residual - absorbed @ (absorbed.T @ residual)
+    swings = np.arange(_FEWEST_SWINGS, _MOST_SWINGS, _SWING_STEP)
+    angles = 2 * np.pi * np.outer(np.arange(fitted) / fitted, swings)
+    columns = -rate[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=2)
+    columns -= np.tensordot(absorbed, np.tensordot(absorbed, columns, (0, 0)), (1, 0))
+    products = np.einsum("tsi,t->si", columns, residual)
+    weights = (np.linalg.pinv(np.einsum("tsi,tsj->sij", columns, columns)) @ products[:, :, None])[:, :, 0]
+    place = int(np.argmax(np.sum(weights * products, axis=1)))
+    best = (*weights[place], swings[place] / context.fit_end_time)
     amplitude = float(np.hypot(best[0], best[1]))
     return tuple((part * amplitude, *map(float, best)) for part in _SWING_MEANS)
 
@@ -123,6 +124,7 @@ VARYING_DELAY = Effect(
     is_applicable=lambda context: context.measured is not None,
     linear_parameters=3,
     extra_degrees_of_freedom=2,
+    is_tuned=True,
     depends_on_time=True,
     similar_to="delay, clock-skew, sensor-lag, resonance",
     distinguished_by="a residual proportional to the rate of the output, with a factor that swings over time",

@@ -235,8 +235,12 @@ def analyse_residual(fit: CalibrationResult, target: Target, rng: np.random.Gene
 
 
 def _may_have_causes(base: CalibrationResult, target: Target, effects: Sequence[Effect]) -> bool:
-    """Return whether linear responses to the effects explain more of the residual than of noise."""
-    selection = ForwardSelection(base, target, effects, MAX_EFFECTS + 1)
+    """Return whether linear responses to the effects explain more of the residual than of noise.
+
+    Responses that are fitted to the residual are left out: they explain more of it than of its surrogates.
+    """
+    given = [each for each in effects if not each.is_tuned]
+    selection = ForwardSelection(base, target, given, MAX_EFFECTS + 1)
     return selection.compute_gain() > selection.compute_chance_gain(CHANCE_PROBABILITY)
 
 

@@ -77,6 +77,9 @@ class Effect:
     is_free : bool
         Whether the effect is a free form, which has any shape of its family. It has one starting point for
         each coefficient, and its calibration starts from their best combination.
+    is_tuned : bool
+        Whether its starting points are fitted to the residual over two numbers or more, so that they explain
+        a part of any noise.
     depends_on_time : bool
         Whether it is a function of the time of the record, so that it says nothing about another record.
     special_cases : tuple of str
@@ -114,6 +117,7 @@ class Effect:
     acts_between_samples: bool = False
     is_gain: bool = False
     is_free: bool = False
+    is_tuned: bool = False
     depends_on_time: bool = False
     special_cases: tuple[str, ...] = ()
     extra_degrees_of_freedom: int = 0

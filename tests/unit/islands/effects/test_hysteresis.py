@@ -1,4 +1,4 @@
-"""Play of a sensor, which is told from a play of the drive."""
+"""Play of a sensor, and of the drive."""
 
 import numpy as np
 import pytest
