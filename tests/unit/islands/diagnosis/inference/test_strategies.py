@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
@@ -85,3 +86,20 @@ def test_model_error_reduces_the_effective_sample_size(assessed) -> None:
     assert 10.0 <= outcome.target.effective_samples < fitted
     assert outcome.base.noise.order == 0
     assert outcome.base.noise.effective_samples == outcome.target.effective_samples
+
+
+def test_lines_that_are_fitted_to_noise_do_not_make_it_model_error() -> None:
+    """They explain more of it than of its surrogates, so that coloured residuals would be searched."""
+    rng = np.random.default_rng(4)
+    u, noise = (lfilter([1.0], [1.0, -pole], rng.standard_normal(600)) for pole in (0.8, 0.9))
+    record = recorded(u, lfilter([0.0, 0.1], [1.0, -0.9], u) + 0.1 * noise, 0.1, ("V", "V"))
+    core = make_simulator("linear:1", record)
+    fitted = count_fitted_samples(record)
+    simulation = ExtendedSimulator(core, (), make_context(record, core, fitted))
+    target = make_target(record, fitted, {})
+    base = calibrate(simulation, target, simulation.nominal)
+    effects = [CATALOGUE[name] for name in ("swept-disturbance", "swept-interference", "varying-delay")]
+    assert all(each.is_tuned for each in effects)
+    run = DiagnosisRun(effects)
+    outcome = search_with_model_error(base, target, run)
+    assert (outcome.screened, outcome.hypothesis.effects) == ((), ())
