@@ -60,33 +60,40 @@ def _starting_points(
 ) -> tuple[tuple[float, ...], ...]:
     fitted = round(context.fit_end_time / context.dt)
     residual = residual[:fitted] - residual[:fitted].mean()
-    response = None
+    size = float(np.max(np.abs(residual)))  # Squares of very large or small numbers are not finite, or zero.
+    if not size > 0.0:
+        return ()
+    response, unit = None, size
     if site == Site.INPUT:
         assert context.measured is not None
-        response = compute_response(context.u[:fitted], context.measured[:fitted] - residual)
+        unit = context.input_peak or 1.0
+        simulated = context.measured[:fitted] - residual
+        response = compute_response(context.u[:fitted] / unit, simulated / size)
         if not response.any():
             return ()
+    residual = residual / size
     found = find_sweep(residual, response, MIN_CHANGE)
-    return () if found is None else (_fit_amplitudes(found, residual, response, context.dt),)
+    if found is None:
+        return ()
+    cosine, sine = _fit_amplitudes(found, residual, response)
+    frequency, rate = found.frequency / context.dt, found.rate / context.dt**2
+    return ((cosine * unit, sine * unit, frequency, rate),)
 
 
-def _fit_amplitudes(
-    sweep: SweptLine, residual: Signal, response: Signal | None, dt: float
-) -> tuple[float, float, float, float]:
-    """Return a sweep with the amplitudes of its cosine and its sine that explain most of the residual."""
-    frequency, rate = sweep.frequency / dt, sweep.rate / dt**2
-    waves: Iterable[Signal] = _make_waves(frequency, rate, 0.0, dt, residual.size)
+def _fit_amplitudes(sweep: SweptLine, residual: Signal, response: Signal | None) -> tuple[float, float]:
+    """Return the amplitudes of the cosine and the sine of a sweep that explain most of the residual."""
+    waves: Iterable[Signal] = _make_waves(sweep.frequency, sweep.rate, 0.0, 1.0, residual.size)
     if response is not None:
         waves = [respond(wave, response) for wave in waves]
     cosine, sine = np.linalg.lstsq(np.column_stack(list(waves)), residual, rcond=None)[0]
-    return float(cosine), float(sine), frequency, rate
+    return float(cosine), float(sine)
 
 
 def _has_many_lines(context: SimulationContext) -> bool:
     """Return whether the input is not a single line, whose distortions would look like another one."""
     fitted = round(context.fit_end_time / context.dt)
     u = context.u[:fitted] - context.u[:fitted].mean()
-    return context.measured is not None and measure_line(u) < MAX_LINE_POWER
+    return context.measured is not None and measure_line(u / (context.input_peak or 1.0)) < MAX_LINE_POWER
 
 
 _EQUATION = f"x + n0*cos({2 * np.pi}*(n2 + 0.5*n3*t)*t) + n1*sin({2 * np.pi}*(n2 + 0.5*n3*t)*t)"

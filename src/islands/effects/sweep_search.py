@@ -119,9 +119,8 @@ def _find_line(signal: Signal, energy: Signal, count: int, sweeps: Iterable[floa
             for edge in (np.minimum, np.maximum)
         )
         mean = (sums[last + 1] - sums[first]) / (last + 1 - first)
-        power = np.where(
-            mean > MIN_RESPONSE * energy.max(), line / np.maximum(mean, np.finfo(float).tiny), 0.0
-        )
+        is_visible = mean > MIN_RESPONSE * energy.max()
+        power = np.where(is_visible, line / np.where(is_visible, mean, 1.0), 0.0)
         place = int(np.argmax(power))
         # A line of amplitude a has the power a^2/2 in each sample, and a length/2 in the spectrum.
         if power[place] > 0.0 and (best is None or 2.0 * power[place] / length > best.power):

@@ -93,9 +93,10 @@ def _varying_delay_starting_points(
     The residual is that rate times minus the delay, as far as the delay is short for the output.
     """
     fitted = round(context.fit_end_time / context.dt)
-    residual = residual[:fitted]
     assert context.measured is not None
-    simulated = context.measured[:fitted] - residual
+    simulated = context.measured[:fitted] - residual[:fitted]
+    size = float(np.max(np.abs(simulated))) or 1.0
+    simulated, residual = simulated / size, residual[:fitted] / size
     rate = np.gradient(simulated, context.dt)
     absorbed, _ = np.linalg.qr(np.column_stack([np.ones(fitted), simulated, rate]))
     residual = residual - absorbed @ (absorbed.T @ residual)
@@ -106,9 +107,10 @@ def _varying_delay_starting_points(
     products = np.einsum("tsi,t->si", columns, residual)
     weights = (np.linalg.pinv(np.einsum("tsi,tsj->sij", columns, columns)) @ products[:, :, None])[:, :, 0]
     place = int(np.argmax(np.sum(weights * products, axis=1)))
-    best = (*weights[place], swings[place] / context.fit_end_time)
-    amplitude = float(np.hypot(best[0], best[1]))
-    return tuple((part * amplitude, *map(float, best)) for part in _SWING_MEANS)
+    most = _delay_parameters(context)[0].upper / max(_SWING_MEANS)
+    cosine, sine = np.clip(weights[place], -most / 2, most / 2).tolist()
+    frequency, amplitude = float(swings[place]) / context.fit_end_time, float(np.hypot(cosine, sine))
+    return tuple((part * amplitude, cosine, sine, frequency) for part in _SWING_MEANS)
 
 
 VARYING_DELAY = Effect(
