@@ -105,6 +105,9 @@ def _backlash_starting_points(context: SimulationContext, _residual: Signal) -> 
     return tuple((part * context.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
 
 
+#: Formula of a play of an input or of an output.
+_PLAY = Formula("play(x, b)", note="play({x}, {b}) is a play of half width {b}")
+
 BACKLASH = Effect(
     name="backlash",
     title="backlash of the input",
@@ -115,7 +118,7 @@ BACKLASH = Effect(
     starting_points=_backlash_starting_points,
     form=_backlash_form,
     equation=lambda _: MapEquation("z0", (("play", "n0"),)),
-    formula=Formula("play(x, b)", note="play({x}, {b}) is a play of half width {b}"),
+    formula=_PLAY,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),
     similar_to="stiction, coulomb-friction, exponential-creep",
@@ -137,6 +140,7 @@ def _sensor_hysteresis_starting_points(
 
 SENSOR_HYSTERESIS = Effect(
     name="sensor-hysteresis",
+    title="play of the sensor",
     summary="Hysteresis of the sensor: the output has a play of half width b",
     family="memory",
     site=Site.OUTPUT,
@@ -144,6 +148,7 @@ SENSOR_HYSTERESIS = Effect(
     starting_points=_sensor_hysteresis_starting_points,
     form=_backlash_form,
     equation=lambda _: MapEquation("z0", (("play", "n0"),)),
+    formula=_PLAY,
     linear_parameters=0,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     similar_to="backlash, output-memory, coulomb-friction",

@@ -7,6 +7,7 @@ import numpy as np
 
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
+from islands.effects.interface.formula import Formula
 from islands.effects.interface.input_spectrum import LINE_WIDTH
 from islands.effects.interface.map_equation import MapEquation
 from islands.effects.sweep_search import SweptLine, compute_response, find_sweep, measure_line, respond
@@ -97,10 +98,12 @@ def _has_many_lines(context: SimulationContext) -> bool:
 
 
 _EQUATION = f"x + n0*cos({2 * np.pi}*(n2 + 0.5*n3*t)*t) + n1*sin({2 * np.pi}*(n2 + 0.5*n3*t)*t)"
+_FORMULA = Formula("x + a*cos(2*pi*(f + r*t/2)*t) + b*sin(2*pi*(f + r*t/2)*t)", symbols=("a", "b", "f", "r"))
 _SOURCE = "Djuric and Kay, Parameter estimation of chirp signals, 1990"
 
 SWEPT_DISTURBANCE = Effect(
     name="swept-disturbance",
+    title="disturbance that sweeps, at the input",
     summary="Disturbance that acts where the input does, with a frequency that changes at a constant rate",
     family="disturbance",
     site=Site.INPUT,
@@ -108,6 +111,7 @@ SWEPT_DISTURBANCE = Effect(
     starting_points=partial(_starting_points, site=Site.INPUT),
     form=_form,
     equation=lambda _: MapEquation(_EQUATION),
+    formula=_FORMULA,
     source=_SOURCE,
     is_applicable=_has_many_lines,
     linear_parameters=2,
@@ -121,6 +125,7 @@ SWEPT_DISTURBANCE = Effect(
 
 SWEPT_INTERFERENCE = Effect(
     name="swept-interference",
+    title="interference that sweeps, at the output",
     summary="Disturbance that is added to the output, with a frequency that changes at a constant rate",
     family="disturbance",
     site=Site.OUTPUT,
@@ -128,6 +133,7 @@ SWEPT_INTERFERENCE = Effect(
     starting_points=partial(_starting_points, site=Site.OUTPUT),
     form=_form,
     equation=lambda _: MapEquation(_EQUATION),
+    formula=_FORMULA,
     source=_SOURCE,
     is_applicable=_has_many_lines,
     linear_parameters=2,

@@ -115,6 +115,7 @@ def _varying_delay_starting_points(
 
 VARYING_DELAY = Effect(
     name="varying-delay",
+    title="delay of the input that swings",
     summary="The delay of the input swings about its mean: u(t - mean - a cos(2 pi f t) - b sin(2 pi f t))",
     family="timing",
     site=Site.INPUT,
@@ -122,6 +123,7 @@ VARYING_DELAY = Effect(
     starting_points=_varying_delay_starting_points,
     form=_varying_delay_form,
     equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0", "n1", "n2", "n3"),)),
+    formula=Formula("at(x, t - tau - a*cos(2*pi*f*t) - b*sin(2*pi*f*t))", symbols=("tau", "a", "b", "f")),
     source="Ljung, System Identification, 2nd ed., section 16",
     is_applicable=lambda context: context.measured is not None,
     linear_parameters=3,
@@ -282,6 +284,7 @@ def _growing_lag_starting_points(
 
 GROWING_LAG = Effect(
     name="growing-lag",
+    title="lag of the sensor that grows with its error",
     summary="Lag of the sensor that grows with its error e = v - y: y' = e/(tau + inverse_rate |e|)",
     family="timing",
     site=Site.OUTPUT,
@@ -289,6 +292,7 @@ GROWING_LAG = Effect(
     starting_points=_growing_lag_starting_points,
     form=_growing_lag_form,
     equation=lambda _: MapEquation("z0", (("lag-by-gap", "n0", "n1"),)),
+    formula=Formula("y", symbols=("tau", "r"), states=(("y", "(x - y)/(tau + r*abs(x - y))"),)),
     source="Isermann, Fault-Diagnosis Applications, section 5",
     linear_parameters=0,
     similar_to="sensor-lag, rate-limit, output-lag-curve",
