@@ -23,7 +23,7 @@ _MARGIN = 1.35
 _CELL = 0.26
 
 #: Font size of names and numbers per inch of cell width, in points.
-_FONT_SIZE_PER_INCH = 46.0
+_FONT_SIZE_PER_INCH = 48.0
 
 #: Largest font size of names and numbers, in points.
 _MAX_FONT_SIZE = 8.0

@@ -23,7 +23,7 @@ function formatConfidence(value) {
   return value < 0.005 ? "below 0.01" : value.toFixed(2);
 }
 
-/** Write the plain name of a cause, then that of the program; results of earlier versions have the last alone. */
+/** Write the plain name of a cause, then that of the program, which earlier versions have alone. */
 function makeName(name, place, titles) {
   const title = titles[place ? `${name}:${place}` : name];
   return title ? [`${title} `, el("code", {}, name)] : [name];

@@ -31,6 +31,7 @@ from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import ResidualStructure
 from support.assessments import with_changes
 from support.identifications import two_inputs
+from support.noisy_records import make_noisy_record
 from support.searches import record
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 17")
@@ -513,3 +514,17 @@ def test_an_empty_estimator_is_named_in_the_settings(findings):
     chosen = replace(findings, settings=dict(findings.settings) | {"estimator": "", "own_primitives": {}})
     assert "estimator by validation," in " ".join(method_text(chosen).split())
     assert "own_primitives" not in method_text(chosen)
+
+
+def test_advice_about_a_saturated_output_names_the_class_of_models_with_a_limit():
+    data = make_noisy_record("output", 1, 400)
+    limit = float(np.quantile(data.y, 0.9))
+    settings = {"library": "polynomial", "degree": 2, "lags": 1, "max_terms": 3, "average": 1}
+    free, limited = (
+        result_document(islands.fit(each, certificate=0, **settings).search_result)
+        for each in (data, replace(data, y=np.minimum(data.y, limit)))
+    )
+    assert free["data"]["output_limits"] == [None, None]
+    assert limited["data"]["output_limits"] == [None, limit]
+    assert "sensor-limits" not in statements.name_statements(free)
+    assert "sensor-limits" in statements.name_statements(limited)
