@@ -174,10 +174,10 @@ def _list_values(document: Document) -> list[tuple[str, ...]]:
     """Return the values of each parameter of the simulation."""
     return [
         (
-            each["name"],
+            each["name"] if each["unit"] in ("", "1") else f"{each['name']} ({each['unit']})",
             f"{each['before']:.4g}",
             "" if each["alone"] is None else f"{each['alone']:.4g}",
-            write_value(each),
+            write_value({**each, "unit": ""}),
         )
         for each in document["values"]
     ]
