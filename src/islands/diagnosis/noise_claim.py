@@ -8,7 +8,7 @@ import numpy as np
 from islands.diagnosis.calibrated_values import list_calibrated_values
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.coloured_remainder import limit_confidences
+from islands.diagnosis.confidence_limits import limit_confidences
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.diagnosis.inference.hidden_structure import find_hidden_structure

@@ -1,4 +1,4 @@
-"""Certainty of a name next to a coloured remainder, which may have another cause."""
+"""Certainty of a name that a further record may refute: a coloured remainder, or values that are open."""
 
 from dataclasses import replace
 
@@ -7,13 +7,15 @@ import pytest
 
 import islands
 from islands.diagnosis.calibration.preparation import make_target
-from islands.diagnosis.coloured_remainder import (
+from islands.diagnosis.confidence_limits import (
     MAX_CONFIDENCE,
     MAX_CONFIDENCE_WITHOUT_GAIN,
     limit_confidences,
 )
 
-LAG = tuple(each for each in islands.EFFECTS if each.name == "sensor-lag")
+LAG, STICTION = (
+    tuple(each for each in islands.EFFECTS if each.name == name) for name in ("sensor-lag", "stiction")
+)
 DT, PROCESS, SENSOR = 0.1, 2.0, 0.6
 
 
@@ -51,3 +53,19 @@ def test_an_extension_without_gain_and_with_coloured_rest_is_not_offered():
     limited = limit_confidences(lost, make_target(lost.record, lost.estimation_samples, {}))
     assert [each.confidence for each in limited.causes] == [MAX_CONFIDENCE_WITHOUT_GAIN]
     assert "not reduce the error on the hold-out part" in limited.refusal
+
+
+@pytest.mark.ci
+def test_a_valve_that_sticks_behind_a_held_input_is_no_more_than_probable():
+    rng = np.random.default_rng(4)
+    held = np.repeat(rng.standard_normal(40), 25)
+    valve = np.zeros(held.size)
+    for k in range(1, held.size):
+        valve[k] = held[k] if abs(held[k] - valve[k - 1]) > 0.9 else valve[k - 1]
+    y = np.zeros(held.size)
+    for k in range(1, held.size):
+        y[k] = y[k - 1] + DT / PROCESS * (valve[k - 1] - y[k - 1])
+    record = islands.Dataset(held, y + 0.005 * rng.standard_normal(y.size), DT)
+    found = islands.diagnose(record, "linear:1", effects=STICTION)
+    assert found.claimed_names == ("stiction",)
+    assert found.causes[0].confidence == MAX_CONFIDENCE
