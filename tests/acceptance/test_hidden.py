@@ -180,7 +180,7 @@ def test_two_effects_are_both_named_with_a_recorded_output() -> None:
 
 
 @pytest.mark.parametrize(
-    "seconds", [pytest.param(12.0, marks=pytest.mark.ci), pytest.param(SECONDS, marks=nightly)]
+    "seconds", [pytest.param(14.0, marks=pytest.mark.ci), pytest.param(SECONDS, marks=nightly)]
 )
 def test_three_effects_are_all_named(seconds: float) -> None:
     injected = ("sensor-gain", "linear-drift", "thermal-drift")

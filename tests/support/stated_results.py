@@ -1,5 +1,6 @@
 """Results of many kinds of records, and every text that states something about them."""
 
+import re
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -142,8 +143,10 @@ def _list_texts_of_diagnosis(name: str, result: DiagnosisResult) -> Mapping[str,
         stored = islands.load(folder)
     if not isinstance(stored, islands.SavedDiagnosis) or stored.summary != result.summary:
         raise AssertionError(f"{name}: the folder states something else than the run")
-    shown = unescape(report)
-    if missing := [line for line in result.summary.splitlines() if line.strip() not in shown]:
+    shown = unescape(re.sub("</?code>", "`", report))
+    # The report has the equations as MathML.
+    lines = [line for line in result.summary.splitlines() if not line.startswith("Extended simulation:")]
+    if missing := [line for line in lines if line.strip() not in shown]:
         raise AssertionError(f"{name}: the report lacks {missing}")
     notebook = render_sentences(stored.summary.splitlines(), None, "")
     return {"summary": result.summary, "notebook": unescape(notebook), "report": shown}

@@ -19,6 +19,12 @@ from support.noise_records import (
     respond,
 )
 
+#: Effects without those that describe an actuator that jumps, and without those whose frequency changes.
+WITHOUT_JUMPS, WITHOUT_SWEEPS = (
+    tuple(each for each in islands.EFFECTS if each.name not in names)
+    for names in (("quantised-input", "stiction"), ("swept-disturbance", "swept-interference"))
+)
+
 
 @pytest.mark.parametrize("level", [0.0, -1.0, np.inf, np.nan])
 def test_noise_level_is_positive_and_finite(level: float) -> None:
@@ -73,22 +79,33 @@ def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
 )
-def test_quantised_actuator_is_no_noise(seed: int) -> None:
-    found = islands.diagnose(make_quantised_actuator(seed), "linear:2")
+def test_an_error_over_the_input_without_a_name_is_no_noise(seed: int) -> None:
+    found = islands.diagnose(make_quantised_actuator(seed), "linear:2", effects=WITHOUT_JUMPS)
     assert found.verdict == Verdict.UNKNOWN
     assert "fine map of the input" in found.residual_structure
     assert "fine map of the input" in found.summary
-    stated = islands.diagnose(make_quantised_actuator(seed), "linear:2", noise_level=SENSOR)
+    stated = islands.diagnose(
+        make_quantised_actuator(seed), "linear:2", effects=WITHOUT_JUMPS, noise_level=SENSOR
+    )
     assert stated.verdict == Verdict.UNKNOWN
     assert "above-noise-level" in [each.name for each in stated.record_findings]
 
 
 @pytest.mark.ci
 @pytest.mark.parametrize("seed", range(3))
-def test_swept_force_is_unknown(seed: int) -> None:
-    found = islands.diagnose(make_swept_force(seed), "linear:2")
+def test_a_line_that_moves_is_a_disturbance_with_a_name_or_unknown(seed: int) -> None:
+    record = make_swept_force(seed)
+    assert islands.diagnose(record, "linear:2").claimed_names[0] == "swept-disturbance"
+    found = islands.diagnose(record, "linear:2", effects=WITHOUT_SWEEPS)
     assert found.verdict == Verdict.UNKNOWN
     assert "moving frequency" in found.residual_structure
+
+
+@pytest.mark.ci
+def test_an_actuator_that_moves_in_steps_has_a_name() -> None:
+    found = islands.diagnose(make_quantised_actuator(0), "linear:2")
+    assert found.claimed_names[0] == "quantised-input"
+    assert found.causes[0].parameters["step"].value == pytest.approx(0.6, rel=0.02)
 
 
 @pytest.mark.parametrize(
