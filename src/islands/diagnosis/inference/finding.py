@@ -353,7 +353,8 @@ def _scale_values(
 def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
     """Return the values of an effect with their confidence intervals, given all standard deviations.
 
-    Initial states of recordings after the first are left out.
+    Initial states of recordings after the first are left out. Values that jump have no derivative, from which
+    an interval could be computed.
     """
     part = fit.simulation.get_slice(effect)
     values = {}
@@ -361,5 +362,9 @@ def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> M
         if fit.simulation.is_copy[index]:
             continue
         parameter, value = fit.simulation.parameters[index], float(fit.values[index])
-        values[parameter.name] = Value.estimate(value, parameter.unit, float(deviations[index]))
+        values[parameter.name] = (
+            Value.estimate(value, parameter.unit, float(deviations[index]))
+            if effect.centre is None
+            else Value(value, parameter.unit, None)
+        )
     return values
