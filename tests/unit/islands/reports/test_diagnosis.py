@@ -61,16 +61,18 @@ def test_report_typesets_the_extended_simulation_and_states_its_values(diagnosis
 
 @pytest.mark.ci
 def test_figures_are_drawn_by_the_map_and_keep_the_order_of_the_report(diagnosis: Diagnosis) -> None:
-    drawn: list[str] = []
+    figures: dict[str, Any] = {}
 
     def draw_backwards(function: Callable[[Any], Any], names: Iterable[Any], /) -> Iterator[Any]:
-        drawn.extend(names)
-        figures = {name: function(name) for name in reversed(drawn)}
-        return iter([figures[name] for name in drawn])
+        order = list(names)
+        figures.update((name, function(name)) for name in reversed(order))
+        return iter([figures[name] for name in order])
 
-    report = diagnosis_report(Origin("record"), diagnosis, parallel_map=draw_backwards)
-    assert drawn == ["over-time", "residual", "ladder"]
-    assert report == diagnosis_report(Origin("record"), diagnosis)
+    report = diagnosis_report(Origin("record"), diagnosis, parallel_map=draw_backwards).decode()
+    assert sorted(figures) == ["ladder", "over-time", "residual"]
+    # Identifiers of clip paths in a figure depend on the addresses of objects.
+    places = [report.index(str(figures[name])) for name in ("over-time", "residual", "ladder")]
+    assert places == sorted(places)
 
 
 @pytest.mark.ci
