@@ -16,6 +16,9 @@ _MAX_BREAKAWAY = 0.6
 #: Breakaway distances of a held input that are compared, and most of those with different responses.
 _BREAKAWAYS, _MAX_STARTS = np.linspace(0.01, _MAX_BREAKAWAY, 119), 40
 
+#: Starting points of the half width of a play, relative to the peak of its signal.
+_HALF_WIDTHS = (0.005, 0.0175, 0.05, 0.125)
+
 
 def is_held(signal: Signal) -> bool:
     """Return whether a signal is constant for most of the time, and jumps between two samples."""
@@ -102,7 +105,7 @@ def _backlash_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
 
 
 def _backlash_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * context.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
+    return tuple((part * context.input_peak,) for part in _HALF_WIDTHS)
 
 
 #: Formula of a play of an input or of an output.
@@ -135,7 +138,7 @@ def _sensor_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter
 def _sensor_hysteresis_starting_points(
     context: SimulationContext, _residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * context.output_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
+    return tuple((part * context.output_peak,) for part in _HALF_WIDTHS)
 
 
 SENSOR_HYSTERESIS = Effect(

@@ -1,6 +1,7 @@
 """Disturbances whose frequency changes at a constant rate, at the input and at the output."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -98,8 +99,6 @@ def _has_many_lines(context: SimulationContext) -> bool:
 
 
 _EQUATION = f"x + n0*cos({2 * np.pi}*(n2 + 0.5*n3*t)*t) + n1*sin({2 * np.pi}*(n2 + 0.5*n3*t)*t)"
-_FORMULA = Formula("x + a*cos(2*pi*(f + r*t/2)*t) + b*sin(2*pi*(f + r*t/2)*t)", symbols=("a", "b", "f", "r"))
-_SOURCE = "Djuric and Kay, Parameter estimation of chirp signals, 1990"
 
 SWEPT_DISTURBANCE = Effect(
     name="swept-disturbance",
@@ -111,8 +110,10 @@ SWEPT_DISTURBANCE = Effect(
     starting_points=partial(_starting_points, site=Site.INPUT),
     form=_form,
     equation=lambda _: MapEquation(_EQUATION),
-    formula=_FORMULA,
-    source=_SOURCE,
+    formula=Formula(
+        "x + a*cos(2*pi*(f + r*t/2)*t) + b*sin(2*pi*(f + r*t/2)*t)", symbols=("a", "b", "f", "r")
+    ),
+    source="Djuric and Kay, Parameter estimation of chirp signals, 1990",
     is_applicable=_has_many_lines,
     linear_parameters=2,
     extra_degrees_of_freedom=4,
@@ -123,23 +124,14 @@ SWEPT_DISTURBANCE = Effect(
     occurs_in="force or torque of a neighbouring machine that runs up or down, through a common frame",
 )
 
-SWEPT_INTERFERENCE = Effect(
+SWEPT_INTERFERENCE = replace(
+    SWEPT_DISTURBANCE,
     name="swept-interference",
     title="interference that sweeps, at the output",
     summary="Disturbance that is added to the output, with a frequency that changes at a constant rate",
-    family="disturbance",
     site=Site.OUTPUT,
     parameters=_output_parameters,
     starting_points=partial(_starting_points, site=Site.OUTPUT),
-    form=_form,
-    equation=lambda _: MapEquation(_EQUATION),
-    formula=_FORMULA,
-    source=_SOURCE,
-    is_applicable=_has_many_lines,
-    linear_parameters=2,
-    extra_degrees_of_freedom=4,
-    is_tuned=True,
-    depends_on_time=True,
     similar_to="swept-disturbance, periodic-disturbance, coloured noise",
     distinguished_by="a line that moves and has the same amplitude at all frequencies",
     occurs_in="cables near the inverter of a drive that runs up or down, vibration of a sensor mount",
