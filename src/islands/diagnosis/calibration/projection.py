@@ -1,6 +1,7 @@
 """Projection of responses: what the parameters of a calibrated simulation cannot reproduce."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, prior_precision
 from islands.diagnosis.calibration.problem import DIFFERENCE_STEP
@@ -13,9 +14,18 @@ class Projection:
 
     The parameters act through their linearised, whitened responses. The prior of each parameter is one more
     observation.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+    target : Target
+    is_fixed : ndarray, shape (parameters,), optional
+        Parameters that reproduce nothing.
     """
 
-    def __init__(self, base: CalibrationResult, target: Target) -> None:
+    def __init__(
+        self, base: CalibrationResult, target: Target, is_fixed: NDArray[np.bool_] | None = None
+    ) -> None:
         simulation, values = base.simulation, base.values
         self._target, self._values = target, values.size
         self._sigma = float(np.std(target.residual(base.output))) or 1.0
@@ -30,7 +40,7 @@ class Projection:
             prior[index] = inverse_std[index] * scale
             response = (moved - base.output) / DIFFERENCE_STEP
             # A simulation that is almost unstable diverges for some changes, and has no response to them.
-            if not np.isfinite(response).all():
+            if not np.isfinite(response).all() or (is_fixed is not None and is_fixed[index]):
                 continue
             # The estimation part does not depend on the initial states of recordings in the hold-out part; an
             # orthogonal basis of columns that are zero would contain arbitrary directions.

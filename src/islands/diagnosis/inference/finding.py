@@ -11,6 +11,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     estimate_deviations,
 )
+from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.confidence import (
     ScoredAlternative,
     compute_confidence,
@@ -19,6 +20,7 @@ from islands.diagnosis.inference.confidence import (
 )
 from islands.diagnosis.inference.confounders import Confounder, find_confounder
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, find_alternatives
+from islands.diagnosis.inference.jump_intervals import find_jump_intervals
 from islands.diagnosis.inference.resemblance import Resemblance, describe_curve_signal, find_resemblance
 from islands.diagnosis.inference.screening import ScreenedEffect, bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome
@@ -198,7 +200,7 @@ def _describe_effect(
     fit = hypothesis.fit
     screened = _list_screened(effect, alternatives, outcome)
     scored = _score_causes(effect, without.cost - hypothesis.cost, screened, outcome, rival)
-    named_effect, values = effect, _get_values(fit, effect, deviations)
+    named_effect, values = effect, _get_values(fit, effect, deviations, target)
     if (confounder := find_confounder(fit, effect, target)) is not None:
         score = scored[effect.cause].score + confounder.score_gain
         scored[confounder.effect.cause] = ScoredAlternative(score, None)
@@ -350,21 +352,24 @@ def _scale_values(
     return scaled
 
 
-def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
+def _get_values(
+    fit: CalibrationResult, effect: Effect, deviations: Signal, target: Target
+) -> Mapping[str, Value]:
     """Return the values of an effect with their confidence intervals, given all standard deviations.
 
-    Initial states of recordings after the first are left out. Values that jump have no derivative, from which
-    an interval could be computed.
+    Initial states of recordings after the first are left out. Values that jump have no derivative, and
+    intervals of the likelihood.
     """
     part = fit.simulation.get_slice(effect)
+    intervals = find_jump_intervals(fit, effect, target) if effect.centre is not None else None
     values = {}
-    for index in range(part.start, part.stop):
+    for place, index in enumerate(range(part.start, part.stop)):
         if fit.simulation.is_copy[index]:
             continue
         parameter, value = fit.simulation.parameters[index], float(fit.values[index])
-        values[parameter.name] = (
-            Value.estimate(value, parameter.unit, float(deviations[index]))
-            if effect.centre is None
-            else Value(value, parameter.unit, None)
-        )
+        if effect.centre is None:
+            found = Value.estimate(value, parameter.unit, float(deviations[index]))
+        else:
+            found = Value(value, parameter.unit, intervals[place] if intervals else None)
+        values[parameter.name] = found
     return values

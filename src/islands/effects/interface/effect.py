@@ -66,8 +66,8 @@ class Effect:
         each value. Calibration moves along such a limit and not beyond it, where derivatives would be zero.
     centre : callable or None
         ``(values, context) -> values``: the middle of the values with the same response to the input of the
-        estimation part, for a map that jumps. Another input tells such values apart. None if every change of
-        a value changes the response.
+        estimation part, for a map that jumps. Another input tells such values apart. The first value is a
+        width, the others are distances. None if every change of a value changes the response.
     acts_between_samples : bool
         Whether a map of the input acts on each value by itself. In continuous time it is then applied to the
         interpolated input: a dead zone or a limit is not reached at a sample, but between two of them.
