@@ -2,6 +2,7 @@
 
 from islands.diagnosis.calibration.levenberg_marquardt import estimate_deviations, whiten_target
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.state_equations import get_linear
 from islands.diagnosis.inference.finding import Value
 from islands.diagnosis.result import CalibratedValue, Diagnosis
 
@@ -32,6 +33,7 @@ def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[Calibrated
         parameter.name: float(value)
         for parameter, value in zip(base.simulation.parameters[known], base.values[known], strict=True)
     }
+    is_replaced = get_linear(base) is not None and get_linear(fit) is None
     terms = {name for each in found.causes if each.term for name in each.parameters}
     values = []
     for place, parameter in enumerate(parameters, part.start):
@@ -43,5 +45,8 @@ def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[Calibrated
             if deviations is None
             else Value.estimate(value, unit, float(deviations[place]))
         )
-        values.append(CalibratedValue(parameter.name, parameter.nominal, alone.get(parameter.name), estimate))
+        before, value_alone = parameter.nominal, alone.get(parameter.name)
+        # The nominal values of equations in place of a linear simulation are those of its calibration.
+        ends = (None, before) if is_replaced else (before, value_alone)
+        values.append(CalibratedValue(parameter.name, *ends, estimate))
     return tuple(values)

@@ -64,8 +64,9 @@ class CalibratedValue:
     Attributes
     ----------
     name : str
-    before : float
-        Value before the calibration: the given one, or an estimate.
+    before : float or None
+        Value before the calibration: the given one, or an estimate. None of equations that take the place of
+        a linear simulation.
     alone : float or None
         Value calibrated without effects; None if the simulation without them has no such parameter.
     estimate : Value
@@ -73,7 +74,7 @@ class CalibratedValue:
     """
 
     name: str
-    before: float
+    before: float | None
     alone: float | None
     estimate: Value
 

@@ -175,8 +175,7 @@ def _list_values(document: Document) -> list[tuple[str, ...]]:
     return [
         (
             each["name"] if each["unit"] in ("", "1") else f"{each['name']} ({each['unit']})",
-            f"{each['before']:.4g}",
-            "" if each["alone"] is None else f"{each['alone']:.4g}",
+            *("" if each[name] is None else f"{each[name]:.4g}" for name in ("before", "alone")),
             write_value({**each, "unit": ""}),
         )
         for each in document["values"]
