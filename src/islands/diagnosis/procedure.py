@@ -193,16 +193,18 @@ def _find_causes(
     interim.reach(EVIDENCE)
     run.progress("analysing the residual")
     outcome = interim.keep_outcome(base, assess_evidence(outcome, run), run.effects, step=MODEL_ERROR)
-    is_unknown = outcome.verdict == Verdict.UNKNOWN
-    is_noise = outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
-    if is_noise or (is_unknown and not explain_all(base, target, run, seed)):
-        second = assess_evidence(search_with_model_error(base, target, run), run)
-        outcome = second if second.verdict != Verdict.UNKNOWN else outcome
-    interim.keep_outcome(base, outcome, run.effects, step=FREE_FORMS)
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
     is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
+    inner = outcome if is_clean else search_inner_effects(outcome, base, target, run)
+    if not inner.leaves_white_noise:
+        is_noise = outcome.verdict == Verdict.NOTHING and not is_clean
+        is_unknown = outcome.verdict == Verdict.UNKNOWN
+        if is_noise or (is_unknown and not explain_all(base, target, run, seed)):
+            second = assess_evidence(search_with_model_error(base, target, run), run)
+            if second.verdict != Verdict.UNKNOWN:
+                outcome, inner = second, search_inner_effects(second, base, target, run)
+    interim.keep_outcome(base, outcome, run.effects, step=FREE_FORMS)
     if not is_clean:
-        inner = search_inner_effects(outcome, base, target, run)
         if inner is not outcome:
             base, outcome = calibrate(inner.base.simulation, target, inner.base.values), inner
             found_effects = outcome.hypothesis.effects
