@@ -24,10 +24,20 @@ MIN_NONLINEAR_GAIN = 1.1
 
 
 class RankedTerm(NamedTuple):
-    """A term, and estimates of its coefficient at which it explains more than its linear response."""
+    """A term, as far as its responses explain the residual.
+
+    Attributes
+    ----------
+    term : CandidateTerm
+    coefficients : tuple of float
+        Estimates of its coefficient at which it explains more than its linear response.
+    promise : float
+        Largest decrease of minus twice the log-likelihood that its responses promise.
+    """
 
     term: CandidateTerm
     coefficients: tuple[float, ...]
+    promise: float
 
 
 def rank_terms(
@@ -98,11 +108,17 @@ def rank_terms(
     explained = found[:, :, :2].max(axis=2)
     rank = np.argsort(np.argsort(-explained, axis=1, kind="stable"), axis=1).min(axis=0)
     ranked = []
+    squares = [float(each.residual @ each.residual) for each in projections]
     for index in np.argsort(rank, kind="stable"):
         if explained[:, index].max() > 0.0:
             chosen = found[:, index]
             is_other = chosen[:, 1] > MIN_NONLINEAR_GAIN * chosen[:, 0]
-            ranked.append(RankedTerm(candidates[index], tuple(chosen[is_other, 2].tolist())))
+            promises = [
+                projection.score_decrease(whole - part)
+                for projection, whole, part in zip(projections, squares, explained[:, index], strict=True)
+            ]
+            coefficients = tuple(chosen[is_other, 2].tolist())
+            ranked.append(RankedTerm(candidates[index], coefficients, max(promises)))
     return ranked
 
 
