@@ -23,7 +23,12 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
 from islands.diagnosis.discovery.form_search import compare_with_free_forms
 from islands.diagnosis.discovery.inner_effects import list_effects, search_inner_effects
-from islands.diagnosis.discovery.missing_terms import explain_all, find_missing_terms, replaces_effects
+from islands.diagnosis.discovery.missing_terms import (
+    TermSearches,
+    explain_all,
+    find_missing_terms,
+    replaces_effects,
+)
 from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.diagnosis.gross_errors.record_finding import describe_extrapolation, describe_gaps
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
@@ -196,10 +201,11 @@ def _find_causes(
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
     is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
     inner = outcome if is_clean else search_inner_effects(outcome, base, target, run)
+    searches = TermSearches(base, target, run)
     if not inner.leaves_white_noise:
         is_noise = outcome.verdict == Verdict.NOTHING and not is_clean
-        is_unknown = outcome.verdict == Verdict.UNKNOWN
-        if is_noise or (is_unknown and not explain_all(base, target, run, seed)):
+        is_open = is_noise or outcome.verdict == Verdict.UNKNOWN
+        if is_open and not explain_all(searches, seed, is_noise):
             second = assess_evidence(search_with_model_error(base, target, run), run)
             if second.verdict != Verdict.UNKNOWN:
                 outcome, inner = second, search_inner_effects(second, base, target, run)
@@ -209,13 +215,14 @@ def _find_causes(
             base, outcome = calibrate(inner.base.simulation, target, inner.base.values), inner
             found_effects = outcome.hypothesis.effects
             run = run.with_effects(list_effects(base.simulation.simulator, run, found_effects))
+            searches = TermSearches(base, target, run)
         run.progress("comparing with free forms")
         outcome = compare_with_free_forms(outcome, forms, run)
         found_forms = [form for form in forms if form in outcome.hypothesis.effects]
         run = run.with_effects([*run.effects, *found_forms])
     interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
     run.progress("searching for missing terms")
-    terms = interim.keep_terms(None if is_clean else find_missing_terms(base, outcome, target, run))
+    terms = interim.keep_terms(None if is_clean else find_missing_terms(searches, outcome, run))
     run.progress("alternatives to the named causes")
     found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):

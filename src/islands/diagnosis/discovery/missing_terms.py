@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -111,56 +112,82 @@ class MissingTerms:
         return self.discovery.worse_by >= margin
 
 
-def find_missing_terms(
-    base: CalibrationResult,
-    alone: SearchOutcome,
-    target: Target,
-    run: DiagnosisRun,
-) -> MissingTerms | None:
-    """Search for missing terms, and compare them with the effects of the catalogue.
+class TermSearches:
+    """Searches for terms in a simulation without effects, each of which runs once.
 
-    Effects in addition to the terms are searched for if a single effect does not explain the record as well.
     Terms of a linear simulation act at its output, or in its differential equations.
 
     Parameters
     ----------
     base : CalibrationResult
         The simulation without effects, calibrated to unweighted residuals.
-    alone : SearchOutcome
-        Outcome of the search for effects. If it has none, the nearest one is the best of those screened.
     target : Target
         Target of ``base``.
     run : DiagnosisRun
+    """
+
+    def __init__(self, base: CalibrationResult, target: Target, run: DiagnosisRun) -> None:
+        self.base, self.target, self.run = base, target, run
+        self._found: dict[CalibrationResult, TermSearchResult | None] = {}
+
+    @cached_property
+    def inner(self) -> list[CalibrationResult]:
+        """Differential equations of a linear simulation, calibrated."""
+        # The search moves the time constants, so that one order of the processes is enough.
+        return [calibrate_states(each, self.target) for each in list_state_fits(self.base, self.target)[:1]]
+
+    def restrict(self, run: DiagnosisRun, start: CalibrationResult) -> DiagnosisRun:
+        """Return a run for the terms of one of the simulations."""
+        return run if start is self.base else replace(run, has_inner_terms_only=True)
+
+    def search(self, start: CalibrationResult, least: float = np.inf) -> TermSearchResult | None:
+        """Search for terms in one of the simulations.
+
+        Parameters
+        ----------
+        least : float
+            Cost of another explanation; see `search_terms`. An earlier search may have more terms.
+        """
+        if start not in self._found:
+            self._found[start] = search_terms(start, self.target, self.restrict(self.run, start), least)
+        return self._found[start]
+
+
+def find_missing_terms(
+    searches: TermSearches, alone: SearchOutcome, run: DiagnosisRun
+) -> MissingTerms | None:
+    """Search for missing terms, and compare them with the effects of the catalogue.
+
+    Effects in addition to the terms are searched for if a single effect does not explain the record as well.
+
+    Parameters
+    ----------
+    searches : TermSearches
+    alone : SearchOutcome
+        Outcome of the search for effects. If it has none, the nearest one is the best of those screened.
+    run : DiagnosisRun
+        Run of the search for effects in addition to terms.
 
     Returns
     -------
     MissingTerms or None
         None if no term gains enough.
     """
-    first = _find_terms(base, alone, target, run)
+    first = _find_terms(searches, searches.base, alone, run)
     if alone.leaves_white_noise and not (first is not None and first.is_better(alone)):
         return first
-    inner = _list_inner_searches(base, target, run)
-    found = [first, *(_find_terms(start, alone, target, own) for start, own in inner)]
+    found = [first, *(_find_terms(searches, start, alone, run) for start in searches.inner)]
     known = [each for each in found if each is not None]
     return max(known, key=lambda each: (each.is_better(alone), -each.search.cost), default=None)
 
 
-def _list_inner_searches(
-    base: CalibrationResult, target: Target, run: DiagnosisRun
-) -> list[tuple[CalibrationResult, DiagnosisRun]]:
-    """Return the differential equations of a linear simulation, and the run of the search in them."""
-    # The search moves the time constants, so that one order of the processes is enough.
-    states = [calibrate_states(each, target) for each in list_state_fits(base, target)[:1]]
-    return [(each, replace(run, has_inner_terms_only=True)) for each in states]
-
-
 def _find_terms(
-    base: CalibrationResult, alone: SearchOutcome, target: Target, run: DiagnosisRun
+    searches: TermSearches, base: CalibrationResult, alone: SearchOutcome, run: DiagnosisRun
 ) -> MissingTerms | None:
     """Search for missing terms in one simulation."""
+    target, run = searches.target, searches.restrict(run, base)
     effects_alone = _score_effects(alone, base, target)
-    found = search_terms(base, target, run, effects_alone.cost)
+    found = searches.search(base, effects_alone.cost)
     tested = None
     if found is not None:
         # A delay instead of a term has to pass the tests of effects.
@@ -182,7 +209,7 @@ def _find_terms(
     return terms
 
 
-def explain_all(base: CalibrationResult, target: Target, run: DiagnosisRun, seed: int) -> bool:
+def explain_all(searches: TermSearches, seed: int, is_noise: bool) -> bool:
     """Return whether missing terms of a simulation without equations leave nothing but noise.
 
     Its terms are found in a tenth of the time that the search with model error takes. Of other simulations it
@@ -190,20 +217,25 @@ def explain_all(base: CalibrationResult, target: Target, run: DiagnosisRun, seed
 
     Parameters
     ----------
-    base, target, run
-        Arguments of `find_missing_terms`.
+    searches : TermSearches
     seed : int
         Seed of the surrogates of the residual.
+    is_noise : bool
+        Whether the residual without terms may be coloured noise. The terms then have to leave white noise.
     """
-    if not isinstance(base.simulation.simulator, OutputEquation):
+    if not isinstance(searches.base.simulation.simulator, OutputEquation):
         return False
-    for start, own in [(base, run), *_list_inner_searches(base, target, run)]:
-        found = search_terms(start, target, own)
-        if found is None:
-            continue
-        if not analyse_residual(found.fit, target, np.random.default_rng(seed)).is_structured:
-            return True
-    return False
+    return _leaves_noise(searches, searches.base, seed, is_noise) or any(
+        _leaves_noise(searches, start, seed, is_noise) for start in searches.inner
+    )
+
+
+def _leaves_noise(searches: TermSearches, start: CalibrationResult, seed: int, is_white: bool) -> bool:
+    """Return whether the missing terms of one simulation leave nothing but noise."""
+    found = searches.search(start)
+    if found is None or (is_white and found.fit.noise.order):
+        return False
+    return not analyse_residual(found.fit, searches.target, np.random.default_rng(seed)).is_structured
 
 
 def _is_contradicted(
