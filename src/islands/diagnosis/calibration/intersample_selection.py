@@ -21,6 +21,10 @@ MAX_OVERSAMPLING = 32
 #: Largest accepted RMS change of the output when the step is halved, relative to the RMS of the residual.
 MAX_STEP_ERROR = 0.05
 
+#: Largest RMS change of the output by a larger step, relative to that of the residual, with which responses
+#: are compared.
+MAX_COMPARED_ERROR = 0.25
+
 #: Largest ratio of the changes by two successive halvings of a step, if smaller steps improve the output.
 MAX_CHANGE_RATIO = 0.7
 
@@ -61,6 +65,25 @@ def halve_step(simulator: Simulator) -> Simulator | None:
     if not simulator.is_continuous_time or oversampling >= MAX_OVERSAMPLING:
         return None
     return ResampledSimulator(_get_inner(simulator), intersample, 2 * oversampling)
+
+
+def enlarge_step(fit: CalibrationResult) -> CalibrationResult:
+    """Return a fit with up to four times its step, as far as that changes its output little.
+
+    Responses that are only compared with one another need no smaller step. The noise, the error and the
+    penalty are those of the given fit.
+    """
+    simulator = fit.simulation.simulator
+    intersample, oversampling = get_discretisation(simulator)
+    for factor in (4, 2):
+        if oversampling % factor == 0:
+            larger = ResampledSimulator(_get_inner(simulator), intersample, oversampling // factor)
+            simulation = _with_simulator(fit.simulation, larger)
+            output = simulation.simulate(fit.values)
+            change = float(np.mean((output - fit.output) ** 2))
+            if change < MAX_COMPARED_ERROR**2 * fit.mean_square:
+                return replace(fit, simulation=simulation, output=output)
+    return fit
 
 
 def _get_inner(simulator: Simulator) -> Simulator:

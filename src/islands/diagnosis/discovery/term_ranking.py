@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.diagnosis.calibration.intersample_selection import enlarge_step
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
@@ -50,7 +51,8 @@ def rank_terms(
     """Return the terms in the order of the part of the residual that their responses explain.
 
     Each term is simulated with a small coefficient, and with the one at which that response explains most:
-    the response to a term that changes within few samples, such as friction, is far from linear.
+    the response to a term that changes within few samples, such as friction, is far from linear. The steps
+    are larger than those of the fit if that changes its output little.
 
     Parameters
     ----------
@@ -67,14 +69,14 @@ def rank_terms(
     """
     if not candidates:
         return []
-    projections = [Projection(fit, target) for target in targets]
+    projections, coarse = [Projection(fit, target) for target in targets], enlarge_step(fit)
 
     def explain_group(group: Sequence[CandidateTerm]) -> NDArray[np.float64]:
         # Terms that differ in their scales alone, as in instants, are one term of the equations.
         laws = {(each.target, each.text, each.gate): each for each in group}
         numbers = dict(zip(laws, find_free_numbers(find_used_names(fit), len(laws)), strict=True))
         numbered = [(law, numbers[key]) for key, law in laws.items()]
-        simulation, start = add_terms(fit, get_system(fit), numbered, target_sizes)
+        simulation, start = add_terms(coarse, get_system(fit), numbered, target_sizes)
         index = {parameter.name: place for place, parameter in enumerate(simulation.parameters)}
         starts, places = np.tile(start, (len(group), 1)), []
         for row, each in zip(starts, group, strict=True):
@@ -86,7 +88,7 @@ def rank_terms(
             """Return the responses to one term at a time, shape (rows, terms, samples)."""
             points = np.tile(starts, (len(coefficients), 1))
             points[np.arange(len(points)), np.tile(places, len(coefficients))] = coefficients.ravel()
-            responses = simulation.simulate_batch(points) - fit.output
+            responses = simulation.simulate_batch(points) - coarse.output
             return responses.reshape(*coefficients.shape, -1)
 
         small = np.array([[simulation.parameters[place].nominal for place in places]])

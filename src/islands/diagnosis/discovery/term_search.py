@@ -70,8 +70,8 @@ FITTED_TERMS = 12
 #: Number of terms with a gate in time of each step that are fitted with all parameters.
 FITTED_GATES = 4
 
-#: Part of the required gain that the responses to a term have to promise, so that it is fitted. In the steps of
-#: nine diagnoses, terms that gained enough promised 0.6 of it or more.
+#: Part of the required gain that the responses to a term have to promise, so that it is fitted. In the steps
+#: of nine diagnoses, terms that gained enough promised 0.6 of it or more.
 MIN_PROMISE = 1.0 / 3.0
 
 #: Number of times that the distance between the instants of a gate is halved before it is fitted.
