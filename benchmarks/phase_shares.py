@@ -98,6 +98,19 @@ def make_stiff_oscillator(samples: int) -> Dataset:
     return Dataset(u[:, None], y + rng.normal(0, 0.005, samples), dt, ("u",), "y")
 
 
+def make_limited_process(samples: int) -> Dataset:
+    """Return a record of two processes in series, of which the first one has limits."""
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(-2, 2, samples // 30), 30)
+    y, inner, dt, fine = np.zeros(samples), 0.0, 0.1, 10
+    for k in range(1, samples):
+        y[k] = y[k - 1]
+        for _ in range(fine):
+            y[k] += dt / fine * (inner - y[k]) / 0.5
+            inner = min(max(inner + dt / fine * (1.5 * u[k - 1] - inner) / 1.5, -1.8), 1.8)
+    return Dataset(u[:, None], y + rng.normal(0, 0.01, samples), dt, ("u",), "y")
+
+
 def run_identification(samples: int, preset: str = AUTO, **changes: Any) -> Recording:
     record = make_process(samples)
     settings = (
@@ -153,6 +166,7 @@ RUNS: dict[str, Callable[[], Recording]] = {
     "diagnosis-second-order": lambda: run_diagnosis(make_saturating_process(1500), "second-order"),
     "diagnosis-short": lambda: run_diagnosis(make_process(500), "second-order"),
     "diagnosis-known": lambda: run_diagnosis(make_stiff_oscillator(3000), "second-order"),
+    "diagnosis-inside": lambda: run_diagnosis(make_limited_process(1500), "linear:2"),
     "diagnosis-explained": lambda: run_diagnosis(make_saturating_process(1500), "linear:2"),
 }
 

@@ -158,7 +158,8 @@ def find_missing_terms(
 ) -> MissingTerms | None:
     """Search for missing terms, and compare them with the effects of the catalogue.
 
-    Effects in addition to the terms are searched for if a single effect does not explain the record as well.
+    Effects in addition to the terms are searched for if neither a single effect nor a single term explains
+    the record alone.
 
     Parameters
     ----------
@@ -198,8 +199,10 @@ def _find_terms(
     is_better = terms is not None and terms.is_better(alone)
     if not is_better and len(alone.hypothesis.effects) == 1 and alone.verdict == Verdict.NAMED:
         return terms
-    if terms and is_better and _is_contradicted(terms.search.fit, effects_alone.fit, target, run.rng):
-        return terms
+    if terms and is_better:
+        leaves_white_noise = len(terms.search.terms) == 1 and not terms.search.fit.noise.order
+        if leaves_white_noise or _is_contradicted(terms.search.fit, effects_alone.fit, target, run.rng):
+            return terms
     joint = search_jointly(found, base, alone, effects_alone.cost, target, run)
     if joint is None:
         return terms

@@ -84,21 +84,25 @@ def rank_terms(
             places.append(index[coefficient])
             row[[index[name] for name in scales]] = each.scale
 
-        def respond(coefficients: Signal) -> Signal:
+        def respond(coefficients: Signal, are_small: bool) -> Signal:
             """Return the responses to one term at a time, shape (rows, terms, samples)."""
             points = np.tile(starts, (len(coefficients), 1))
             points[np.arange(len(points)), np.tile(places, len(coefficients))] = coefficients.ravel()
-            responses = simulation.simulate_batch(points) - coarse.output
-            return responses.reshape(*coefficients.shape, -1)
+            if are_small and simulation.fits_states:
+                near = np.full(len(points) + 1, len(points))
+                outputs = simulation.simulate_batch(np.vstack([points, start]), near)[:-1]
+            else:
+                outputs = simulation.simulate_batch(points)
+            return (outputs - coarse.output).reshape(*coefficients.shape, -1)
 
         small = np.array([[simulation.parameters[place].nominal for place in places]])
-        (responses,) = respond(small)
+        (responses,) = respond(small, are_small=True)
         linear = np.array([[_explain(each, projection) for each in responses] for projection in projections])
         large = small * linear[:, :, 1]
         # All targets share a call, since the lanes of one would not fill it.
         explained = [
             [_explain(each, projection)[0] for each in responses]
-            for responses, projection in zip(respond(large), projections, strict=True)
+            for responses, projection in zip(respond(large, are_small=False), projections, strict=True)
         ]
         return np.dstack([linear[:, :, 0], explained, large])
 
