@@ -72,31 +72,32 @@ MAX_SEARCHES = 3
 #: Phase of a search whose outcome is known before missing terms are searched for.
 _MODEL_ERROR = "the residual is model error"
 
-#: Phases of a diagnosis, with the means of their shares and steps in two diagnoses of 44 and 75 s: a process
-#: with a squared input (3000 samples) as ``linear:1``, and one with a saturating input (1500 samples) as
-#: ``second-order``. Missing terms are searched for with effects as well, unless the residual is model error:
-#: the share of that search is between those of a stiff spring (3000 samples) as ``second-order``, where it is
-#: largest, and a saturating input as ``linear:2``. ``benchmarks/phase_shares.py`` measures them.
+#: Phases of a diagnosis. The shares and steps are those with which the times left are least wrong in six
+#: diagnoses that `benchmarks/phase_shares.py` recorded: a process with a squared input (3000 samples), one with
+#: a saturating input as ``linear:2`` and as ``second-order`` (1500), one with a limit of a state (1500), a
+#: short record (500), and a stiff spring (3000). Missing terms are searched for with effects as well, unless
+#: the residual is model error. That is known after the search inside of a linear simulation, which belongs to
+#: the analysis of the residual.
 PHASES = (
-    Phase("calibrating the simulation", 0.001),
-    Phase("looking for gross errors", 0.012),
-    Phase("screening each of", 0.011, 3),
-    Phase("the noise is coloured", 0.010, 5),
-    Phase("effects in addition", 0.040, 22),
-    Phase("screening alternative causes", 0.031, 16),
-    Phase("analysing the residual", 0.035, 8),
-    Phase(_MODEL_ERROR, 0.020, 3),
-    Phase(f"{WITH_MODEL_ERROR}effects in addition", 0.370, 39),
-    Phase(f"{WITH_MODEL_ERROR}screening alternative causes", 0.268, 64),
-    Phase("comparing with free forms", 0.178, 26),
-    Phase("searching for missing terms", 0.070, 16, unless=_MODEL_ERROR),
-    Phase("searching for missing terms", 0.022, 5),
-    Phase("alternatives to the named causes", 0.015, 5),
+    Phase("calibrating the simulation", 0.002),
+    Phase("looking for gross errors", 0.018),
+    Phase("screening each of", 0.017, 3),
+    Phase("the noise is coloured", 0.033, 5),
+    Phase("effects in addition", 0.120, 14),
+    Phase("screening alternative causes", 0.006, 33),
+    Phase("analysing the residual", 0.053, 6),
+    Phase(_MODEL_ERROR, 0.041),
+    Phase(f"{WITH_MODEL_ERROR}effects in addition", 0.343, 35),
+    Phase(f"{WITH_MODEL_ERROR}screening alternative causes", 0.236, 60),
+    Phase("comparing with free forms", 0.060, 30),
+    Phase("searching for missing terms", 0.072, 25, unless=_MODEL_ERROR),
+    Phase("searching for missing terms", 0.047, 6),
+    Phase("alternatives to the named causes", 0.025, 4),
 )
 
 #: Fraction from which the time left of a diagnosis is estimated: the phases that follow are known, and the
-#: first ones, whose times differ most, weigh little. In five recorded diagnoses of 15 to 80 s, estimates were
-#: wrong by at most half of the truth and 11 s, and never below 0.4 of more than 15 s.
+#: first ones, whose times differ most, weigh little. In six recorded diagnoses of 5 to 29 s, estimates were
+#: wrong by at most half of the truth and 3 s, and never below 0.6 of more than 15 s.
 LEAST_FRACTION = 0.25
 
 

@@ -1,12 +1,18 @@
 """Intersample selection: the behaviour and the step that generated a record are found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
+from islands.diagnosis.calibration.intersample_selection import (
+    enlarge_step,
+    get_discretisation,
+    select_intersample,
+)
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
@@ -163,3 +169,17 @@ def test_a_simulation_that_smaller_steps_do_not_improve_keeps_its_step() -> None
     selected = select_intersample(evaluate_fit(simulation, target, simulation.nominal), target)
     steps = selected.oversampling if isinstance(selected, ResampledSimulator) else 1
     assert steps == 1
+
+
+def test_a_step_is_enlarged_as_far_as_the_output_remains_that_of_the_fit() -> None:
+    u, fine = make_inputs(InterSample.FOH)
+    y = simulate_finely(fine)
+    noise = 0.01 * np.std(y) * np.random.default_rng(0).standard_normal(y.size)
+    core = ResampledSimulator(oscillator(), InterSample.FOH, 8)
+    fit, _ = calibrate_to(recorded(u, y + noise, DT), core)
+    larger = enlarge_step(fit)
+    assert get_discretisation(larger.simulation.simulator) == (InterSample.FOH, 2)
+    assert np.array_equal(larger.output, larger.simulation.simulate(fit.values))
+    assert np.std(larger.output - fit.output) < 0.25 * np.std(noise)
+    exact = replace(fit, mean_square=1e-30)
+    assert enlarge_step(exact) is exact

@@ -15,7 +15,7 @@ from islands.diagnosis.calibration.intersample_selection import get_discretisati
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.diagnosis.discovery import term_search
+from islands.diagnosis.discovery import missing_terms, term_search
 from islands.diagnosis.discovery.candidate_terms import (
     MAX_MULTIPLIED_SIGNALS,
     find_free_numbers,
@@ -27,6 +27,7 @@ from islands.diagnosis.discovery.term_search import TermSearchResult, search_ter
 from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.procedure import diagnose as diagnose_simulator
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
@@ -404,3 +405,35 @@ def test_two_named_effects_are_not_replaced_by_terms() -> None:
     found = islands.diagnose(record, OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), effects=own)
     assert found.verdict == Verdict.NAMED
     assert sorted(each.name for each in found.effects) == ["cubic-stiffness", "jump"]
+
+
+@pytest.mark.ci
+def test_no_term_is_fitted_to_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted: list[object] = []
+    calibrate_all = term_search.calibrate_all
+
+    def count(calibrator, tasks, parallel_map):
+        fitted.extend(tasks)
+        return calibrate_all(calibrator, tasks, parallel_map)
+
+    monkeypatch.setattr(term_search, "calibrate_all", count)
+    assert search(lambda _x, _v, _u: 0.0) is None
+    assert not fitted
+    assert search(LAWS["fifth power"][0]) is not None
+    assert fitted
+
+
+@pytest.mark.ci
+def test_no_effects_are_searched_for_with_a_term_that_leaves_white_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_arguments):
+        raise AssertionError
+
+    monkeypatch.setattr(missing_terms, "search_jointly", refuse)
+    record = simulate(LAWS["fifth power"][0])
+    simulator = make_simulator(OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), record)
+    found = diagnose_simulator(
+        record, simulator, catalogue=[CATALOGUE["cubic-stiffness"], CATALOGUE["delay"]]
+    )
+    assert found.verdict == "discovered"

@@ -95,12 +95,20 @@ BRIEFLY_SEARCHED = ("range", "friction", "spring", "elastic stop")
 CATALOGUE = ("coulomb-friction", "cubic-stiffness", "input-saturation", "delay")
 
 
+#: Messages of the diagnosis of each process.
+MESSAGES: dict[str, list[str]] = {}
+
+
 @cache
 def find(name: str) -> tuple[Dataset, Diagnosis]:
     record = make_record(name)
     catalogue = [each for each in EFFECTS if each.name in CATALOGUE] if name in BRIEFLY_SEARCHED else EFFECTS
     simulator = make_simulator(f"linear:{PROCESSES[name][1]}", record)
-    return record, diagnose(record, simulator, catalogue=catalogue)
+    messages = MESSAGES.setdefault(name, [])
+    found = diagnose(
+        record, simulator, progress=lambda message, _=None, /: messages.append(message), catalogue=catalogue
+    )
+    return record, found
 
 
 @pytest.mark.ci
@@ -130,6 +138,14 @@ def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
     _, found = find("limit")
     assert [each.name for each in found.causes] == ["state-clip"]
     assert found.causes[0].parameters["state-clip:x1"].value == pytest.approx(1.8, rel=0.02)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", ["uneven", "radiation", pytest.param("limit", marks=pytest.mark.nightly)])
+def test_a_residual_that_a_law_of_the_process_explains_is_not_taken_for_model_error(name: str) -> None:
+    find(name)
+    assert "searching for missing terms" in MESSAGES[name]
+    assert not [each for each in MESSAGES[name] if "model error" in each]
 
 
 @pytest.mark.ci
