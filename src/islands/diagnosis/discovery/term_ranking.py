@@ -89,6 +89,7 @@ def rank_terms(
             points = np.tile(starts, (len(coefficients), 1))
             points[np.arange(len(points)), np.tile(places, len(coefficients))] = coefficients.ravel()
             if are_small and simulation.fits_states:
+                # States that are fitted to first order take a thirteenth of the simulations.
                 near = np.full(len(points) + 1, len(points))
                 outputs = simulation.simulate_batch(np.vstack([points, start]), near)[:-1]
             else:

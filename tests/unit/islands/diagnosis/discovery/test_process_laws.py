@@ -142,7 +142,7 @@ def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
 
 @pytest.mark.ci
 @pytest.mark.parametrize("name", ["uneven", "radiation", pytest.param("limit", marks=pytest.mark.nightly)])
-def test_a_residual_that_a_law_of_the_process_explains_is_not_taken_for_model_error(name: str) -> None:
+def test_a_law_of_the_process_is_no_model_error(name: str) -> None:
     find(name)
     assert "searching for missing terms" in MESSAGES[name]
     assert not [each for each in MESSAGES[name] if "model error" in each]
