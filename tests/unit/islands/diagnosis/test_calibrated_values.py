@@ -63,7 +63,7 @@ def test_values_of_an_exact_record_have_no_intervals() -> None:
 
 
 @pytest.mark.ci
-def test_equations_in_place_of_a_linear_simulation_are_compared_with_its_calibration() -> None:
+def test_equations_of_a_linear_simulation_are_compared_with_it() -> None:
     rng = np.random.default_rng(3)
     u = np.repeat(rng.uniform(0.0, 100.0, 40), 20)
     y = [20.0]
