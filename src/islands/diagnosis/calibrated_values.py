@@ -45,8 +45,8 @@ def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[Calibrated
             if deviations is None
             else Value.estimate(value, unit, float(deviations[place]))
         )
-        before, value_alone = parameter.nominal, alone.get(parameter.name)
+        name, before = parameter.name, None if is_replaced else parameter.nominal
         # The nominal values of equations in place of a linear simulation are those of its calibration.
-        ends = (None, before) if is_replaced else (before, value_alone)
-        values.append(CalibratedValue(parameter.name, *ends, estimate))
+        without = parameter.nominal if is_replaced else alone.get(name)
+        values.append(CalibratedValue(name, before, without, estimate))
     return tuple(values)
