@@ -7,6 +7,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.assembly import extend_equations, make_diagnosis, make_gross_diagnosis
+from islands.diagnosis.calibration.friction_width import narrow_friction
 from islands.diagnosis.calibration.intersample_selection import (
     Discretisation,
     get_discretisation,
@@ -253,6 +254,27 @@ def _calibrate_again(
 
 
 def _search(
+    base: CalibrationResult, target: Target, run: DiagnosisRun, interim: InterimFindings
+) -> tuple[CalibrationResult, SearchOutcome]:
+    """Search with the width of dry friction that suits the record.
+
+    Returns
+    -------
+    CalibrationResult
+        The simulation without effects, calibrated to unweighted residuals.
+    SearchOutcome
+    """
+    base, outcome = _search_with_steps(base, target, run, interim)
+    while True:
+        context = narrow_friction(outcome.hypothesis.fit, outcome.target)
+        if context is outcome.hypothesis.fit.simulation.context:
+            return base, outcome
+        run.progress("dry friction is narrower: repeating the search")
+        narrower = replace(base, simulation=replace(base.simulation, context=context))
+        base, outcome = _search_with_steps(narrower, target, run, interim)
+
+
+def _search_with_steps(
     base: CalibrationResult,
     target: Target,
     run: DiagnosisRun,
@@ -268,10 +290,9 @@ def _search(
     """
     simulation, simulator = base.simulation, select_intersample(base, target)
     tried: set[Discretisation] = set()
-    found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}
+    suits_effects = False
     while True:
-        current = get_discretisation(simulator)
-        tried.add(current)
+        tried.add(get_discretisation(simulator))
         base = _calibrate_again(replace(simulation, simulator=simulator), target, base)
         if target.is_matched(base.output):
             return base, make_exact_outcome(base, target)
@@ -279,15 +300,13 @@ def _search(
         recorded = replace(run, parallel_map=interim.record_screening(base, run.parallel_map))
         screened = screen_effects(base, target, recorded)
         interim.keep_screening(base, screened)
-        selected = select_intersample(best_single(base, screened), target)
-        if (known := found.get(get_discretisation(selected))) is not None:
-            return known
+        # One of several effects leaves a larger residual, next to which the error of a larger step is small.
+        selected = simulator if suits_effects else select_intersample(best_single(base, screened), target)
         if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
             outcome = search_with_ar_noise(base, screened, target, run)
-            found[current] = base, outcome
-            selected = select_intersample(outcome.hypothesis.fit, outcome.target)
+            selected, suits_effects = select_intersample(outcome.hypothesis.fit, outcome.target), True
             if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
-                return found[current]
+                return base, outcome
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
         run.progress("intersample behaviour changed: repeating the search")
         simulator = selected

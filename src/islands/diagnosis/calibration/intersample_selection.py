@@ -41,13 +41,28 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     if not simulator.is_continuous_time:
         return simulator
     inner, (current, _) = _get_inner(simulator), get_discretisation(simulator)
-    tried = {}
+    tried, irregular = {}, set()
     for intersample in (current, *(each for each in InterSample if each != current)):
-        candidate = _refine_steps(inner, intersample, fit)
-        refitted = calibrate(_with_simulator(fit.simulation, candidate), target, fit.values)
-        tried[intersample] = (refitted.score, candidate)
-    best = min(tried, key=lambda intersample: tried[intersample][0])
-    return tried[best if tried[best][0] < tried[current][0] - MIN_IMPROVEMENT else current][1]
+        candidate, is_regular = _refine_steps(inner, intersample, fit)
+        tried[intersample] = calibrate(_with_simulator(fit.simulation, candidate), target, fit.values)
+        irregular |= set() if is_regular else {intersample}
+    best = min(tried, key=lambda intersample: tried[intersample].score)
+    chosen = best if tried[best].score < tried[current].score - MIN_IMPROVEMENT else current
+    found = tried[chosen]
+    return (_refine_by_score(found, target) if chosen in irregular else found).simulation.simulator
+
+
+def _refine_by_score(fit: CalibrationResult, target: Target) -> CalibrationResult:
+    """Halve the step of a fit as long as that explains the record better.
+
+    The changes of the output by dry friction do not decrease regularly with the step.
+    """
+    while (finer := halve_step(fit.simulation.simulator)) is not None:
+        refitted = calibrate(_with_simulator(fit.simulation, finer), target, fit.values)
+        if not refitted.score < fit.score - MIN_IMPROVEMENT:
+            break
+        fit = refitted
+    return fit
 
 
 def get_discretisation(simulator: Simulator) -> Discretisation:
@@ -94,14 +109,23 @@ def _with_simulator(simulation: ExtendedSimulator, simulator: Simulator) -> Exte
     return replace(simulation, simulator=simulator)
 
 
-def _refine_steps(inner: Simulator, intersample: InterSample, fit: CalibrationResult) -> Simulator:
+def _refine_steps(
+    inner: Simulator, intersample: InterSample, fit: CalibrationResult
+) -> tuple[Simulator, bool]:
     """Halve the step until the change of the output is small compared with the residual.
 
-    A change that does not decrease is no error of the integration: the simulation is chaotic, or states of
-    shooting intervals are at another minimum. The step then remains as it is.
+    Changes that do not decrease are no regular error of the integration: the simulation is chaotic, states of
+    shooting intervals are at another minimum, or dry friction is smoothed little. The step then remains as it
+    is.
+
+    Returns
+    -------
+    Simulator
+    bool
+        Whether the changes decrease.
     """
     accepted = MAX_STEP_ERROR * float(np.sqrt(fit.mean_square))
-    oversampling, before = 1, np.inf
+    oversampling, before, is_regular = 1, np.inf, True
     resampled = ResampledSimulator(inner, intersample, oversampling)
     coarse = _with_simulator(fit.simulation, resampled).simulate(fit.values)
     while oversampling < MAX_OVERSAMPLING:
@@ -110,14 +134,12 @@ def _refine_steps(inner: Simulator, intersample: InterSample, fit: CalibrationRe
         with np.errstate(over="ignore", invalid="ignore"):
             change = float(np.sqrt(np.mean((fine - coarse) ** 2)))
         if change > MAX_CHANGE_RATIO * before:
-            oversampling = 1
+            oversampling, is_regular = 1, False
             break
         if change < accepted:
             break
         oversampling, coarse = 2 * oversampling, fine
         before = change if np.isfinite(change) else np.inf
-    return (
-        inner
-        if oversampling == 1 and intersample == InterSample.FOH
-        else ResampledSimulator(inner, intersample, oversampling)
-    )
+    if oversampling == 1 and intersample == InterSample.FOH:
+        return inner, is_regular
+    return ResampledSimulator(inner, intersample, oversampling), is_regular
