@@ -1,0 +1,59 @@
+"""Width of simulated dry friction: a record with little noise shows it, and another one does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+from islands.data.dataset import Dataset
+from islands.diagnosis.calibration.friction_width import narrow_friction
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.preparation import count_fitted_samples
+from islands.diagnosis.calibration.target import Target
+from islands.effects.friction import COULOMB_FRICTION
+from islands.simulators.context import make_context
+from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.intersample import InterSample, ResampledSimulator
+from support.built_in_simulators import make_oscillator
+
+SAMPLES, DT = 900, 0.01
+
+#: Dry friction relative to the peak of the force.
+FRICTION = 0.2
+
+
+def fit(width: float, noise: float, *, has_friction: bool = True) -> tuple[CalibrationResult, Target]:
+    """Calibrate an oscillator with dry friction to a record with a narrower one, and a relative noise."""
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.standard_normal(SAMPLES // 10), 10)
+    core = ResampledSimulator(make_oscillator(0.5, 2.0, 100.0), InterSample.ZOH, 4)
+    samples = count_fitted_samples(Dataset(u, u, DT))
+    without = scipy.signal.lsim(([1.0], [0.5, 2.0, 100.0]), u, DT * np.arange(SAMPLES))[1]
+    context = make_context(Dataset(u, without, DT), core, samples)
+    simulation = ExtendedSimulator(core, (COULOMB_FRICTION,) if has_friction else (), context)
+    values = simulation.nominal
+    if has_friction:
+        values[simulation.get_slice(COULOMB_FRICTION)] = FRICTION * np.max(np.abs(u))
+    narrow = replace(context.force_coordinate, friction_smoothing=width)
+    true = replace(simulation, context=replace(context, force_coordinate=narrow)).simulate(values)
+    y = true + noise * true.std() * rng.standard_normal(SAMPLES)
+    target = Target(y, np.arange(SAMPLES) < samples, None, {}, fitted=samples)
+    return calibrate(simulation, target, values), target
+
+
+@pytest.mark.parametrize("width", [0.005, 0.00125])
+def test_width_of_a_record_with_little_noise_is_found(width: float) -> None:
+    found, target = fit(width, 1e-5)
+    narrowed = narrow_friction(found, target).force_coordinate.friction_smoothing
+    assert narrowed == pytest.approx(width)
+
+
+def test_width_that_noise_hides_remains() -> None:
+    found, target = fit(0.005, 1.0)
+    assert narrow_friction(found, target) is found.simulation.context
+
+
+def test_simulation_without_dry_friction_keeps_its_context() -> None:
+    found, target = fit(0.005, 1e-5, has_friction=False)
+    assert narrow_friction(found, target) is found.simulation.context
