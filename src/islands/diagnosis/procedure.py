@@ -11,6 +11,7 @@ from islands.diagnosis.calibration.friction_width import narrow_friction
 from islands.diagnosis.calibration.intersample_selection import (
     Discretisation,
     get_discretisation,
+    is_halved,
     select_intersample,
 )
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
@@ -290,9 +291,11 @@ def _search_with_steps(
     """
     simulation, simulator = base.simulation, select_intersample(base, target)
     tried: set[Discretisation] = set()
-    suits_effects = False
+    found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}
+    is_finer = False
     while True:
-        tried.add(get_discretisation(simulator))
+        current = get_discretisation(simulator)
+        tried.add(current)
         base = _calibrate_again(replace(simulation, simulator=simulator), target, base)
         if target.is_matched(base.output):
             return base, make_exact_outcome(base, target)
@@ -300,13 +303,17 @@ def _search_with_steps(
         recorded = replace(run, parallel_map=interim.record_screening(base, run.parallel_map))
         screened = screen_effects(base, target, recorded)
         interim.keep_screening(base, screened)
-        # One of several effects leaves a larger residual, next to which the error of a larger step is small.
-        selected = simulator if suits_effects else select_intersample(best_single(base, screened), target)
+        # A finer step for all effects is kept: next to the residual of one of them, its error seems small.
+        selected = simulator if is_finer else select_intersample(best_single(base, screened), target)
+        if (known := found.get(get_discretisation(selected))) is not None:
+            return known
         if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
             outcome = search_with_ar_noise(base, screened, target, run)
-            selected, suits_effects = select_intersample(outcome.hypothesis.fit, outcome.target), True
+            found[current] = base, outcome
+            selected = select_intersample(outcome.hypothesis.fit, outcome.target)
             if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
-                return base, outcome
+                return found[current]
+            is_finer = is_halved(current, get_discretisation(selected))
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
         run.progress("intersample behaviour changed: repeating the search")
         simulator = selected

@@ -74,6 +74,11 @@ def get_discretisation(simulator: Simulator) -> Discretisation:
     )
 
 
+def is_halved(one: Discretisation, other: Discretisation) -> bool:
+    """Return whether the other discretisation differs by a smaller step alone."""
+    return one[0] == other[0] and one[1] < other[1]
+
+
 def halve_step(simulator: Simulator) -> Simulator | None:
     """Return a simulator with twice the number of steps per sample; None if it has no smaller step."""
     intersample, oversampling = get_discretisation(simulator)

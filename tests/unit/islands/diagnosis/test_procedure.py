@@ -197,14 +197,28 @@ def test_diverging_simulation_is_rejected(record: Dataset) -> None:
 
 
 @pytest.mark.ci
-def test_intersample_behaviour_that_suits_all_effects_is_kept(
+def test_intersample_behaviour_that_is_rejected_ends_the_search(
     record: Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One of them, with a larger residual, does not decide again after the screening."""
+    """The search before counts: it is not repeated."""
     held, effects = ResampledSimulator(make_piezo(), InterSample.ZOH, 1), [CATALOGUE["quadratic-drag"]]
-    # Before the search, after the screening, after the search, and after the search with the held input.
-    selected = iter([make_piezo(), make_piezo(), held, held])
+    once = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
+    # Before the search, after the screening, after the search, and after the screening of the held input.
+    selected = iter([make_piezo(), make_piezo(), held, make_piezo()])
     monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
     found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
     assert next(selected, None) is None
-    assert get_discretisation(found.best.simulation.simulator) == (InterSample.ZOH, 1)
+    assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 1)
+    assert np.array_equal(found.best.values, once.best.values)
+
+
+@pytest.mark.ci
+def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of them, with a larger residual, does not decide again after the screening."""
+    fine, effects = ResampledSimulator(make_piezo(), InterSample.FOH, 4), [CATALOGUE["quadratic-drag"]]
+    # Before the search, after the screening, after the search, and after the search with finer steps.
+    selected = iter([make_piezo(), make_piezo(), fine, fine])
+    monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
+    found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
+    assert next(selected, None) is None
+    assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 4)
