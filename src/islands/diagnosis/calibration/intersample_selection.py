@@ -41,11 +41,13 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     if not simulator.is_continuous_time:
         return simulator
     inner, (current, _) = _get_inner(simulator), get_discretisation(simulator)
-    tried, irregular = {}, set()
+    tried: dict[InterSample, CalibrationResult] = {}
+    irregular = set()
     for intersample in (current, *(each for each in InterSample if each != current)):
         candidate, is_regular = _refine_steps(inner, intersample, fit)
         tried[intersample] = calibrate(_with_simulator(fit.simulation, candidate), target, fit.values)
-        irregular |= set() if is_regular else {intersample}
+        if not is_regular:
+            irregular.add(intersample)
     best = min(tried, key=lambda intersample: tried[intersample].score)
     chosen = best if tried[best].score < tried[current].score - MIN_IMPROVEMENT else current
     found = tried[chosen]

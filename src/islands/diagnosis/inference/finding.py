@@ -367,9 +367,9 @@ def _get_values(
         if fit.simulation.is_copy[index]:
             continue
         parameter, value = fit.simulation.parameters[index], float(fit.values[index])
-        if effect.centre is None:
-            found = Value.estimate(value, parameter.unit, float(deviations[index]))
-        else:
-            found = Value(value, parameter.unit, intervals[place] if intervals else None)
-        values[parameter.name] = found
+        values[parameter.name] = (
+            Value.estimate(value, parameter.unit, float(deviations[index]))
+            if effect.centre is None
+            else Value(value, parameter.unit, intervals[place] if intervals else None)
+        )
     return values

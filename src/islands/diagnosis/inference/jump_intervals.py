@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.curve_ends import MAX_INCREASE
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.effects.hysteresis import is_held
@@ -17,9 +18,6 @@ from islands.effects.interface.effect import Effect, Signal, apply_map
 _CHANGES = np.geomspace(5e-4, 0.9, 32)
 _FACTORS = np.concatenate([1.0 - _CHANGES[::-1], [1.0], 1.0 + _CHANGES])
 _DISTANCES = np.linspace(-0.4, 0.4, 65)
-
-#: The 0.95 quantile of the chi-square distribution with one degree of freedom.
-_QUANTILE = 3.84
 
 
 def find_jump_intervals(
@@ -31,7 +29,7 @@ def find_jump_intervals(
     samples: the intervals, about a thousandth of the values, are smaller than the error of this response.
 
     The intervals are those of the profile likelihood: minus twice its logarithm exceeds the least one by no
-    more than a quantile (Venzon and Moolgavkar, Applied Statistics 37 (1988) 87-94). The response of the
+    more than the quantile of chi-square (Venzon and Moolgavkar, Applied Statistics 37 (1988) 87-94). The response of the
     plant to what the effect changes, and to its own parameters, is linear.
 
     Parameters
@@ -61,7 +59,7 @@ def find_jump_intervals(
         if keys[-1] not in losses:
             remainder = projection.residual - projection(convolve(change, response, context.segments))
             losses[keys[-1]] = -projection.score_decrease(float(remainder @ remainder))
-    most = min(losses.values()) + _QUANTILE
+    most = min(losses.values()) + MAX_INCREASE
     is_likely = np.array([losses[key] < most for key in keys])
     return tuple(_find_range(column, is_likely) for column in points.T)
 
