@@ -29,8 +29,8 @@ def find_jump_intervals(
     samples: the intervals, about a thousandth of the values, are smaller than the error of this response.
 
     The intervals are those of the profile likelihood: minus twice its logarithm exceeds the least one by no
-    more than the quantile of chi-square (Venzon and Moolgavkar, Applied Statistics 37 (1988) 87-94). The response of the
-    plant to what the effect changes, and to its own parameters, is linear.
+    more than the quantile of the chi-square distribution (Venzon and Moolgavkar, Applied Statistics 37 (1988)
+    87-94). The response of the plant to what the effect changes, and to its own parameters, is linear.
 
     Parameters
     ----------
