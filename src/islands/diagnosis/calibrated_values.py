@@ -28,12 +28,13 @@ def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[Calibrated
         return ()
     is_exact = target.is_matched(fit.output)
     deviations = None if is_exact else estimate_deviations(fit, whiten_target(target, fit))
-    known = base.simulation.simulator_slice
-    alone = {
-        parameter.name: float(value)
-        for parameter, value in zip(base.simulation.parameters[known], base.values[known], strict=True)
-    }
     is_replaced = get_linear(base) is not None and get_linear(fit) is None
+    if is_replaced:  # The nominal values of the equations are those of the calibrated linear simulation.
+        alone = {each.name: each.nominal for each in parameters}
+    else:
+        known = base.simulation.simulator_slice
+        names = [each.name for each in base.simulation.parameters[known]]
+        alone = dict(zip(names, base.values[known].tolist(), strict=True))
     terms = {name for each in found.causes if each.term for name in each.parameters}
     values = []
     for place, parameter in enumerate(parameters, part.start):
@@ -45,8 +46,6 @@ def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[Calibrated
             if deviations is None
             else Value.estimate(value, unit, float(deviations[place]))
         )
-        name, before = parameter.name, None if is_replaced else parameter.nominal
-        # The nominal values of equations in place of a linear simulation are those of its calibration.
-        without = parameter.nominal if is_replaced else alone.get(name)
-        values.append(CalibratedValue(name, before, without, estimate))
+        before = None if is_replaced else parameter.nominal
+        values.append(CalibratedValue(parameter.name, before, alone.get(parameter.name), estimate))
     return tuple(values)

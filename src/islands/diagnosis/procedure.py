@@ -265,30 +265,20 @@ def _search(
         The simulation without effects, calibrated to unweighted residuals.
     SearchOutcome
     """
-    base, outcome = _search_with_steps(base, target, run, interim)
     while True:
-        context = narrow_friction(outcome.hypothesis.fit, outcome.target)
-        if context is outcome.hypothesis.fit.simulation.context:
+        base, outcome = _search_with_steps(base, target, run, interim)
+        fit = outcome.hypothesis.fit
+        context = narrow_friction(fit, outcome.target)
+        if context is fit.simulation.context:
             return base, outcome
         run.progress("dry friction is narrower: repeating the search")
-        narrower = replace(base, simulation=replace(base.simulation, context=context))
-        base, outcome = _search_with_steps(narrower, target, run, interim)
+        base = replace(base, simulation=replace(base.simulation, context=context))
 
 
 def _search_with_steps(
-    base: CalibrationResult,
-    target: Target,
-    run: DiagnosisRun,
-    interim: InterimFindings,
+    base: CalibrationResult, target: Target, run: DiagnosisRun, interim: InterimFindings
 ) -> tuple[CalibrationResult, SearchOutcome]:
-    """Search with the intersample behaviour and the step size that suit the simulation with the effects.
-
-    Returns
-    -------
-    CalibrationResult
-        The simulation without effects, calibrated to unweighted residuals.
-    SearchOutcome
-    """
+    """Search with the intersample behaviour and the step that suit all effects; see `_search`."""
     simulation, simulator = base.simulation, select_intersample(base, target)
     tried: set[Discretisation] = set()
     found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}

@@ -41,10 +41,13 @@ def find_jump_intervals(
     target : Target
     """
     simulation, part = fit.simulation, fit.simulation.get_slice(effect)
+    context, values = simulation.context, fit.values[part]
+    if values[0] <= 0.0 or not is_held(context.u):
+        return None
     others = simulation.with_effects([each for each in simulation.effects if each is not effect])
     plant = evaluate_fit(others, target, transfer_parameters(fit.values, simulation, others))
-    response, context, values = respond_to_pulse(plant), simulation.context, fit.values[part]
-    if response is None or values[0] <= 0.0 or not is_held(context.u):
+    response = respond_to_pulse(plant)
+    if response is None:
         return None
     is_own = np.zeros(fit.values.size, dtype=np.bool_)
     is_own[part] = True
