@@ -7,11 +7,10 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.assembly import extend_equations, make_diagnosis, make_gross_diagnosis
-from islands.diagnosis.calibration.friction_width import narrow_friction
 from islands.diagnosis.calibration.intersample_selection import (
+    MIN_IMPROVEMENT,
     Discretisation,
     get_discretisation,
-    is_halved,
     select_intersample,
 )
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
@@ -21,6 +20,7 @@ from islands.diagnosis.calibration.preparation import (
     select_effects,
     validate_prior,
 )
+from islands.diagnosis.calibration.smoothing_widths import narrow_friction, narrow_steps
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
 from islands.diagnosis.discovery.form_search import compare_with_free_forms
@@ -257,7 +257,7 @@ def _calibrate_again(
 def _search(
     base: CalibrationResult, target: Target, run: DiagnosisRun, interim: InterimFindings
 ) -> tuple[CalibrationResult, SearchOutcome]:
-    """Search with the width of dry friction that suits the record.
+    """Search with the widths of dry friction and of steps over time that suit the record.
 
     Returns
     -------
@@ -270,7 +270,8 @@ def _search(
         fit = outcome.hypothesis.fit
         context = narrow_friction(fit, outcome.target)
         if context is fit.simulation.context:
-            return base, outcome
+            narrower = narrow_steps(fit, outcome.target)
+            return base, outcome if narrower is fit else outcome.with_fit(narrower)
         run.progress("dry friction is narrower: repeating the search")
         base = replace(base, simulation=replace(base.simulation, context=context))
 
@@ -282,7 +283,6 @@ def _search_with_steps(
     simulation, simulator = base.simulation, select_intersample(base, target)
     tried: set[Discretisation] = set()
     found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}
-    is_finer = False
     while True:
         current = get_discretisation(simulator)
         tried.add(current)
@@ -293,17 +293,23 @@ def _search_with_steps(
         recorded = replace(run, parallel_map=interim.record_screening(base, run.parallel_map))
         screened = screen_effects(base, target, recorded)
         interim.keep_screening(base, screened)
-        # A finer step for all effects is kept: next to the residual of one of them, its error seems small.
-        selected = simulator if is_finer else select_intersample(best_single(base, screened), target)
-        if (known := found.get(get_discretisation(selected))) is not None:
-            return known
+        # What suits all effects is kept: next to one of them, the others look like its errors.
+        selected = simulator if found else select_intersample(best_single(base, screened), target)
         if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
             outcome = search_with_ar_noise(base, screened, target, run)
             found[current] = base, outcome
             selected = select_intersample(outcome.hypothesis.fit, outcome.target)
-            if len(tried) == MAX_SEARCHES or get_discretisation(selected) in tried:
-                return found[current]
-            is_finer = is_halved(current, get_discretisation(selected))
+            if len(found) == MAX_SEARCHES or get_discretisation(selected) in found:
+                return _choose_outcome(found, current)
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
         run.progress("intersample behaviour changed: repeating the search")
         simulator = selected
+
+
+def _choose_outcome(
+    found: Mapping[Discretisation, tuple[CalibrationResult, SearchOutcome]], last: Discretisation
+) -> tuple[CalibrationResult, SearchOutcome]:
+    """Return the last outcome unless another one is clearly better: each discretisation led to the next."""
+    costs = {each: outcome.hypothesis.cost for each, (_, outcome) in found.items()}
+    best = min(costs, key=costs.__getitem__)
+    return found[best if costs[best] < costs[last] - MIN_IMPROVEMENT else last]

@@ -39,20 +39,21 @@ def instant_bounds(context: SimulationContext) -> tuple[float, float]:
 
 def smooth_step(context: SimulationContext, instant: float) -> Signal:
     """Return a step from 0 to 1 at an instant, smoothed over a few samples so that it has a derivative."""
-    return _make_step(instant, context.start_time, context.dt, context.u.size)
+    width = context.step_width * context.dt
+    return _make_step(instant, width, context.start_time, context.dt, context.u.size)
 
 
 @lru_cache(maxsize=4)
-def _make_step(instant: float, start: float, dt: float, samples: int) -> Signal:
+def _make_step(instant: float, width: float, start: float, dt: float, samples: int) -> Signal:
     """Return a smooth step over time; most derivatives have it in common."""
     time = start + dt * np.arange(samples, dtype=np.float64)
-    out: Signal = scipy.special.expit((time - instant) / (2 * dt))
+    out: Signal = scipy.special.expit((time - instant) / width)
     return out
 
 
 def write_step(context: SimulationContext, instant: str) -> str:
     """Write `smooth_step` as an expression of the time, given that of the instant."""
-    return f"(1/(1 + exp(({instant} - t)/{2 * context.dt})))"
+    return f"(1/(1 + exp(({instant} - t)/{context.step_width * context.dt})))"
 
 
 def gain_over_time(effect_parameters: Mapping[str, float], context: SimulationContext) -> Signal | float:

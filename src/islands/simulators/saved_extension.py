@@ -78,6 +78,7 @@ class SavedExtension(SimulatorWrapper):
             output_peak=scales.output_peak,
             fit_end_time=scales.fit_end_time,
             reference_duration=scales.duration,
+            step_width=scales.step_width,
             force_coordinate=scales.force_coordinate,
         )
         return ExtendedSimulator(self.simulator, self.added, inner).simulate(

@@ -11,6 +11,7 @@ import numpy as np
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
+from islands.effects.timing import DELAY
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
@@ -36,7 +37,11 @@ Discretisation: TypeAlias = tuple[InterSample, int]
 
 
 def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
-    """Return the simulator of a fit with the intersample behaviour and the step size that suit the record."""
+    """Return the simulator of a fit with the intersample behaviour and the step size that suit the record.
+
+    An output before its input is less probable than a wrong intersample behaviour: a hold is half a sample
+    late.
+    """
     simulator = fit.simulation.simulator
     if not simulator.is_continuous_time:
         return simulator
@@ -50,8 +55,19 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
             irregular.add(intersample)
     best = min(tried, key=lambda intersample: tried[intersample].score)
     chosen = best if tried[best].score < tried[current].score - MIN_IMPROVEMENT else current
+    if _get_lead(tried[chosen]) > 0.0:
+        near = [each for each in tried if tried[each].score < tried[chosen].score + MIN_IMPROVEMENT]
+        chosen = min(near, key=lambda intersample: (_get_lead(tried[intersample]), tried[intersample].score))
     found = tried[chosen]
     return (_refine_by_score(found, target) if chosen in irregular else found).simulation.simulator
+
+
+def _get_lead(fit: CalibrationResult) -> float:
+    """Return by how much the output of a fit comes before its input."""
+    simulation = fit.simulation
+    return (
+        max(-float(fit.values[simulation.get_slice(DELAY)][0]), 0.0) if DELAY in simulation.effects else 0.0
+    )
 
 
 def _refine_by_score(fit: CalibrationResult, target: Target) -> CalibrationResult:
@@ -74,11 +90,6 @@ def get_discretisation(simulator: Simulator) -> Discretisation:
         if isinstance(simulator, ResampledSimulator)
         else (InterSample.FOH, 1)
     )
-
-
-def is_halved(one: Discretisation, other: Discretisation) -> bool:
-    """Return whether the other discretisation differs by a smaller step alone."""
-    return one[0] == other[0] and one[1] < other[1]
 
 
 def halve_step(simulator: Simulator) -> Simulator | None:

@@ -97,6 +97,10 @@ class SearchOutcome:
     form_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
     cancelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    def with_fit(self, fit: CalibrationResult) -> "SearchOutcome":
+        """Return the outcome with another fit of the simulation of its hypothesis."""
+        return replace(self, hypothesis=self.hypothesis.with_fit(fit))
+
     @property
     def leaves_white_noise(self) -> bool:
         """Whether a single named effect leaves white noise, so that it is probably the cause.

@@ -92,6 +92,8 @@ class SimulationContext:
         Output in the record, without gaps. None for a simulation without a record.
     whole : SimulationContext or None
         Context of all recordings, if this is the context of one of several.
+    step_width : float
+        Width of steps over time in samples; they are smoothed so that their instants have derivatives.
     """
 
     u: Signal
@@ -110,6 +112,7 @@ class SimulationContext:
     start_time: float = 0.0
     measured: Signal | None = None
     whole: "SimulationContext | None" = None
+    step_width: float = 2.0
 
     def __post_init__(self) -> None:
         if self.force_coordinate is None:

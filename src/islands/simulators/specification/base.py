@@ -55,6 +55,7 @@ class ScalesSpec(SpecModel):
     fitted_s: PositiveFloat
     duration_s: PositiveFloat
     frame: FrameSpec
+    step_width: PositiveFloat = 2.0
 
 
 class SignalRangeSpec(SpecModel):

@@ -132,6 +132,7 @@ def make_extended_spec(
             fitted_s=scales.fit_end_time,
             duration_s=scales.duration,
             frame=_make_frame_spec(scales.force_coordinate),
+            step_width=scales.step_width,
         ),
     )
 
@@ -183,6 +184,7 @@ def read_scales(given: ScalesSpec, u: Signal, dt: float, units: tuple[str, str])
             is_dissipative=frame.dissipates,
             friction_smoothing=frame.sharp,
         ),
+        step_width=given.step_width,
     )
 
 

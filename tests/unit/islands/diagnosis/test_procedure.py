@@ -23,7 +23,7 @@ from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands_measurements.detection.injection.measurement import inject
-from islands_measurements.detection.trial import TOLERANCE
+from islands_measurements.detection.trial import TOLERANCE, Trial, run_trial
 from support.built_in_simulators import make_piezo
 
 
@@ -222,3 +222,19 @@ def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch:
     found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
     assert next(selected, None) is None
     assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 4)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("effects", "seed"),
+    [
+        # A hold fits better next to one of the effects alone, and makes the others half a sample early.
+        (("rate-limit", "input-offset"), 7750016),
+        (("offset", "state-clip"), 7750017),
+        # A jump of many standard deviations is sharper than the step that is calibrated.
+        (("ageing", "jump"), 7750012),
+    ],
+)
+def test_errors_of_the_calibration_are_no_further_causes(effects: tuple[str, ...], seed: int) -> None:
+    found = run_trial(Trial(effects, seed, band=(1.0, 4.0), core="cascaded-tanks"))
+    assert found.exact

@@ -20,6 +20,9 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.screening import screen_effects
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.timing import DELAY
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
@@ -123,6 +126,20 @@ def test_steps_are_halved_until_the_output_converges() -> None:
     refitted = calibrate(ExtendedSimulator(core, (), fit.simulation.context), target, fit.values)
     assert refitted.values[:3] == pytest.approx(stiff, rel=0.01)
     assert refitted.mean_square < 0.3 * fit.mean_square
+
+
+@pytest.mark.parametrize("delay", [4, -12])
+def test_lead_of_an_output_is_as_small_as_the_record_permits(delay: int) -> None:
+    """A hold is half a sample late, so that a shorter delay is a lead there, and a lead is longer."""
+    t = DT / FINE * np.arange(SAMPLES * FINE)
+    fine_u = sum(np.sin(2 * np.pi * f * t + f) for f in (0.7, 1.9, 3.1, 4.3))
+    y = add_noise(simulate_finely(np.roll(fine_u, delay)))
+    record = recorded(fine_u[::FINE], y, DT, ("N", "m"))
+    base, target = calibrate_to(record, ResampledSimulator(oscillator(), InterSample.ZOH, 1))
+    fit = screen_effects(base, target, DiagnosisRun([DELAY]))[0].fit
+    lead = float(fit.values[fit.simulation.get_slice(DELAY)][0])
+    assert lead == pytest.approx((delay / FINE - 0.5) * DT, abs=0.1 * DT)
+    assert get_intersample(select_intersample(fit, target)) != InterSample.ZOH
 
 
 @pytest.mark.parametrize("seed", range(8))

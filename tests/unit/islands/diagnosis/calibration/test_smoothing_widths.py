@@ -1,4 +1,4 @@
-"""Width of simulated dry friction: a record with little noise shows it, and another one does not."""
+"""Widths of dry friction and of steps: a record with little noise shows them, and another one does not."""
 
 from dataclasses import replace
 
@@ -7,14 +7,18 @@ import pytest
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.diagnosis.calibration.friction_width import narrow_friction
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples
+from islands.diagnosis.calibration.smoothing_widths import narrow_friction, narrow_steps
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.documents.extension_json import extended_document
+from islands.effects.baseline import JUMP
 from islands.effects.friction import COULOMB_FRICTION
+from islands.facade.results.saved_simulation import SavedSimulation
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
+from islands.simulators.specification.table import LocalExtendedSpec
 from support.built_in_simulators import make_oscillator
 
 SAMPLES, DT = 900, 0.01
@@ -57,3 +61,37 @@ def test_width_that_noise_hides_remains() -> None:
 def test_simulation_without_dry_friction_keeps_its_context() -> None:
     found, target = fit(0.005, 1e-5, has_friction=False)
     assert narrow_friction(found, target) is found.simulation.context
+
+
+def fit_jump(size: float) -> tuple[CalibrationResult, Target, Dataset]:
+    """Calibrate an oscillator with a jump to a record with a sharp one, of a size relative to its noise."""
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal(SAMPLES)
+    core = ResampledSimulator(make_oscillator(0.5, 2.0, 100.0), InterSample.ZOH, 4)
+    y = scipy.signal.lsim(([1.0], [0.5, 2.0, 100.0]), u, DT * np.arange(SAMPLES), interp=False)[1]
+    noise = 0.02 * y.std()
+    y = y + noise * rng.standard_normal(SAMPLES) + size * noise * (np.arange(SAMPLES) >= 301)
+    record = Dataset(u, y, DT)
+    samples = count_fitted_samples(record)
+    simulation = ExtendedSimulator(core, (JUMP,), make_context(record, core, samples))
+    target = Target(y, np.arange(SAMPLES) < samples, None, {}, fitted=samples)
+    start = simulation.nominal
+    start[simulation.get_slice(JUMP)] = size * noise, 3.05
+    return calibrate(simulation, target, start), target, record
+
+
+def test_jump_of_many_standard_deviations_is_a_narrow_step() -> None:
+    wide, target, record = fit_jump(12.0)
+    narrow = narrow_steps(wide, target)
+    assert narrow.simulation.context.step_width < 1.0 < wide.simulation.context.step_width
+    assert narrow.score < wide.score - 50.0
+    instant = narrow.values[narrow.simulation.get_slice(JUMP)][1]
+    assert instant == pytest.approx(3.005, abs=0.005)
+    saved = LocalExtendedSpec.model_validate(extended_document(narrow, record))
+    simulated = SavedSimulation(saved).simulate(record).y  # with other initial states
+    assert simulated[299:] == pytest.approx(narrow.output[299:], abs=1e-9)
+
+
+def test_jump_of_the_size_of_the_noise_keeps_its_width() -> None:
+    wide, target, _ = fit_jump(1.0)
+    assert narrow_steps(wide, target) is wide

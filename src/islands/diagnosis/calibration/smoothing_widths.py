@@ -1,0 +1,64 @@
+"""Selection of the widths over which effects with a discontinuity are smoothed.
+
+Dry friction is smoothed around a rate of zero, and a step over time around its instant, since calibration
+requires a derivative. A record whose noise is small next to the effect shows the difference from a sign or a
+step, which would be taken for another law.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+from islands.diagnosis.calibration.intersample_selection import MIN_IMPROVEMENT
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.target import Target
+from islands.effects.baseline import JUMP
+from islands.effects.friction import COULOMB_FRICTION
+from islands.effects.interface.context import SimulationContext
+from islands.effects.time_variation import GAIN_STEP
+
+#: Width of a try relative to the one before.
+_NARROWER = 0.25
+
+#: Least width of dry friction relative to the typical rate, and of a step in samples.
+_LEAST_FRICTION, _LEAST_STEP = 2e-4, 0.1
+
+#: ``context -> context`` with a narrower width; None below the least one.
+_Narrow: TypeAlias = Callable[[SimulationContext], SimulationContext | None]
+
+
+def narrow_friction(fit: CalibrationResult, target: Target) -> SimulationContext:
+    """Return the context of a fit, with a narrower dry friction if that explains the record better."""
+    if COULOMB_FRICTION in fit.simulation.effects:
+        fit = _narrow(fit, target, _make_friction_narrower)
+    return fit.simulation.context
+
+
+def narrow_steps(fit: CalibrationResult, target: Target) -> CalibrationResult:
+    """Return a fit with narrower steps over time if these explain the record better.
+
+    The instant of a step is found with the wide one, whose derivative reaches farther.
+    """
+    is_step = {JUMP.name, GAIN_STEP.name} & {effect.name for effect in fit.simulation.effects}
+    return _narrow(fit, target, _make_steps_narrower) if is_step else fit
+
+
+def _narrow(fit: CalibrationResult, target: Target, make_narrower: _Narrow) -> CalibrationResult:
+    """Calibrate with narrower widths as long as that explains the record better."""
+    while (context := make_narrower(fit.simulation.context)) is not None:
+        narrower = calibrate(replace(fit.simulation, context=context), target, fit.values)
+        if not narrower.score < fit.score - MIN_IMPROVEMENT:
+            break
+        fit = narrower
+    return fit
+
+
+def _make_friction_narrower(context: SimulationContext) -> SimulationContext | None:
+    width = _NARROWER * context.force_coordinate.friction_smoothing
+    coordinate = replace(context.force_coordinate, friction_smoothing=width)
+    return None if width < _LEAST_FRICTION else replace(context, force_coordinate=coordinate)
+
+
+def _make_steps_narrower(context: SimulationContext) -> SimulationContext | None:
+    width = _NARROWER * context.step_width
+    return None if width < _LEAST_STEP else replace(context, step_width=width)
