@@ -73,9 +73,11 @@ def with_effect(hypothesis: Hypothesis, screened: ScreenedEffect) -> Hypothesis:
     return Hypothesis(screened.fit, cost, (*hypothesis.effects, screened.effect))
 
 
-def screen_others(hypothesis: Hypothesis, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
-    """Screen the effects that a hypothesis does not have, in addition to its own."""
-    return screen_effects(hypothesis.fit, target, run.without_effects(hypothesis.effects))
+def screen_others(
+    hypothesis: Hypothesis, target: Target, run: DiagnosisRun, larger: CalibrationResult | None = None
+) -> list[ScreenedEffect]:
+    """Screen the effects that a hypothesis does not have, in addition to its own; see `screen_effects`."""
+    return screen_effects(hypothesis.fit, target, run.without_effects(hypothesis.effects), larger)
 
 
 def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
@@ -103,4 +105,6 @@ def remove_each(
 def find_alternatives(hypothesis: Hypothesis, target: Target, run: DiagnosisRun) -> tuple[Alternatives, ...]:
     """Remove each effect in turn, and screen the effects that could take its place, itself included."""
     reduced = remove_each(hypothesis, hypothesis.effects, target, run.parallel_map)
-    return tuple(Alternatives(without, screen_others(without, target, run)) for without in reduced)
+    return tuple(
+        Alternatives(without, screen_others(without, target, run, hypothesis.fit)) for without in reduced
+    )

@@ -69,8 +69,20 @@ def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     return (values + effect.extra_degrees_of_freedom) * float(np.log(base.noise.effective_samples))
 
 
-def screen_effects(base: CalibrationResult, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
-    """Extend a simulation by each effect in turn and calibrate it; return the best first."""
+def screen_effects(
+    base: CalibrationResult, target: Target, run: DiagnosisRun, larger: CalibrationResult | None = None
+) -> list[ScreenedEffect]:
+    """Extend a simulation by each effect in turn and calibrate it; return the best first.
+
+    Parameters
+    ----------
+    base : CalibrationResult
+    target : Target
+    run : DiagnosisRun
+    larger : CalibrationResult, optional
+        Fit of the simulation with one effect more. Calibrations start from its values as well: without that
+        effect, the others may be in another minimum.
+    """
     projection = Projection(base, target)
     candidates = [
         (starts[0][0], effect, [values for _, values in starts])
@@ -91,6 +103,11 @@ def screen_effects(base: CalibrationResult, target: Target, run: DiagnosisRun) -
             or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
         ]
     tasks = [(_extend(base, effect), starts) for _, effect, starts in candidates]
+    if larger is not None:
+        tasks = [
+            (simulation, [*starts, _start_from(larger, simulation, effect, starts[0])])
+            for (simulation, starts), (_, effect, _) in zip(tasks, candidates, strict=True)
+        ]
     penalties = [bic_penalty(effect, base) for _, effect, _ in candidates]
     fits = calibrate_best(tasks, penalties, target, run.parallel_map)
     screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
@@ -214,6 +231,17 @@ class StartFinder:
                 for start, other, values in zip(starts, others, scaled, strict=True)
             ]
         return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
+
+
+def _start_from(
+    larger: CalibrationResult, simulation: ExtendedSimulator, effect: Effect, start: Signal
+) -> Signal:
+    """Return the values of a fit for a simulation with another effect, which begins at a starting point."""
+    values = transfer_parameters(larger.values, larger.simulation, simulation)
+    if effect not in larger.simulation.effects:
+        part = simulation.get_slice(effect)
+        values[part] = start[part]
+    return values
 
 
 def _extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:

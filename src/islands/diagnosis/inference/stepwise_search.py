@@ -9,6 +9,7 @@ import numpy as np
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, whiten_target
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.chance_gain import ForwardSelection
 from islands.diagnosis.inference.hypothesis import (
     Alternatives,
     Hypothesis,
@@ -49,6 +50,7 @@ def stepwise_search(
     target: Target,
     run: DiagnosisRun,
     pairs: bool = False,
+    start: Hypothesis | None = None,
 ) -> tuple[Hypothesis, Target]:
     """Return the best hypothesis, and the target with its noise model.
 
@@ -65,8 +67,10 @@ def stepwise_search(
     pairs : bool
         Whether the first effect of a pair may have an insufficient gain alone: two causes may mask each
         other.
+    start : Hypothesis, optional
+        Hypothesis to which effects are added; the simulation without effects by default.
     """
-    best = Hypothesis(base, base.score, ())
+    best = start or Hypothesis(base, base.score, ())
     beam = [best]
     max_effects = MAX_EFFECTS + 1 if pairs else MAX_EFFECTS
     while beam and _count_causes(beam[0]) < max_effects:
@@ -90,7 +94,31 @@ def stepwise_search(
         if not pairs:
             least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
             beam = [each for each in beam if base.score - each.cost >= least]
-    return refine_by_swaps(best, target, run, max_effects)
+    refined, new_target = refine_by_swaps(best, target, run, max_effects)
+    if not pairs and refined.effects and refined.fit.noise.order:
+        return _add_pair(refined, new_target, run, max_effects)
+    return refined, new_target
+
+
+def _add_pair(
+    hypothesis: Hypothesis, target: Target, run: DiagnosisRun, max_effects: int
+) -> tuple[Hypothesis, Target]:
+    """Add two effects at once to a hypothesis that leaves coloured noise, if that gains enough for both.
+
+    The noise model may take the response to one of them for noise, as long as the other one is missing.
+    """
+    min_gain = 2.0 * _get_min_further_gain(target, run.effects)
+    others = [effect for effect in run.effects if effect not in hypothesis.effects and not effect.is_tuned]
+    if ForwardSelection(hypothesis.fit, target, others, 2).compute_gain() < min_gain:
+        return hypothesis, target
+    firsts = [with_effect(hypothesis, each) for each in screen_others(hypothesis, target, run)[:BEAM_WIDTH]]
+    pairs = _extend_beam(((first, screen_others(first, target, run)[:1]) for first in firsts), None)
+    beam, refitted = refit_with_ar_noise(pairs, target, run.parallel_map)
+    if not beam or beam[0].cost > hypothesis.cost - min_gain:
+        return hypothesis, target
+    found, refitted = refine_by_swaps(beam[0], refitted, run, max_effects)
+    is_better = _count_causes(found) <= max_effects and found.cost < hypothesis.cost - min_gain
+    return (found, refitted) if is_better else (hypothesis, target)
 
 
 def _extend_beam(
@@ -173,7 +201,12 @@ def refine_by_swaps(
             candidates += [each for each in larger if each.cost < hypothesis.cost - min_gain]
         best = min(candidates, key=attrgetter("rank"), default=hypothesis)
         if best.cost > hypothesis.cost - SCORE_TIE:
-            return replace(hypothesis, alternatives=alternatives), target
+            smaller = _find_smaller(hypothesis, alternatives, target, min_gain, run)
+            if smaller is None:
+                return replace(hypothesis, alternatives=alternatives), target
+            complete = smaller.effects
+            (hypothesis,), target = refit_with_ar_noise([smaller], target)
+            continue
         if set(best.effects) == set(hypothesis.effects) and best.cost > hypothesis.cost - MIN_GAIN:
             # Same effects with slightly better values: another pass would not find others.
             refined = replace(hypothesis, fit=best.fit, cost=best.cost, alternatives=alternatives)
@@ -182,6 +215,30 @@ def refine_by_swaps(
         best = eliminate_backward(best, target, min_gain, run)
         (hypothesis,), target = refit_with_ar_noise([best], target)
     return hypothesis, target
+
+
+def _find_smaller(
+    hypothesis: Hypothesis,
+    alternatives: Sequence[Alternatives],
+    target: Target,
+    min_gain: float,
+    run: DiagnosisRun,
+) -> Hypothesis | None:
+    """Return a hypothesis with fewer effects, one of which takes the place of two; None if none is as good.
+
+    An effect has to gain enough over the best hypothesis with one effect less, also over one with others.
+    """
+    limit = hypothesis.cost + min_gain
+    replaced = [
+        with_effect(each.without, screened)
+        for each in alternatives
+        for screened in each.screened[: BEAM_WIDTH + 1]
+        if screened.effect not in hypothesis.effects
+    ]
+    near = [each for each in replaced if each.cost < limit]
+    reduced = [eliminate_backward(each, target, min_gain, run) for each in near]
+    smaller = [each for each in reduced if each.cost < limit and len(each.effects) < len(hypothesis.effects)]
+    return min(smaller, key=attrgetter("rank"), default=None)
 
 
 def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:

@@ -28,6 +28,7 @@ from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
+from islands_measurements.detection.trial import Trial, run_trial
 from support.built_in_simulators import make_piezo
 from support.simulated_records import DT, made, recorded, wave
 
@@ -255,3 +256,22 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
     found, _ = refine_by_swaps(initial, target, DiagnosisRun(effects))
     assert found.effects == ()
     assert found.fit.values == pytest.approx([1.3], rel=1e-3)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("effects", "seed"),
+    [
+        # The gain step looks like a thermal drift, and the offset gains nothing next to that.
+        (("offset", "delay", "gain-step"), 7700005),
+        # Without the offset, the limit of the level is in another minimum.
+        (("offset", "state-clip"), 7700000),
+        # Two effects imitate the flow better than any one, until that takes the place of both.
+        (("jump", "input-offset"), 6970000),
+    ],
+    ids=["two-at-once", "two-minima", "one-for-two"],
+)
+def test_several_causes_are_found_though_one_alone_is_another(effects: tuple[str, ...], seed: int) -> None:
+    found = run_trial(Trial(effects, seed, band=(1.0, 4.0), core="cascaded-tanks"))
+    assert found.within_sets
+    assert found.noise == ()
