@@ -70,12 +70,16 @@ def search_inner_effects(
         target = whiten_target(target, fit)
         fit = calibrate(simulation, target, fit.values)
     bare = simulation.with_effects(())
-    start = transfer_parameters(fit.values, simulation, bare)
-    without = calibrate(bare, target, base.values if simulator is base.simulation.simulator else start)
+    given = transfer_parameters(fit.values, simulation, bare)
+    without = calibrate(bare, target, base.values if simulator is base.simulation.simulator else given)
     own = run.with_effects(list_effects(simulator, run, [inner.effect]))
     others = screen_effects(without, target, own.without_effects([inner.effect]))
-    screened = [ScreenedEffect(inner.effect, fit), *others]
-    hypothesis, target = stepwise_search(without, screened, target, own)
+    single, start = [ScreenedEffect(inner.effect, fit)], None
+    if len(simulation.effects) > 1:
+        single = screen_effects(without, target, own.with_effects([inner.effect]))
+        start = Hypothesis(fit, _compute_cost(fit, base), simulation.effects)
+    screened = [*single, *others]
+    hypothesis, target = stepwise_search(without, screened, target, own, start=start)
     found = assess_evidence(make_outcome(without, screened, target, hypothesis), own)
     possible = [inner.effect, *_list_inner_effects(simulator, run)]
     is_inner = any(effect in possible for effect in found.hypothesis.effects)
@@ -136,18 +140,22 @@ def _find_best_effect(
     """
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(alone.fit.simulation, target, alone.fit.values)
-    best, least = None, scored.score + sum(bic_penalty(effect, base) for effect in alone.effects)
-    least -= EQUIVALENCE_MARGIN
+    best, least = None, _compute_cost(scored, base) - EQUIVALENCE_MARGIN
     unsigned = fit_unsigned_output(base, target, run)
     screened = [] if unsigned is None else [unsigned]
-    screened += fit_jumping_inputs(base, target, run)
-    starts = [base, alone.fit] if alone.effects else [base]
+    starts = [base, scored] if alone.effects else [base]
+    screened += [each for start in starts for each in fit_jumping_inputs(start, target, run)]
     fits = [states for start in starts for states in list_state_fits(start, target)]
     for states in [*fits, *list_process_fits(base, target)]:
         inner = _list_inner_effects(states.simulation.simulator, run)
         screened += screen_effects(states, target, run.with_effects(inner))
     for each in screened:
-        cost = each.fit.score + bic_penalty(each.effect, base)
+        cost = _compute_cost(each.fit, base)
         if cost < least:
             best, least = each, cost
     return best
+
+
+def _compute_cost(fit: CalibrationResult, base: CalibrationResult) -> float:
+    """Return the score of a fit plus the BIC penalties of its effects."""
+    return fit.score + sum(bic_penalty(effect, base) for effect in fit.simulation.effects)

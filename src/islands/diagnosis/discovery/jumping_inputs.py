@@ -25,6 +25,7 @@ from islands.diagnosis.discovery.state_equations import (
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.screening import ScreenedEffect, transfer_parameters
 from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import catalogue_order
 from islands.effects.hysteresis import STICTION
 from islands.effects.interface.effect import Effect, Signal, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
@@ -34,19 +35,24 @@ from islands.simulators.intersample import InterSample, resample_input
 from islands.simulators.linear import estimate_linear
 
 #: Maximum number of cells of the input. A step needs three.
-_CELLS = 120
+_CELLS = 400
 
 #: Number of values of the input per sample from which the part of the time in a cell is computed.
 _FINE = 8
 
 #: Numbers of steps within twice the peak of the input, and offsets relative to the step. At the peak, the
-#: levels of successive numbers differ by a twentieth of a step.
-_COUNTS, _OFFSETS = np.arange(2.0, 40.0, 0.1), np.arange(-7, 9) / 16.0
+#: levels of successive numbers differ by a twentieth of a step, and by a tenth if they are many.
+_COUNTS = np.concatenate([np.arange(2.0, 40.0, 0.1), np.arange(40.0, 100.0, 0.2)])
+_OFFSETS = np.arange(-7, 9) / 16.0
+
+#: Numbers of steps and offsets near the best ones that are compared then, relative to these. An input that
+#: takes all values tells them apart, and one with few levels permits a range.
+_NEAR_COUNTS, _NEAR_OFFSETS = np.arange(-10, 11) / 50.0, np.arange(-4, 5) / 64.0
 
 #: Range of the size of a change relative to the expected one: cells that contain an edge reduce it.
 _SIZES = (0.6, 1.2)
 
-#: Part of the misfit that values explain before they are calibrated, and how many are calibrated.
+#: Part of the misfit that values explain before they are calibrated, and how many different ones are.
 _MIN_FRACTION, _STARTS = 0.1, 2
 
 #: Maximum number of searches, each with the plant of the one before, and largest mean square relative to it.
@@ -80,15 +86,15 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
     Parameters
     ----------
     base : CalibrationResult
-        The simulation without effects, calibrated to unweighted residuals.
+        The simulation, calibrated to unweighted residuals. It keeps its effects.
     target, run
         Arguments of a search, whose effects are searched for.
     """
-    found = []
-    if QUANTISED_INPUT in run.effects:
+    found, known = [], base.simulation.effects
+    if QUANTISED_INPUT in run.effects and QUANTISED_INPUT not in known:
         cells = _divide_input(base, target)
         found.append(_search(QUANTISED_INPUT, base, target, lambda plant: _list_steps(cells, plant, target)))
-    if STICTION in run.effects:
+    if STICTION in run.effects and STICTION not in known:
         found.append(_search(STICTION, base, target, lambda plant: _list_breakaways(plant, target)))
     return [each for each in found if each is not None]
 
@@ -97,7 +103,8 @@ def _search(
     effect: Effect, base: CalibrationResult, target: Target, list_points: _ListPoints
 ) -> ScreenedEffect | None:
     """Return the best fit of an effect; None if it explains nothing."""
-    simulation = _halve_steps(base.simulation).with_effects((effect,))
+    effects = catalogue_order((*base.simulation.effects, effect))
+    simulation = _halve_steps(base.simulation).with_effects(effects)
     plant, best = base, None
     for _ in range(_SEARCHES):
         fits = [_calibrate(plant, simulation, effect, point, target) for point in list_points(plant)]
@@ -140,7 +147,7 @@ def _estimate_plant(
 ) -> list[Signal]:
     """Return values with those of a linear model of the output over the input after an effect, if any."""
     linear, context = get_linear(plant), plant.simulation.context
-    if linear is None or target.prior_std or len(context.bounds) > 1:
+    if linear is None or plant.simulation.effects or target.prior_std or len(context.bounds) > 1:
         return []
     record = make_fitted_record(context, target)
     moved = apply_map(effect, context.u, start[part], context)[: record.samples]
@@ -177,21 +184,33 @@ def _list_steps(cells: _Cells, plant: CalibrationResult, target: Target) -> list
     responses = np.column_stack(
         [projection(convolve(part, response, context.segments)) for part in cells.parts]
     )
-    steps = np.repeat(2.0 * context.input_peak / _COUNTS, _OFFSETS.size)
-    offsets = np.tile(_OFFSETS, _COUNTS.size) * steps
-    places = (cells.values - offsets[:, None]) / steps[:, None]
-    levels = np.round(places)
-    changes = steps[:, None] * (levels - places)
-    squares = np.einsum("ij,ij->i", changes @ (responses.T @ responses), changes)
-    explained = _explain(changes @ (responses.T @ projection.residual), squares)
+    gram, products = responses.T @ responses, responses.T @ projection.residual
+
+    def compare(counts: Signal, offsets: Signal) -> tuple[Signal, Signal, Signal]:
+        """Return steps and offsets, their levels in each cell, and the decrease of the sum of squares."""
+        steps = np.repeat(2.0 * context.input_peak / counts, offsets.size)
+        parts = np.tile(offsets, counts.size)
+        places = cells.values / steps[:, None] - parts[:, None]
+        levels = np.round(places)
+        changes = steps[:, None] * (levels - places)
+        explained = _explain(changes @ products, np.sum(changes @ gram * changes, axis=1))
+        return np.column_stack([steps, parts * steps]), levels, explained
+
+    points, levels, explained = compare(_COUNTS, _OFFSETS)
+    counts = 2.0 * context.input_peak / points[:, 0]
     least = _MIN_FRACTION * float(projection.residual @ projection.residual)
     found: list[Signal] = []
-    while len(found) < _STARTS and explained.max() > least:
+    for _ in range(_STARTS):
         best = int(np.argmax(explained))
+        if not explained[best] > least:
+            break
         is_same = (levels == levels[best]).all(axis=1)
-        found.append(np.array([steps[is_same].mean(), offsets[is_same].mean()]))
-        is_near = np.abs(context.input_peak / steps - context.input_peak / steps[best]) < 0.5
-        explained[is_near | is_same] = 0.0
+        near, _, near_explained = compare(
+            np.maximum(counts[best] + _NEAR_COUNTS, _COUNTS[0]),
+            points[best, 1] / points[best, 0] + _NEAR_OFFSETS,
+        )
+        found += [points[is_same].mean(axis=0), near[int(np.argmax(near_explained))]]
+        explained[is_same | (np.abs(counts - counts[best]) < 1.0)] = 0.0
     return found
 
 
@@ -224,8 +243,6 @@ def _divide_input(fit: CalibrationResult, target: Target) -> _Cells:
 
 def _average(cells: NDArray[np.int64], count: int, fine: int) -> Signal:
     """Return the part of the time around each sample in each cell: an input is linear between samples."""
-    is_in = (cells == np.arange(count)[:, None]).astype(np.float64)
-    if fine == 1:
-        return is_in
     weights = np.bartlett(2 * fine + 1)[1:-1] / fine
-    return np.array([np.convolve(each, weights, "same")[::fine] for each in is_in])
+    # One cell after the other: all of them together take hundreds of megabytes.
+    return np.array([np.convolve(cells == cell, weights, "same")[::fine] for cell in range(count)])

@@ -7,7 +7,8 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.resolution import DITHERED_RMS, is_unresolved
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hypothesis import Hypothesis, without_effect
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.effect import Effect, Signal, Site
+from islands.simulators.extended import ExtendedSimulator
 
 #: Probability that the confidence region of a strength contains it.
 REGION_PROBABILITY = 0.95
@@ -37,9 +38,10 @@ def _may_be_zero(fit: CalibrationResult, effect: Effect, covariance: Signal) -> 
     The shape of the effect, as the time constant of a creep, is given: without it, a short record that shows
     the effect determines its strength less than its response. Of an effect without a strength all values
     count: one limit of a range may not be reached. A free form has none: a gain of the simulation may make
-    up for the size of all of its values. The response to a value that jumps has no derivative.
+    up for the size of all of its values. The response to a value that jumps has no derivative, nor has that
+    to an effect in front of an actuator that jumps.
     """
-    if effect.is_free or effect.centre is not None:
+    if effect.is_free or effect.centre is not None or _is_before_jumps(effect, fit.simulation):
         return False
     part = fit.simulation.get_slice(effect)
     parameters = effect.parameters(fit.simulation.context)
@@ -50,6 +52,12 @@ def _may_be_zero(fit: CalibrationResult, effect: Effect, covariance: Signal) -> 
     return may_be_zero(
         fit.values[places] - [each.nominal for each in parameters[:count]], covariance[places, places] - given
     )
+
+
+def _is_before_jumps(effect: Effect, simulation: ExtendedSimulator) -> bool:
+    """Return whether an effect changes the input of an actuator that moves in jumps."""
+    maps = [each for each in simulation.effects if each.site == Site.INPUT]
+    return effect in maps and any(each.centre is not None for each in maps[maps.index(effect) + 1 :])
 
 
 def may_be_zero(values: Signal, covariance: Signal) -> bool:

@@ -11,6 +11,9 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.jumping_inputs import fit_jumping_inputs
+from islands.diagnosis.inference.hypothesis import Hypothesis
+from islands.diagnosis.inference.resolved_effects import remove_unresolved
+from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
@@ -48,6 +51,15 @@ def make_record(name: str, seed: int) -> Dataset:
     return Dataset(u, x + NOISE * noise, 0.1, ("u_V",), "y_V", ("V",), "V")
 
 
+def make_smooth_record(step: float, limit: float) -> Dataset:
+    """Return a record of an actuator with a limit that moves in steps; its input takes all values."""
+    rng = np.random.default_rng(5)
+    u = lfilter([0.3], [1.0, -0.7], rng.standard_normal(1200))
+    moved = step * np.round(np.clip(u, -limit, limit) / step)
+    x = lfilter([0.0, 0.3], [1.0, -0.9, 0.2], moved)
+    return Dataset(u, x + 0.002 * rng.standard_normal(u.size), 0.1, ("u_V",), "y_V", ("V",), "V")
+
+
 def fit(record: Dataset) -> tuple[CalibrationResult, Target]:
     fitted = count_fitted_samples(record)
     simulator = make_simulator("linear:2", record)
@@ -65,6 +77,31 @@ def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int
     found = fit_jumping_inputs(base, target, DiagnosisRun((QUANTISED_INPUT, STICTION)))
     exact = [each.effect.name for each in found if each.fit.mean_square**0.5 < 1.1 * NOISE]
     assert exact == ([] if name == "none" else [name])
+
+
+def test_small_steps_of_an_actuator_are_found() -> None:
+    record = make_smooth_record(0.05, np.inf)
+    base, target = fit(record)
+    (found,) = fit_jumping_inputs(base, target, DiagnosisRun([QUANTISED_INPUT]))
+    assert 2.0 * np.abs(record.u).max() / 0.05 > 50.0
+    step = found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)][0]
+    assert step == pytest.approx(0.05, rel=2e-3)
+    assert found.fit.mean_square**0.5 < 1.1 * 0.002 < 0.6 * base.mean_square**0.5
+
+
+def test_steps_are_found_behind_another_effect() -> None:
+    """The steps of the plant alone are not those of the actuator, whose limit it lacks."""
+    base, target = fit(make_smooth_record(0.2, 0.8))
+    saturation = CATALOGUE["input-saturation"]
+    limited = screen_effects(base, target, DiagnosisRun([saturation]))[0].fit
+    (found,) = fit_jumping_inputs(limited, target, DiagnosisRun([QUANTISED_INPUT]))
+    assert found.fit.simulation.effects == (saturation, QUANTISED_INPUT)
+    assert found.fit.mean_square**0.5 < 1.5 * 0.002 < 0.2 * limited.mean_square**0.5
+    step = found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)][0]
+    assert step == pytest.approx(0.2, rel=1e-2)
+    assert fit_jumping_inputs(found.fit, target, DiagnosisRun([QUANTISED_INPUT])) == []
+    hypothesis = Hypothesis(found.fit, found.fit.score, found.fit.simulation.effects)
+    assert remove_unresolved(hypothesis, target) is hypothesis
 
 
 def test_search_is_limited_to_the_effects_of_a_diagnosis() -> None:
