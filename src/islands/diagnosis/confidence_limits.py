@@ -26,8 +26,8 @@ from islands.estimation.noise_model import fit_noise
 #: Coloured part of the misfit up to which a cause explains it.
 MAX_COLOURED_FRACTION = 0.05
 
-#: Largest confidence of a cause that leaves more, or whose values are open; and of one that leaves more,
-#: without a significant gain on the hold-out part.
+#: Largest confidence of a cause that leaves more, or whose values are open; and of one that leaves more
+#: without a significant gain on the hold-out part, or diverges with another input.
 MAX_CONFIDENCE, MAX_CONFIDENCE_WITHOUT_GAIN = 0.85, 0.5
 
 #: Why such an extension is not offered.
@@ -38,7 +38,7 @@ _REFUSAL = (
 
 
 def limit_confidences(found: Diagnosis, target: Target) -> Diagnosis:
-    """Return a diagnosis without a larger confidence than a coloured remainder or open values allow.
+    """Return a diagnosis without a larger confidence than its remainder, values and extension allow.
 
     An extension that leaves a coloured error and has no significant gain on the hold-out part is not offered.
 
@@ -49,11 +49,13 @@ def limit_confidences(found: Diagnosis, target: Target) -> Diagnosis:
     """
     jumps = _list_open_jumps(found)
     found = _limit(found, MAX_CONFIDENCE, lambda each: each.name in jumps)
+    if found.trial is not None and found.trial.is_unstable:
+        found = _limit(found, MAX_CONFIDENCE_WITHOUT_GAIN, _is_cause)
     if not found.causes or measure_coloured_fraction(found, target) <= MAX_COLOURED_FRACTION:
         return found
     has_gain = found.gain is not None and found.gain.ci95[0] > 0.0
     limit = MAX_CONFIDENCE if has_gain else MAX_CONFIDENCE_WITHOUT_GAIN
-    found = _limit(found, limit, lambda each: each.explained_fraction is not None)
+    found = _limit(found, limit, _is_cause)
     if has_gain or found.trial is None or found.trial.refusal:
         return found
     return replace(found, trial=replace(found.trial, refusal=_REFUSAL))
@@ -65,6 +67,11 @@ def _list_open_jumps(found: Diagnosis) -> set[str]:
     if not is_held(simulation.context.u):
         return set()
     return {each.name for each in simulation.effects if each.centre is not None}
+
+
+def _is_cause(finding: Finding) -> bool:
+    """Return whether a finding is a cause, and no property of the noise."""
+    return finding.explained_fraction is not None
 
 
 def _limit(found: Diagnosis, limit: float, concerns: Callable[[Finding], bool]) -> Diagnosis:

@@ -1,8 +1,10 @@
-"""Trial of an extended simulation: over the intervals of its parameters, and with a larger input.
+"""Trial of an extended simulation: over the intervals of its parameters, and with other inputs.
 
-An effect whose value is uncertain, or whose force is stiff, may make a simulation diverge on the next record.
+An effect whose value is uncertain, whose law is wrong, or whose force is stiff may make a simulation diverge
+on the next record.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +19,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal
-from islands.simulators.extended import ExtendedSimulator
+from islands.effects.interface.effect import Signal, SimulationContext
 
 #: Largest factor of the recorded input with which an extended simulation is tried.
 INPUT_FACTOR = 1.2
@@ -47,11 +48,14 @@ class ExtensionTrial:
         that input alone.
     refusal : str or None
         Why it is not offered, as a sentence; None if it is.
+    is_unstable : bool
+        Whether it diverges at its values: the law is wrong. At other values they may be uncertain.
     """
 
     ranges: tuple[SignalRange, ...]
     input_factor: float
     refusal: str | None = None
+    is_unstable: bool = False
 
 
 def refine_extension(
@@ -83,9 +87,10 @@ def refine_extension(
 def try_extension(
     record: Dataset, base: CalibrationResult, best: CalibrationResult, target: Target
 ) -> ExtensionTrial:
-    """Simulate an extension at both ends of each interval of its parameters, and with a larger input.
+    """Simulate an extension at both ends of each interval of its parameters, and with other inputs.
 
-    The other parameters have their most probable values given that end.
+    They are larger than the recorded one, in the reverse order, and mirrored within its range. The other
+    parameters have their most probable values given an end.
 
     Parameters
     ----------
@@ -97,15 +102,27 @@ def try_extension(
     simulator = best.simulation.simulator
     # Another input has another output, which was not recorded.
     is_bound = simulator.is_recorded or simulator.fits_states
-    factors = (1.0,) if is_bound else (1.0, INPUT_FACTOR)
     labels, points = _list_ends(base, best, target)
-    refusal = None
-    for factor in factors:
-        place = _find_excursion(best, points, factor, target)
+    context, refusal, is_unstable = best.simulation.context, None, False
+    others = () if is_bound else _list_other_inputs(context)
+    for description, u in (("", context.u), *others):
+        place = _find_excursion(base, best, points, u, target)
         if place is not None:
-            refusal = _describe_refusal(labels[place], factor)
+            refusal, is_unstable = _describe_refusal(labels[place], description), place == 0
             break
-    return ExtensionTrial(measure_ranges(record, best.output), factors[-1], refusal)
+    factor = 1.0 if is_bound else INPUT_FACTOR
+    return ExtensionTrial(measure_ranges(record, best.output), factor, refusal, is_unstable)
+
+
+def _list_other_inputs(context: SimulationContext) -> Iterator[tuple[str, Signal]]:
+    """Yield inputs like the recorded one, with their descriptions."""
+    u = context.u
+    yield f"{INPUT_FACTOR:g} times the recorded input", INPUT_FACTOR * u
+    yield (
+        "the recorded input in reverse order",
+        np.concatenate([u[first:last][::-1] for first, last in context.bounds]),
+    )
+    yield "the recorded input mirrored within its range", u.min() + u.max() - u
 
 
 def _list_ends(
@@ -138,13 +155,20 @@ def find_added_parameters(base: CalibrationResult, best: CalibrationResult) -> d
     }
 
 
-def _find_excursion(best: CalibrationResult, points: Signal, factor: float, target: Target) -> int | None:
+def _find_excursion(
+    base: CalibrationResult, best: CalibrationResult, points: Signal, u: Signal, target: Target
+) -> int | None:
     """Return the first point at which the extension diverges or leaves the recorded range by far, or None.
 
-    The simulation with the same values, but without effects, may do so as well: that is not the extension.
+    The simulation without it may do so as well: that is not the extension. Without effects it has the same
+    values. Without terms it is another simulation, with its own ones.
     """
-    simulation = _scale_input(best, factor)
-    alone = simulation.with_effects(()).simulate_batch(points[:, simulation.simulator_slice])
+    context = replace(best.simulation.context, u=u, intersample_values=None)
+    simulation = replace(best.simulation, context=context)
+    if simulation.simulator.parameters == base.simulation.simulator.parameters:
+        alone = simulation.with_effects(()).simulate_batch(points[:, simulation.simulator_slice])
+    else:
+        alone = replace(base.simulation, context=context).simulate(base.values)[None, :]
     outputs = simulation.simulate_batch(points)
     low, high = float(np.nanmin(target.y)), float(np.nanmax(target.y))
     reach = MAX_EXCURSION * np.maximum(high - low, np.ptp(alone, axis=1))[:, None]
@@ -153,17 +177,9 @@ def _find_excursion(best: CalibrationResult, points: Signal, factor: float, targ
     return None if is_within.all() else int(np.argmin(is_within))
 
 
-def _scale_input(fit: CalibrationResult, factor: float) -> ExtendedSimulator:
-    """Return the simulation of a fit with a multiple of its input."""
-    context = fit.simulation.context
-    between = None if context.intersample_values is None else factor * context.intersample_values
-    return replace(fit.simulation, context=replace(context, u=factor * context.u, intersample_values=between))
-
-
-def _describe_refusal(label: str, factor: float) -> str:
-    at = f" with {label}, an end of its 95 % interval" if label else ""
-    larger = f" {'and' if at else 'with'} {factor:g} times the recorded input" if factor != 1.0 else ""
-    where = f"{at}{larger}," if label or larger else ""
+def _describe_refusal(label: str, description: str) -> str:
+    conditions = [f"{label}, an end of its 95 % interval"] * bool(label) + [description] * bool(description)
+    where = f" with {' and '.join(conditions)}," if conditions else ""
     return (
         f"The extended simulation is not offered:{where} it diverges, or its output leaves the "
         f"recorded range by more than {MAX_EXCURSION:g} times its width."

@@ -44,6 +44,9 @@ def test_a_name_that_leaves_a_coloured_error_is_no_more_than_probable():
     assert near.noise_claim.correlation_time > 0.0
     assert "probably lacks" in near.summary
     assert right.refusal is near.refusal is None
+    unstable = replace(right, trial=replace(right.trial, is_unstable=True))
+    limited = limit_confidences(unstable, make_target(right.record, right.estimation_samples, {}))
+    assert [each.confidence for each in limited.causes] == [MAX_CONFIDENCE_WITHOUT_GAIN]
 
 
 @pytest.mark.ci

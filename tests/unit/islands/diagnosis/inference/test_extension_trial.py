@@ -1,4 +1,4 @@
-"""Trial of an extended simulation over the intervals of its parameters, and with a larger input."""
+"""Trial of an extended simulation over the intervals of its parameters, and with other inputs."""
 
 from dataclasses import replace
 
@@ -8,8 +8,13 @@ from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
-from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    calibrate,
+    evaluate_fit,
+)
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
+from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.extension_trial import (
     INPUT_FACTOR,
     ExtensionTrial,
@@ -78,6 +83,54 @@ def test_extension_that_diverges_with_a_larger_input_is_refused() -> None:
     refusal = try_runaway(12.0, 1e-3).refusal
     assert refusal is not None
     assert "1.2 times the recorded input" in refusal
+
+
+def rise_at_falls(u: np.ndarray, values: np.ndarray, _: object) -> np.ndarray:
+    """Return a signal to which a fast fall adds much; the reverse of a sawtooth falls fast."""
+    return u + values[0] * 1e3 * np.maximum(-np.diff(u, prepend=u[0]) - 1.0, 0.0)
+
+
+def rise_with_mean(u: np.ndarray, values: np.ndarray, _: object) -> np.ndarray:
+    """Return a signal to which a large mean adds much."""
+    return u + values[0] * 1e3 * max(float(u.mean()) - 1.0, 0.0)
+
+
+def make_rare_peaks() -> tuple[Dataset, CalibrationResult, Target]:
+    """Return a record whose input rises fast, falls slowly, and is small for most of the time."""
+    phase = np.arange(400) % 40
+    u = np.where(phase < 2, 1.8 * phase, 3.6 * ((40 - phase) / 38) ** 4) - 0.6
+    record = Dataset(u, 1.01 * u + 0.01 * np.random.default_rng(1).standard_normal(400), 0.1)
+    simulator, target = PythonFunctionSimulator(copy_input, "copy"), make_target(record, 300, {})
+    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 300))
+    return record, calibrate(simulation, target, simulation.nominal), target
+
+
+@pytest.mark.parametrize(
+    ("form", "description"),
+    [(rise_at_falls, "in reverse order"), (rise_with_mean, "mirrored within its range")],
+)
+def test_extension_that_diverges_with_another_input_is_refused(form, description: str) -> None:
+    record, base, target = make_rare_peaks()
+    effect = replace(RUNAWAY, form=form)
+    best = evaluate_fit(base.simulation.with_effects([effect]), target, np.array([1.0]))
+    assert best.mean_square < 1.0
+    trial = try_extension(record, base, best, target)
+    assert trial.refusal is not None
+    assert f"with the recorded input {description}" in trial.refusal
+    assert trial.is_unstable
+
+
+def test_term_that_diverges_with_another_input_is_refused() -> None:
+    """A term is a part of the extended equations, and not of the simulation without it."""
+    record, base, target = make_rare_peaks()
+
+    def extended(u: np.ndarray, dt: float, a1: float = 0.5) -> np.ndarray:
+        return rise_with_mean(copy_input(u, dt), np.array([a1]), None)
+
+    simulation = replace(base.simulation, simulator=PythonFunctionSimulator(extended, "extended"))
+    trial = try_extension(record, base, evaluate_fit(simulation, target, np.array([1.0])), target)
+    assert trial.refusal is not None
+    assert "mirrored" in trial.refusal
 
 
 def test_extension_that_diverges_at_an_end_of_an_interval_is_refused() -> None:
