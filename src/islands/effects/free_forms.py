@@ -97,7 +97,8 @@ _LINEAR = ("delay", "sensor-lag", "resonance", "viscous", "relaxation", *_DRIFTI
 _LOOPS = ("second-hysteresis", "loop-asymmetry", "rate-dependent-loop", "coulomb-friction")
 _HYSTERETIC = ("backlash", "stiction", *_LOOPS)
 _SPRINGS = ("even-nonlinearity", "cubic-stiffness")
-_STATIC = ("dead-zone", "input-saturation", "absolute-value-sensor", "output-saturation", *_SPRINGS)
+_LIMITS = ("dead-zone", "input-saturation", "output-saturation")
+_STATIC = ("offset", "input-offset", *_LIMITS, "absolute-value-sensor", *_SPRINGS)
 _DAMPING = ("viscous", "coulomb-friction", "viscous-asymmetry", "quadratic-drag")
 _CHANGING = ("gain-step", "ageing")
 
