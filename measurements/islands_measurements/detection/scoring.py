@@ -221,7 +221,9 @@ def _score_sets(known: Sequence[TrialOutcome], goals: Targets) -> list[Proportio
     return [
         _count("false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True),
         _count("pairs exact", pairs, lambda each: each.exact, goals.pairs),
+        _count("pairs exact or equivalent", pairs, lambda each: each.within_sets),
         _count("triples exact", triples, lambda each: each.exact, goals.triples),
+        _count("triples exact or equivalent", triples, lambda each: each.within_sets),
     ]
 
 

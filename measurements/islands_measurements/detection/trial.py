@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -129,6 +130,15 @@ class TrialOutcome:
     def exact(self) -> bool:
         """Whether the names are exactly the injected faults."""
         return sorted(self.named) == sorted(self.trial.effects)
+
+    @property
+    def within_sets(self) -> bool:
+        """Whether there are as many names as faults, and each fault is a name or equivalent to one."""
+        sets = [{name, *equal} for name, equal in zip(self.named, self.equivalents, strict=True)]
+        orders = permutations(self.trial.effects)
+        return len(sets) == len(self.trial.effects) and any(
+            all(fault in found for fault, found in zip(order, sets, strict=True)) for order in orders
+        )
 
     @property
     def within_set(self) -> bool:
