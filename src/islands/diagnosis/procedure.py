@@ -8,7 +8,6 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.diagnosis.assembly import extend_equations, make_diagnosis, make_gross_diagnosis
 from islands.diagnosis.calibration.intersample_selection import (
-    MIN_IMPROVEMENT,
     Discretisation,
     get_discretisation,
     select_intersample,
@@ -299,17 +298,10 @@ def _search_with_steps(
             outcome = search_with_ar_noise(base, screened, target, run)
             found[current] = base, outcome
             selected = select_intersample(outcome.hypothesis.fit, outcome.target)
-            if len(found) == MAX_SEARCHES or get_discretisation(selected) in found:
-                return _choose_outcome(found, current)
+            if get_discretisation(selected) == current:
+                return found[current]
+            if get_discretisation(selected) in found or len(found) == MAX_SEARCHES:
+                return min(found.values(), key=lambda each: each[1].hypothesis.cost)
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
         run.progress("intersample behaviour changed: repeating the search")
         simulator = selected
-
-
-def _choose_outcome(
-    found: Mapping[Discretisation, tuple[CalibrationResult, SearchOutcome]], last: Discretisation
-) -> tuple[CalibrationResult, SearchOutcome]:
-    """Return the last outcome unless another one is clearly better: each discretisation led to the next."""
-    costs = {each: outcome.hypothesis.cost for each, (_, outcome) in found.items()}
-    best = min(costs, key=costs.__getitem__)
-    return found[best if costs[best] < costs[last] - MIN_IMPROVEMENT else last]

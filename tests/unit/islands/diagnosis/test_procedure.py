@@ -197,13 +197,13 @@ def test_diverging_simulation_is_rejected(record: Dataset) -> None:
 
 
 @pytest.mark.ci
-def test_intersample_behaviour_that_is_rejected_ends_the_search(
+def test_better_of_two_intersample_behaviours_counts_if_neither_is_confirmed(
     record: Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The search before counts: it is not repeated."""
+    """Each search selects the behaviour of the other one."""
     held, effects = ResampledSimulator(make_piezo(), InterSample.ZOH, 1), [CATALOGUE["quadratic-drag"]]
     once = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
-    # Before the search, after the screening, after the search, and after the screening of the held input.
+    # Before the search, after the screening, after the search, and after the search with the held input.
     selected = iter([make_piezo(), make_piezo(), held, make_piezo()])
     monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
     found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
