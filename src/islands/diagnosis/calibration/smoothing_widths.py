@@ -39,8 +39,8 @@ def narrow_steps(fit: CalibrationResult, target: Target) -> CalibrationResult:
 
     The instant of a step is found with the wide one, whose derivative reaches farther.
     """
-    is_step = {JUMP.name, GAIN_STEP.name} & {effect.name for effect in fit.simulation.effects}
-    return _narrow(fit, target, _make_steps_narrower) if is_step else fit
+    has_step = any(effect in fit.simulation.effects for effect in (JUMP, GAIN_STEP))
+    return _narrow(fit, target, _make_steps_narrower) if has_step else fit
 
 
 def _narrow(fit: CalibrationResult, target: Target, make_narrower: _Narrow) -> CalibrationResult:
