@@ -33,9 +33,9 @@ class SimulationRun:
         Index of the run of the same call from which this one differs by a small change. Its output is needed
         for derivatives: a simulator that fits states may fit those of this run to first order.
     characteristic : callable or None
-        Static map of the input that acts on the values between samples as well, ``values -> values`` of shape
-        (values,); None for none. Only simulators in continuous time have runs with one. Runs with the same
-        map have the same object.
+        Map of the input that acts on the values between samples as well, ``values -> values`` of shape
+        (values,) in the order of time, as many for each sample; None for none. Only simulators in continuous
+        time have runs with one. Runs with the same map have the same object.
     """
 
     values: Signal
@@ -52,7 +52,7 @@ class SimulationRun:
         return id(self.x), id(self.characteristic)
 
     def apply_characteristic(self, signal: Signal) -> Signal:
-        """Return values of the input, of any shape, after ``characteristic``."""
+        """Return values of the input after ``characteristic``, of any shape with the time along its rows."""
         if self.characteristic is None:
             return signal
         return self.characteristic(signal.reshape(-1)).reshape(signal.shape)
@@ -196,7 +196,7 @@ class Simulator(ABC):
         for run in runs:
             own, x = context, run.apply_characteristic(run.x)
             if run.intersample_values is not None:
-                between = run.apply_characteristic(run.intersample_values)
+                between = run.apply_characteristic(run.intersample_values.T).T
                 own = replace(context, u=x, intersample_values=between)
             output = self.simulate(run.values, x, own, run.effect_parameters, run.forces)
             outputs.append(output[::every])

@@ -1,8 +1,9 @@
 """Input of a simulation after the maps of effects."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import NamedTuple
+
+import numpy as np
 
 from islands.effects.interface.context import Signal, SimulationContext
 from islands.effects.interface.effect import Effect, apply_map
@@ -40,9 +41,22 @@ def map_input(
     """
     last = count_sampled_maps([effect for effect, _ in maps]) if is_continuous_time else len(maps)
 
-    def apply(part: Sequence[tuple[Effect, Signal]], signal: Signal) -> Signal:
-        for effect, values in part:
-            signal = apply_map(effect, signal, values, context)
+    x = context.u
+    for effect, values in maps[:last]:
+        x = apply_map(effect, x, values, context)
+    if not maps[last:]:
+        return MappedInput(x, None)
+    held, at_samples = [], x
+    for effect, values in maps[last:]:
+        at_samples = apply_map(effect, at_samples, values, context)
+        held.append(at_samples)
+
+    def characteristic(signal: Signal) -> Signal:
+        for (effect, values), each in zip(maps[last:], held, strict=True):
+            if effect.continuation is None:
+                signal = apply_map(effect, signal, values, context)
+            else:
+                signal = effect.continuation(np.repeat(each, signal.size // each.size), signal, values, context)
         return signal
 
-    return MappedInput(apply(maps[:last], context.u), partial(apply, maps[last:]) if maps[last:] else None)
+    return MappedInput(x, characteristic)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 from islands.export.equations.collection import CHANNEL_OPERATORS
-from islands.export.equations.extended_system import ExtendedEquations, SampledCore, SignalMap
+from islands.export.equations.extended_system import ExtendedEquations, SampledCore, SignalMap, name_held
 from islands.export.equations.language import Language
 from islands.export.equations.sampled_core import MEASURED, RECORDED
 from islands.export.equations.statements import EquationCode, make_step
@@ -36,12 +36,14 @@ class EquationProgram(ABC):
         self.columns = [self.code.identifiers[name] for name in equations.columns]
         self.states = self.code.list_states()
         self.input = self.code.identifiers[equations.system.input]
+        self.maps = (*equations.input_maps, *equations.held_maps, *equations.output_maps)
+        places = range(len(equations.held_maps))
+        self.held = {name: self.code.identifiers[name] for name in map(name_held, places)}
 
     def write(self) -> str:
         """Return the program."""
         given, language = self.given, self.language
-        maps = [*given.input_maps, *given.output_maps]
-        operators = {name for each in maps for name, _ in each.operators}
+        operators = {name for each in self.maps for name, _ in each.operators}
         has_slopes = not given.core or any(each.state for each in given.forces)
         text = language.program.format(
             **self.describe_data(),
@@ -50,7 +52,7 @@ class EquationProgram(ABC):
             output=self._indent(self._output()),
             move=self._fill(language.move, moves=self._moves()) if has_slopes else "",
             operators="".join(f"{text}\n" for name, text in language.operators.items() if name in operators),
-            maps="".join(self._map(each) for each in maps),
+            maps="".join(self._map(each) for each in self.maps),
             forces=self._forces() if given.forces else "",
         )
         return self.complete(text)
@@ -321,7 +323,9 @@ class EquationProgram(ABC):
         lines = [language.give.format(value)]
         if is_input and given.characteristic is not None:
             result = f"{language.declare}{language.value}"
-            mapped = self.code.assign([(result, given.characteristic)], {"x": "x"})
+            hold = language.between["zero-order"]
+            held = {name: hold.format(self._name(column)) for name, column in self.held.items()}
+            mapped = self.code.assign([(result, given.characteristic)], {"x": "x", **held})
             lines = [f"{language.declare}x = {value};", *mapped, *self._finish(language.value)]
         lines = [*self.begin(lines, "p", "part"), *lines]
         return self._fill(language.reader, name=self.code.identifiers[name], lines=lines)
@@ -398,6 +402,6 @@ def map_function(given: SignalMap) -> str:
     return f"apply_{given.effect.replace('-', '_')}"
 
 
-def _list_called(functions: Mapping[str, str], text: str) -> str:
+def _list_called(functions: Mapping[str, str], calls: str) -> str:
     """Return the functions that a text calls."""
-    return "".join(function for name, function in functions.items() if f" {name}(" in text)
+    return "".join(text for name, text in functions.items() if re.search(rf"\b{name}\(", calls))

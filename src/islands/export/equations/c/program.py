@@ -38,7 +38,12 @@ class _CProgram(EquationProgram):
             "parameters": _list_members(code.list_parameters()),
             "states": _list_members(self.states),
             "signal_members": _list_members(signals or [("none", "", "")]),
-            "record": "\n".join(f"    const double *{name};" for name in self.columns),
+            "record": "\n".join(
+                [
+                    *(f"    const double *{name};" for name in self.columns),
+                    *(f"    const double *{name}; /* set by simulate() */" for name in self.held.values()),
+                ]
+            ),
             "parameter_values": _list_values(code.list_parameters()),
             "state_values": _list_values(self.states),
             "variables": "/* Variables of the equations. */\n"
@@ -69,7 +74,7 @@ class _CProgram(EquationProgram):
         head = HEAD.format(
             heading="\n".join(f" * {line}".rstrip() for line in code.describe()),
             functions=SAMPLED_FUNCTIONS if given.core else EQUATION_FUNCTIONS,
-            example=", ".join(["samples", *self.columns]),
+            example=", ".join(["samples", *self.columns, *("NULL" for _ in self.held)]),
             constants="".join([*used, "\n"]),
             definitions="".join(
                 f"{self.language.definitions[each]}\n\n" for each in code.find_functions(text)
@@ -91,10 +96,10 @@ class _CProgram(EquationProgram):
         given, lines = self.given, []
         if given.hold == "band-limited":
             lines.append("if (samples > 0 && samples <= REACH + 1) return -1; /* too short for the filter */")
-        maps = [*given.input_maps, *given.output_maps]
-        rows = max((len(each.operators) for each in maps), default=0)
-        if maps:
-            count = max(rows + bool(given.input_maps), 1)
+        rows = max((len(each.operators) for each in self.maps), default=0)
+        place = rows + bool(given.input_maps)
+        if self.maps:
+            count = max(place + len(given.held_maps), 1)
             lines += [
                 f"double *const rows = malloc({count}*(samples + 1)*sizeof *rows);",
                 "if (rows == NULL) return -1;",
@@ -106,12 +111,21 @@ class _CProgram(EquationProgram):
                 *(f"if (samples > 0) {map_function(each)}(p, record, x, rows);" for each in given.input_maps),
                 f"mapped.{self.input} = x;",
             ]
+        before = f"mapped.{self.input}"
+        for number, (each, name) in enumerate(zip(given.held_maps, self.held.values(), strict=True)):
+            lines += [
+                f"double *const {name} = rows + {place + number}*samples;",
+                f"for (size_t k = 0; k < samples; ++k) {name}[k] = {before}[k];",
+                f"if (samples > 0) {map_function(each)}(p, record, {name}, rows);",
+                f"mapped.{name} = {name};",
+            ]
+            before = f"mapped.{name}"
         return lines
 
     def map_output(self) -> list[str]:
         given = self.given
         maps = [f"if (samples > 0) {map_function(each)}(p, record, y, rows);" for each in given.output_maps]
-        return [*maps, "free(rows);"] if given.input_maps or given.output_maps else []
+        return [*maps, "free(rows);"] if self.maps else []
 
     def copy_output(self, column: str, count: int | None) -> list[str]:
         first = "" if count is None else f" && k < {count}"

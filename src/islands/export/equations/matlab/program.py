@@ -54,7 +54,11 @@ class _MatlabProgram(EquationProgram):
 
     def map_input(self) -> list[str]:
         column = f"r.{self.input}"
-        return [f"{column} = {map_function(each)}(p, r, {column}, c);" for each in self.given.input_maps]
+        lines = [f"{column} = {map_function(each)}(p, r, {column}, c);" for each in self.given.input_maps]
+        for each, name in zip(self.given.held_maps, self.held.values(), strict=True):
+            lines.append(f"r.{name} = {map_function(each)}(p, r, {column}, c);")
+            column = f"r.{name}"
+        return lines
 
     def map_output(self) -> list[str]:
         return [f"y = {map_function(each)}(p, r, y, c);" for each in self.given.output_maps]
