@@ -68,7 +68,8 @@ class StartsCalibrator:
         decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
         points = minimise(simulation, self.target, starts, iterations, decrease)
         best = points if has_model_error else [min(points, key=attrgetter("cost"))]
-        return [CalibratedStart(point.values, point.output) for point in best]
+        # Copies, since a row would keep the outputs of all points of its simulations in memory.
+        return [CalibratedStart(point.values.copy(), point.output.copy()) for point in best]
 
     def make_digest(self, task: CalibrationTask) -> str:
         """Return the SHA-256 of all numbers that the result of a task depends on.
