@@ -1,6 +1,7 @@
 """Input of a simulation after the maps of effects."""
 
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ class MappedInput(NamedTuple):
     ----------
     x : ndarray, shape (samples,)
     characteristic : callable or None
-        Static map that acts on the values between samples as well.
+        Map that acts on the values between samples as well.
     """
 
     x: Signal
@@ -40,23 +41,19 @@ def map_input(
     In continuous time, the last ones form the characteristic if they act between samples.
     """
     last = count_sampled_maps([effect for effect, _ in maps]) if is_continuous_time else len(maps)
+    outputs = list(
+        accumulate(maps, lambda u, each: apply_map(each[0], u, each[1], context), initial=context.u)
+    )
+    if last == len(maps):
+        return MappedInput(outputs[last], None)
 
-    x = context.u
-    for effect, values in maps[:last]:
-        x = apply_map(effect, x, values, context)
-    if not maps[last:]:
-        return MappedInput(x, None)
-    held, at_samples = [], x
-    for effect, values in maps[last:]:
-        at_samples = apply_map(effect, at_samples, values, context)
-        held.append(at_samples)
-
-    def characteristic(signal: Signal) -> Signal:
-        for (effect, values), each in zip(maps[last:], held, strict=True):
+    def characteristic(u: Signal) -> Signal:
+        for (effect, values), output in zip(maps[last:], outputs[last + 1 :], strict=True):
             if effect.continuation is None:
-                signal = apply_map(effect, signal, values, context)
+                u = apply_map(effect, u, values, context)
             else:
-                signal = effect.continuation(np.repeat(each, signal.size // each.size), signal, values, context)
-        return signal
+                held = np.repeat(output, u.size // output.size)
+                u = effect.continuation(held, u, values, context)
+        return u
 
-    return MappedInput(x, characteristic)
+    return MappedInput(outputs[last], characteristic)
