@@ -100,10 +100,9 @@ class InterimFindings:
         self._assessed, self._step = (base, outcome, effects), step
         return outcome
 
-    def keep_terms(self, terms: MissingTerms | None) -> MissingTerms | None:
-        """Keep the missing terms, and return them; alternative causes are screened."""
+    def keep_terms(self, terms: MissingTerms | None) -> None:
+        """Keep the missing terms; alternative causes are screened."""
         self._terms, self._step = terms, ALTERNATIVES
-        return terms
 
     def keep_diagnosis(self, found: Diagnosis) -> Diagnosis:
         """Keep the diagnosis without the last step, and return it."""

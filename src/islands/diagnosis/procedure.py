@@ -26,10 +26,12 @@ from islands.diagnosis.discovery.form_search import compare_with_free_forms
 from islands.diagnosis.discovery.inner_effects import list_effects, search_inner_effects
 from islands.diagnosis.discovery.missing_terms import (
     TermSearches,
+    compare_terms,
     explain_all,
     find_missing_terms,
     replaces_effects,
 )
+from islands.diagnosis.discovery.replaced_terms import search_instead_of_terms
 from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.diagnosis.gross_errors.record_finding import describe_extrapolation, describe_gaps
 from islands.diagnosis.gross_errors.search import explain_divergence, find_gross_errors
@@ -46,6 +48,7 @@ from islands.diagnosis.inference.strategies import (
     search_with_ar_noise,
     search_with_model_error,
 )
+from islands.diagnosis.inference.timing_alternatives import find_timing_simulator
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
     EVIDENCE,
@@ -224,7 +227,11 @@ def _find_causes(
         run = run.with_effects([*run.effects, *found_forms])
     interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
     run.progress("searching for missing terms")
-    terms = interim.keep_terms(None if is_clean else find_missing_terms(searches, outcome, run))
+    terms = None if is_clean else find_missing_terms(searches, outcome, run)
+    if terms and (again := search_instead_of_terms(terms, outcome, base, target, run)) is not outcome:
+        outcome, terms = again, compare_terms(terms, again, base, target)
+        interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
+    interim.keep_terms(terms)
     run.progress("alternatives to the named causes")
     found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
@@ -282,6 +289,7 @@ def _search_with_steps(
     simulation, simulator = base.simulation, select_intersample(base, target)
     tried: set[Discretisation] = set()
     found: dict[Discretisation, tuple[CalibrationResult, SearchOutcome]] = {}
+    confirmed = []
     while True:
         current = get_discretisation(simulator)
         tried.add(current)
@@ -299,9 +307,10 @@ def _search_with_steps(
             found[current] = base, outcome
             selected = select_intersample(outcome.hypothesis.fit, outcome.target)
             if get_discretisation(selected) == current:
-                return found[current]
+                confirmed.append(found[current])
+                selected = find_timing_simulator(outcome.hypothesis, outcome.target, run) or simulator
             if get_discretisation(selected) in found or len(found) == MAX_SEARCHES:
-                return min(found.values(), key=lambda each: each[1].hypothesis.cost)
+                return min(confirmed or found.values(), key=lambda each: each[1].hypothesis.cost)
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
         run.progress("intersample behaviour changed: repeating the search")
         simulator = selected

@@ -92,6 +92,16 @@ def get_discretisation(simulator: Simulator) -> Discretisation:
     )
 
 
+def list_other_holds(simulator: Simulator) -> list[Simulator]:
+    """Return the simulator with each other intersample behaviour; none in discrete time."""
+    current, oversampling = get_discretisation(simulator)
+    return [
+        ResampledSimulator(_get_inner(simulator), intersample, oversampling)
+        for intersample in (InterSample if simulator.is_continuous_time else ())
+        if intersample != current
+    ]
+
+
 def halve_step(simulator: Simulator) -> Simulator | None:
     """Return a simulator with twice the number of steps per sample; None if it has no smaller step."""
     intersample, oversampling = get_discretisation(simulator)

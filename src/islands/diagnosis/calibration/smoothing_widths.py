@@ -1,4 +1,4 @@
-"""Selection of the widths over which effects with a discontinuity are smoothed.
+"""Selection of the widths over which effects with a discontinuity are smoothed, and of their instants.
 
 Dry friction is smoothed around a rate of zero, and a step over time around its instant, since calibration
 requires a derivative. A record whose noise is small next to the effect shows the difference from a sign or a
@@ -9,13 +9,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
+from islands.diagnosis.calibration.instants import Instant, move_instants
 from islands.diagnosis.calibration.intersample_selection import MIN_IMPROVEMENT
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
 from islands.effects.baseline import JUMP
 from islands.effects.friction import COULOMB_FRICTION
 from islands.effects.interface.context import SimulationContext
-from islands.effects.time_variation import GAIN_STEP
+from islands.effects.time_variation import GAIN_STEP, INSTANTS, instant_bounds
 
 #: Width of a try relative to the one before.
 _NARROWER = 0.25
@@ -35,12 +36,19 @@ def narrow_friction(fit: CalibrationResult, target: Target) -> SimulationContext
 
 
 def narrow_steps(fit: CalibrationResult, target: Target) -> CalibrationResult:
-    """Return a fit with narrower steps over time if these explain the record better.
+    """Return a fit with steps at better instants, and narrower ones if these explain the record better.
 
     The instant of a step is found with the wide one, whose derivative reaches farther.
     """
-    has_step = any(effect in fit.simulation.effects for effect in (JUMP, GAIN_STEP))
-    return _narrow(fit, target, _make_steps_narrower) if has_step else fit
+    simulation, context = fit.simulation, fit.simulation.context
+    steps = [effect for effect in (JUMP, GAIN_STEP) if effect in simulation.effects]
+    if not steps:
+        return fit
+    earliest, latest = instant_bounds(context)
+    distances = (latest - earliest) / (INSTANTS - 1), context.step_width * context.dt
+    places = [simulation.get_slice(effect).start + 1 for effect in steps]
+    fit = move_instants(fit, target, [Instant(each, earliest, latest, *distances) for each in places])
+    return _narrow(fit, target, _make_steps_narrower)
 
 
 def _narrow(fit: CalibrationResult, target: Target, make_narrower: _Narrow) -> CalibrationResult:

@@ -9,7 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.diagnosis.calibration.intersample_selection import select_intersample
+from islands.diagnosis.calibration.intersample_selection import (
+    get_discretisation,
+    select_intersample,
+)
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
@@ -61,29 +64,48 @@ def search_inner_effects(
     inner = _find_best_effect(outcome.hypothesis, base, target, run)
     if inner is None:
         return outcome
-    simulator = select_intersample(inner.fit, target)
-    simulation = replace(inner.fit.simulation, simulator=simulator)
-    inner = replace(inner, fit=calibrate(simulation, target, inner.fit.values))
-    inner = _find_opposite_limits(inner, base, target) or inner
+    fit = _select_simulator(inner.fit, target)
+    inner = _find_opposite_limits(replace(inner, fit=fit), base, target) or replace(inner, fit=fit)
+    simulator = inner.fit.simulation.simulator
+    own = run.with_effects(list_effects(simulator, run, [inner.effect]))
+    searched = _search_with(inner, base, target, own)
+    # The other effects had hidden that another intersample behaviour or a finer step fits better.
+    fit = _select_simulator(searched.hypothesis.fit, searched.target)
+    has_inner = inner.effect in fit.simulation.effects
+    if has_inner and get_discretisation(fit.simulation.simulator) != get_discretisation(simulator):
+        searched = _search_with(replace(inner, fit=fit), base, target, own)
+    found = assess_evidence(searched, own)
+    possible = [inner.effect, *_list_inner_effects(simulator, run)]
+    is_inner = any(effect in possible for effect in found.hypothesis.effects)
+    return found if is_inner and found.verdict != Verdict.UNKNOWN else outcome
+
+
+def _select_simulator(fit: CalibrationResult, target: Target) -> CalibrationResult:
+    """Return a fit with the intersample behaviour and the step that suit the record."""
+    simulation = replace(fit.simulation, simulator=select_intersample(fit, target))
+    return calibrate(simulation, target, fit.values)
+
+
+def _search_with(
+    inner: ScreenedEffect, base: CalibrationResult, target: Target, run: DiagnosisRun
+) -> SearchOutcome:
+    """Search for effects next to an inner one, beginning with all effects of its fit."""
     simulation, fit = inner.fit.simulation, inner.fit
     if fit.noise.order:  # Ordinary least squares would fit the coloured noise as well.
         target = whiten_target(target, fit)
         fit = calibrate(simulation, target, fit.values)
     bare = simulation.with_effects(())
     given = transfer_parameters(fit.values, simulation, bare)
-    without = calibrate(bare, target, base.values if simulator is base.simulation.simulator else given)
-    own = run.with_effects(list_effects(simulator, run, [inner.effect]))
-    others = screen_effects(without, target, own.without_effects([inner.effect]))
+    is_known = simulation.simulator is base.simulation.simulator
+    without = calibrate(bare, target, base.values if is_known else given)
+    others = screen_effects(without, target, run.without_effects([inner.effect]))
     single, start = [ScreenedEffect(inner.effect, fit)], None
     if len(simulation.effects) > 1:
-        single = screen_effects(without, target, own.with_effects([inner.effect]))
+        single = screen_effects(without, target, run.with_effects([inner.effect]))
         start = Hypothesis(fit, _compute_cost(fit, base), simulation.effects)
     screened = [*single, *others]
-    hypothesis, target = stepwise_search(without, screened, target, own, start=start)
-    found = assess_evidence(make_outcome(without, screened, target, hypothesis), own)
-    possible = [inner.effect, *_list_inner_effects(simulator, run)]
-    is_inner = any(effect in possible for effect in found.hypothesis.effects)
-    return found if is_inner and found.verdict != Verdict.UNKNOWN else outcome
+    hypothesis, target = stepwise_search(without, screened, target, run, start=start)
+    return make_outcome(without, screened, target, hypothesis)
 
 
 def _find_opposite_limits(

@@ -263,6 +263,13 @@ def _score_effects(alone: SearchOutcome, base: CalibrationResult, target: Target
     return Hypothesis(scored, scored.score + sum(bic_penalty(effect, base) for effect in effects), effects)
 
 
+def compare_terms(
+    terms: MissingTerms, alone: SearchOutcome, base: CalibrationResult, target: Target
+) -> MissingTerms:
+    """Return missing terms that are compared with another outcome of the search for effects."""
+    return _compare(JointResult(terms.search, terms.outcome), _score_effects(alone, base, target))
+
+
 def _compare(joint: JointResult, alone: Hypothesis) -> MissingTerms:
     """Compare terms with effects alone."""
     terms = joint.terms

@@ -13,12 +13,12 @@ from operator import attrgetter
 import numpy as np
 
 from islands.data.segments import fill_gaps
+from islands.diagnosis.calibration.instants import Instant, move_instants
 from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
     estimate_covariance,
-    evaluate_fit,
     whiten_target,
 )
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
@@ -298,28 +298,14 @@ def _take_limits(
 
 
 def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
-    """Return the equations with other instants of gates, as long as they fit better.
-
-    A calibration moves an instant by the duration of its change only.
-    """
+    """Return the equations with other instants of gates, as long as they fit better."""
     places = {parameter.name: place for place, parameter in enumerate(found.fit.simulation.parameters)}
-    for each in found.terms:
-        if each.term.gate is None:
-            continue
-        place, distance = places[each.parameters[1]], each.term.gate.spacing
-        while distance > each.term.gate.change:
-            # An effect may have a parameter of the same name as the equations: values are counted, not names.
-            moved = np.tile(found.fit.values, (2, 1))
-            moved[:, place] += [-distance, distance]
-            moved[:, place] = np.clip(moved[:, place], each.term.gate.earliest, each.term.gate.latest)
-            fits = [evaluate_fit(found.fit.simulation, target, values) for values in moved]
-            best = min(fits, key=lambda fit: fit.score)
-            if best.score < found.fit.score - MIN_GAIN:
-                # Each move gains, so that the search ends; a calibration of whitened errors may score worse.
-                found = _improve(replace(found, fit=best), calibrate(best.simulation, target, best.values))
-            else:
-                distance /= 2.0
-    return found
+    instants = [
+        Instant(places[each.parameters[1]], gate.earliest, gate.latest, gate.spacing, gate.change)
+        for each in found.terms
+        if (gate := each.term.gate) is not None
+    ]
+    return replace(found, fit=move_instants(found.fit, target, instants))
 
 
 def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:

@@ -24,6 +24,7 @@ from islands.diagnosis.inference.jump_intervals import find_jump_intervals
 from islands.diagnosis.inference.resemblance import Resemblance, describe_curve_signal, find_resemblance
 from islands.diagnosis.inference.screening import ScreenedEffect, bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome
+from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives
 from islands.diagnosis.inference.verdict import (
     Verdict,
     choose_reference_fit,
@@ -182,10 +183,16 @@ def describe_effects(
 
 def _list_alternatives(outcome: SearchOutcome, run: DiagnosisRun) -> Sequence[Alternatives]:
     """Return the alternatives to each effect of an outcome."""
-    base, hypothesis = outcome.base, outcome.hypothesis
-    if len(hypothesis.effects) == 1:
-        return (Alternatives(Hypothesis(base, base.score, ()), outcome.screened),)
-    return hypothesis.alternatives or find_alternatives(hypothesis, outcome.target, run)
+    base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
+    found = (
+        (Alternatives(Hypothesis(base, base.score, ()), outcome.screened),)
+        if len(hypothesis.effects) == 1
+        else hypothesis.alternatives or find_alternatives(hypothesis, target, run)
+    )
+    return [
+        add_timing_alternatives(each, effect, hypothesis.fit, target, run)
+        for effect, each in zip(hypothesis.effects, found, strict=True)
+    ]
 
 
 def _describe_effect(

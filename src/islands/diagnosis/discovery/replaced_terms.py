@@ -1,0 +1,57 @@
+"""Effects that replace missing terms.
+
+A search for effects takes one at a time, and ends where no further one gains enough. Terms that explain more
+together with effects show it a better start: with these effects, and the noise that the terms leave, another
+effect may be as good as the terms.
+"""
+
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
+from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.missing_terms import MissingTerms
+from islands.diagnosis.inference.hypothesis import Hypothesis
+from islands.diagnosis.inference.screening import bic_penalty, transfer_effects, transfer_parameters
+from islands.diagnosis.inference.stepwise_search import MIN_GAIN, stepwise_search
+from islands.diagnosis.inference.strategies import SearchOutcome, assess_evidence, make_outcome
+from islands.diagnosis.inference.verdict import Verdict
+from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import catalogue_order
+
+
+def search_instead_of_terms(
+    terms: MissingTerms, alone: SearchOutcome, base: CalibrationResult, target: Target, run: DiagnosisRun
+) -> SearchOutcome:
+    """Return the outcome of a search that begins with the effects next to missing terms, if it is better.
+
+    Parameters
+    ----------
+    terms : MissingTerms
+    alone : SearchOutcome
+        Outcome of the search for effects without terms.
+    base, target, run
+        Arguments of that search.
+
+    Returns
+    -------
+    SearchOutcome
+        The given one if there are no effects next to the terms, the terms are not better, or as many effects
+        as there are effects and terms do not explain more.
+    """
+    found, given = terms.search, alone.hypothesis
+    is_same = found.base.simulation.simulator.parameters == base.simulation.simulator.parameters
+    if not found.effects or not is_same or not terms.is_better(alone):
+        return alone
+    run.progress("effects instead of missing terms")
+    whitened = whiten_target(target, found.fit)
+    simulation = base.simulation.with_effects(catalogue_order(found.effects))
+    values = transfer_parameters(base.values, base.simulation, simulation)
+    transfer_effects(found.fit.values, found.fit.simulation, values, simulation)
+    fit = calibrate(simulation, whitened, values)
+    cost = fit.score + sum(bic_penalty(effect, base) for effect in found.effects)
+    start = Hypothesis(fit, cost, found.effects)
+    hypothesis, whitened = stepwise_search(alone.base, alone.screened, whitened, run, start=start)
+    is_larger = len(hypothesis.effects) > len(found.terms) + len(found.effects)
+    if is_larger or hypothesis.cost > given.cost - MIN_GAIN:
+        return alone
+    outcome = assess_evidence(make_outcome(alone.base, alone.screened, whitened, hypothesis), run)
+    has_all = set(outcome.hypothesis.effects) == set(hypothesis.effects)
+    return outcome if has_all and outcome.verdict != Verdict.UNKNOWN else alone
