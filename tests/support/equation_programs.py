@@ -98,10 +98,8 @@ def run_c(
     """Compile the program in C and simulate a record, which may have further columns."""
     library = compile_model(export_extended(spec, "c"), FLAGS, folder)
     columns = read_columns(spec, record, further)
-    held = [0] * len(collect_equations(spec).held_maps)
-    members = (ctypes.c_size_t * (1 + len(columns) + len(held)))(
-        record.samples, *(each.ctypes.data for each in columns), *held
-    )
+    # One more member, which some programs set themselves.
+    members = (ctypes.c_size_t * (2 + len(columns)))(record.samples, *(each.ctypes.data for each in columns))
     y = np.full(record.samples, np.nan)
     defaults = [(ctypes.c_char * 1).in_dll(library, name) for name in ("PARAMETERS", "INITIAL_STATES")]
     status = library.simulate(

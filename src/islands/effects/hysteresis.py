@@ -98,12 +98,6 @@ def _backlash_form(u: Signal, values: Signal, _context: SimulationContext) -> Si
     return play_from(u, values[0]) if values[0] > 0.0 else u
 
 
-def _continue_play(held: Signal, u: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    # The input is monotonic between two samples, so that the play depends on its value alone.
-    width = max(float(values[0]), 0.0)
-    return np.clip(held, u - width, u + width)
-
-
 def _backlash_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("b", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak),
@@ -126,11 +120,8 @@ BACKLASH = Effect(
     parameters=_backlash_parameters,
     starting_points=_backlash_starting_points,
     form=_backlash_form,
-    equation=lambda _: MapEquation(
-        "z0", (("play", "n0"),), between="max(min(z0, x + max(n0, 0)), x - max(n0, 0))"
-    ),
+    equation=lambda _: MapEquation("z0", (("play", "n0"),)),
     acts_between_samples=True,
-    continuation=_continue_play,
     formula=_PLAY,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),

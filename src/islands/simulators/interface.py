@@ -34,8 +34,8 @@ class SimulationRun:
         for derivatives: a simulator that fits states may fit those of this run to first order.
     characteristic : callable or None
         Map of the input that acts on the values between samples as well, ``values -> values`` of shape
-        (values,) in the order of time, as many for each sample; None for none. Only simulators in continuous
-        time have runs with one. Runs with the same map have the same object.
+        (values,) in the order of time; None for none. Only simulators in continuous time have runs with one.
+        Runs with the same map have the same object.
     """
 
     values: Signal
@@ -194,10 +194,13 @@ class Simulator(ABC):
         """
         outputs = []
         for run in runs:
-            own, x = context, run.apply_characteristic(run.x)
+            own, x = context, run.x
             if run.intersample_values is not None:
-                between = run.apply_characteristic(run.intersample_values.T).T
-                own = replace(context, u=x, intersample_values=between)
+                moments = np.column_stack([run.x, *run.intersample_values])
+                x, *between = np.ascontiguousarray(run.apply_characteristic(moments).T)
+                own = replace(context, u=x, intersample_values=np.stack(between))
+            elif run.characteristic is not None:
+                x = run.apply_characteristic(run.x)
             output = self.simulate(run.values, x, own, run.effect_parameters, run.forces)
             outputs.append(output[::every])
         return np.stack(outputs)

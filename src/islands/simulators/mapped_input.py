@@ -1,10 +1,8 @@
 """Input of a simulation after the maps of effects."""
 
 from collections.abc import Callable, Sequence
-from itertools import accumulate
+from functools import partial
 from typing import NamedTuple
-
-import numpy as np
 
 from islands.effects.interface.context import Signal, SimulationContext
 from islands.effects.interface.effect import Effect, apply_map
@@ -41,19 +39,10 @@ def map_input(
     In continuous time, the last ones form the characteristic if they act between samples.
     """
     last = count_sampled_maps([effect for effect, _ in maps]) if is_continuous_time else len(maps)
-    outputs = list(
-        accumulate(maps, lambda u, each: apply_map(each[0], u, each[1], context), initial=context.u)
-    )
-    if last == len(maps):
-        return MappedInput(outputs[last], None)
 
-    def characteristic(u: Signal) -> Signal:
-        for (effect, values), output in zip(maps[last:], outputs[last + 1 :], strict=True):
-            if effect.continuation is None:
-                u = apply_map(effect, u, values, context)
-            else:
-                held = np.repeat(output, u.size // output.size)
-                u = effect.continuation(held, u, values, context)
-        return u
+    def apply(part: Sequence[tuple[Effect, Signal]], signal: Signal) -> Signal:
+        for effect, values in part:
+            signal = apply_map(effect, signal, values, context)
+        return signal
 
-    return MappedInput(outputs[last], characteristic)
+    return MappedInput(apply(maps[:last], context.u), partial(apply, maps[last:]) if maps[last:] else None)

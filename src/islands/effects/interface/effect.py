@@ -69,12 +69,9 @@ class Effect:
         estimation part, for a map that jumps. Another input tells such values apart. The first value is a
         width, the others are distances. None if every change of a value changes the response.
     acts_between_samples : bool
-        Whether a map of the input is applied to the interpolated input in continuous time: a dead zone or a
-        limit is not reached at a sample, but between two of them. The map acts on each value by itself, or
-        has a ``continuation``.
-    continuation : callable or None
-        ``(held, signal, values, context) -> signal``: the map of values between samples, given its result at
-        the sample before each of them. None for a map without memory.
+        Whether a map of the input depends on the order of values and not on their instants. In continuous
+        time it is then applied to the interpolated input: a dead zone or a limit is not reached at a sample,
+        but between two of them.
     is_gain : bool
         Whether the effect is a gain. Gains are searched for only if every parameter except initial states has
         a tolerance; otherwise calibration absorbs them.
@@ -119,7 +116,6 @@ class Effect:
     project: Callable[[Signal], Signal] | None = None
     centre: Callable[[Signal, SimulationContext], Signal] | None = None
     acts_between_samples: bool = False
-    continuation: Callable[[Signal, Signal, Signal, SimulationContext], Signal] | None = None
     is_gain: bool = False
     is_free: bool = False
     is_tuned: bool = False

@@ -51,15 +51,10 @@ class MapEquation:
         ``n0``, ``n1``, ... of the effect, and the results ``z0``, ``z1``, ... of operators on ``x``.
     operators : tuple of tuple of str
         Name of each operator in `OPERATORS`, then its arguments as expressions of the values.
-    between : str
-        Signal after a map with memory between two samples: an expression of the signal ``x``, the values, and
-        the result ``z0`` at the sample before. Empty for ``equation``, or for a map that acts on samples
-        alone.
     """
 
     equation: str
     operators: tuple[tuple[str, ...], ...] = ()
-    between: str = ""
 
 
 #: ``context -> equation``: the scales of the context are numbers in the equation.

@@ -18,7 +18,6 @@ from islands.export.equations.extended_system import (
     SampledCore,
     SignalMap,
     StateLimit,
-    name_held,
 )
 from islands.export.equations.program_system import drop_force, read_system, refuse
 from islands.export.equations.sampled_core import read_core, read_output_system
@@ -77,8 +76,8 @@ class _Collection:
     terms: list[OdeEffect] = field(default_factory=list)
     clips: set[str] = field(default_factory=set)
     laws: list[tuple[str, Mapping[str, Expression], ForceLaw]] = field(default_factory=list)
-    held_maps: list[SignalMap] = field(default_factory=list)
     characteristic: Expression | None = None
+    moment_maps: list[SignalMap] = field(default_factory=list)
     gain: Expression | None = None
 
     def collect(self) -> ExtendedEquations:
@@ -120,8 +119,8 @@ class _Collection:
             limits=self._find_limits(),
             input_maps=tuple(input_maps),
             output_maps=tuple(output_maps),
-            held_maps=tuple(self.held_maps),
             characteristic=self.characteristic,
+            moment_maps=tuple(self.moment_maps),
             forces=() if has_equation else tuple(self._make_force(*each) for each in self.laws),
             gain=self.gain,
             gain_signal=factor,
@@ -190,18 +189,17 @@ class _Collection:
             for name, *arguments in written.operators
         )
         equation = substitute(parse_law(written.equation), symbols)
-        between = substitute(parse_law(written.between), symbols) if written.between else None
-        return SignalMap(effect.name, get_summary(effect.name), equation, operators, between)
+        return SignalMap(effect.name, get_summary(effect.name), equation, operators)
 
     def _take_characteristic(self, maps: list[SignalMap]) -> list[SignalMap]:
-        """Join the last maps to the characteristic if they act between samples; return the others."""
+        """Take the last maps if they act between samples; return the others."""
         last = count_sampled_maps([CATALOGUE[each.effect] for each in maps])
-        further = maps[last:]
-        remembered = [place for place, each in enumerate(further) if each.between is not None]
-        self.held_maps = further[: max(remembered, default=-1) + 1]
-        for place, each in enumerate(further):
-            known = {"x": self.characteristic or Symbol("x"), "z0": Symbol(name_held(place))}
-            self.characteristic = substitute(each.between or each.equation, known)
+        if any(each.operators for each in maps[last:]):
+            self.moment_maps = maps[last:]
+            return maps[:last]
+        for each in maps[last:]:
+            before = self.characteristic or Symbol("x")
+            self.characteristic = substitute(each.equation, {"x": before})
         return maps[:last]
 
     def _find_channel(self, effect: str, thermal: bool) -> str:

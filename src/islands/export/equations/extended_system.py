@@ -32,21 +32,12 @@ class SignalMap:
     operators : tuple of (str, tuple of expression)
         Name and arguments of each operator. The argument of ``temperature`` and ``coupled`` is the name of
         the channel.
-    between : expression or None
-        The same between samples, given the result at the sample before as ``z0``. None for a static map, or
-        for one that acts on samples alone.
     """
 
     effect: str
     summary: str
     equation: Expression
     operators: tuple[tuple[str, tuple[Expression, ...]], ...]
-    between: Expression | None = None
-
-
-def name_held(place: int) -> str:
-    """Return the name of the result of a held map, given its place among them."""
-    return f"held ({place + 1})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,11 +127,11 @@ class ExtendedEquations:
         By name of the state.
     input_maps, output_maps : tuple of SignalMap
         In the order in which they act.
-    held_maps : tuple of SignalMap
-        Maps behind those of the input, up to the last one with memory that acts between samples.
     characteristic : expression or None
-        Map of the interpolated input ``x``, behind the maps of the input; None for none. It reads the results
-        of ``held_maps`` at the sample before, by the names of `name_held`.
+        Static characteristic of the interpolated input ``x``, behind the maps of the input; None for none.
+    moment_maps : tuple of SignalMap
+        Maps of the interpolated input at the start, in the middle and at the end of each step, in the order
+        of time, instead of a characteristic; empty if none of them has a memory.
     forces : tuple of OutputForce
     gain : expression or None
         Factor of the gain over the time ``t``; None for one.
@@ -174,8 +165,8 @@ class ExtendedEquations:
     limits: Mapping[str, StateLimit] = field(default_factory=dict)
     input_maps: tuple[SignalMap, ...] = ()
     output_maps: tuple[SignalMap, ...] = ()
-    held_maps: tuple[SignalMap, ...] = ()
     characteristic: Expression | None = None
+    moment_maps: tuple[SignalMap, ...] = ()
     forces: tuple[OutputForce, ...] = ()
     gain: Expression | None = None
     gain_signal: str = ""

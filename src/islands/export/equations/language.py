@@ -53,6 +53,8 @@ class Language:
     derivatives, move, advance, map, forces, force_slopes, force_steps, core, signals, reader, gain, \
 gain_between, band_limit : str
         Functions and parts of functions.
+    moment : str
+        Value of the input at three moments of each step.
     between, interpolations : mapping
         Value of a column between samples by the kind of hold; the functions that it calls, by name.
     pointer, rates : str, mapping
@@ -110,6 +112,7 @@ gain_between, band_limit : str
     gain: str
     gain_between: str
     band_limit: str
+    moment: str
     between: Mapping[str, str]
     interpolations: Mapping[str, str]
     pointer: str

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 from islands.export.equations.collection import CHANNEL_OPERATORS
-from islands.export.equations.extended_system import ExtendedEquations, SampledCore, SignalMap, name_held
+from islands.export.equations.extended_system import ExtendedEquations, SampledCore, SignalMap
 from islands.export.equations.language import Language
 from islands.export.equations.sampled_core import MEASURED, RECORDED
-from islands.export.equations.statements import EquationCode, make_step
+from islands.export.equations.statements import MOMENTS, EquationCode, make_step
 from islands.export.languages.bodies import function_name
 from islands.expressions.printing import render
 from islands.expressions.tree import RATE, Apply, Expression, Symbol
@@ -36,9 +36,8 @@ class EquationProgram(ABC):
         self.columns = [self.code.identifiers[name] for name in equations.columns]
         self.states = self.code.list_states()
         self.input = self.code.identifiers[equations.system.input]
-        self.maps = (*equations.input_maps, *equations.held_maps, *equations.output_maps)
-        places = range(len(equations.held_maps))
-        self.held = {name: self.code.identifiers[name] for name in map(name_held, places)}
+        self.moments = self.code.identifiers[MOMENTS]
+        self.maps = (*equations.input_maps, *equations.moment_maps, *equations.output_maps)
 
     def write(self) -> str:
         """Return the program."""
@@ -299,13 +298,14 @@ class EquationProgram(ABC):
         if given.forces and given.system.input not in read:
             read.insert(0, given.system.input)
         readers = "".join(self._reader(name) for name in read)
+        calls = readers + self.interpolate(given.system.input) if given.moment_maps else readers
         gain = "" if given.gain is None else code.write(given.gain, {TIME: "t"})
         rates = _list_called(language.rates, signals)
         return {
             "signals": signals,
             "readers": readers,
-            "between": _list_called(language.interpolations, readers),
-            "band_limit": self._limit_band() if " limit_band(" in readers else "",
+            "between": _list_called(language.interpolations, calls),
+            "band_limit": self._limit_band() if "limit_band(" in calls else "",
             "gain": language.gain.format(gain=gain) if gain else "",
             "gain_between": language.gain_between if given.gain_signal else "",
             "rates": (language.pointer if rates else "") + rates,
@@ -314,18 +314,22 @@ class EquationProgram(ABC):
             ),
         }
 
+    def interpolate(self, name: str) -> str:
+        """Write the value of a column at the part ``part`` of the step ``step``."""
+        hold = self.given.hold if name == self.given.system.input else "first-order"
+        return self.language.between[hold].format(self._name(self.code.identifiers[name]))
+
     def _reader(self, name: str) -> str:
         """Write the function that reads a column between samples."""
         given, language = self.given, self.language
         is_input = name == given.system.input
-        column = self._name(self.code.identifiers[name])
-        value = language.between[given.hold if is_input else "first-order"].format(column)
+        value = self.interpolate(name)
+        if is_input and given.moment_maps:
+            value = language.moment.format(self._name(self.moments))
         lines = [language.give.format(value)]
         if is_input and given.characteristic is not None:
             result = f"{language.declare}{language.value}"
-            hold = language.between["zero-order"]
-            held = {name: hold.format(self._name(column)) for name, column in self.held.items()}
-            mapped = self.code.assign([(result, given.characteristic)], {"x": "x", **held})
+            mapped = self.code.assign([(result, given.characteristic)], {"x": "x"})
             lines = [f"{language.declare}x = {value};", *mapped, *self._finish(language.value)]
         lines = [*self.begin(lines, "p", "part"), *lines]
         return self._fill(language.reader, name=self.code.identifiers[name], lines=lines)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from islands.export.equations.common_parts import take_common_parts
-from islands.export.equations.extended_system import ExtendedEquations, name_held
+from islands.export.equations.extended_system import ExtendedEquations
 from islands.export.equations.identifiers import make_identifiers
 from islands.export.equations.language import Language
 from islands.expressions.primitives import POW
@@ -39,6 +39,9 @@ DEFINED = {
 
 #: Functions that are operators in every language.
 _OPERATORS = {name: EQUATION_OPERATORS[name] for name in ("add", "sub", "mul", "div")}
+
+#: Name of the input at three moments of each step, after maps with memory.
+MOMENTS = "input moments"
 
 #: Columns of a line.
 _WIDTH = 108
@@ -73,8 +76,7 @@ class EquationCode:
         """Identifiers of all names, and of signals by their text."""
         given = self.equations
         names = [*given.values, *given.start, *(name for name, _ in given.system.variables), *given.columns]
-        held = [name_held(place) for place in range(len(given.held_maps))]
-        return make_identifiers([*names, *held, *(render(each) for each in self.signals)])
+        return make_identifiers([*names, MOMENTS, *(render(each) for each in self.signals)])
 
     @cached_property
     def _members(self) -> dict[str, str]:

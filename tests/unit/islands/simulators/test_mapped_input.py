@@ -18,7 +18,7 @@ from support.simulated_records import DT, recorded, wave
 Array = NDArray[np.float64]
 
 BETWEEN = sorted(name for name, effect in CATALOGUE.items() if effect.acts_between_samples)
-STATIC = [name for name in BETWEEN if CATALOGUE[name].continuation is None]
+STATIC = [name for name in BETWEEN if name != "backlash"]
 
 OSCILLATOR = make_oscillator(0.5, 4.0, 200.0)
 

@@ -316,6 +316,7 @@ static double limit_band(const double *x, size_t samples, size_t step, double pa
 typedef double (*read_signal)(const struct parameters *p, const struct record *r, size_t step, double part);
 
 """,
+    moment="{}[3*step + (size_t)(2.0*part)]",
     between={
         "first-order": "interpolate({}, r->samples, step, part)",
         "zero-order": "hold({}, step)",

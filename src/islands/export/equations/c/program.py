@@ -34,16 +34,13 @@ class _CProgram(EquationProgram):
         code = self.code
         signals = [(code.identifiers[render(each)], "", "") for each in code.signals]
         variables = [(code.identifiers[name], "", "") for name, _ in self.given.system.variables]
+        moments = self.given.moment_maps
         return {
             "parameters": _list_members(code.list_parameters()),
             "states": _list_members(self.states),
             "signal_members": _list_members(signals or [("none", "", "")]),
-            "record": "\n".join(
-                [
-                    *(f"    const double *{name};" for name in self.columns),
-                    *(f"    const double *{name}; /* set by simulate() */" for name in self.held.values()),
-                ]
-            ),
+            "record": "\n".join(f"    const double *{name};" for name in self.columns)
+            + (f"\n    const double *{self.moments}; /* set by simulate() */" if moments else ""),
             "parameter_values": _list_values(code.list_parameters()),
             "state_values": _list_values(self.states),
             "variables": "/* Variables of the equations. */\n"
@@ -74,7 +71,7 @@ class _CProgram(EquationProgram):
         head = HEAD.format(
             heading="\n".join(f" * {line}".rstrip() for line in code.describe()),
             functions=SAMPLED_FUNCTIONS if given.core else EQUATION_FUNCTIONS,
-            example=", ".join(["samples", *self.columns, *("NULL" for _ in self.held)]),
+            example=", ".join(["samples", *self.columns, *["NULL"] * bool(given.moment_maps)]),
             constants="".join([*used, "\n"]),
             definitions="".join(
                 f"{self.language.definitions[each]}\n\n" for each in code.find_functions(text)
@@ -96,10 +93,10 @@ class _CProgram(EquationProgram):
         given, lines = self.given, []
         if given.hold == "band-limited":
             lines.append("if (samples > 0 && samples <= REACH + 1) return -1; /* too short for the filter */")
-        rows = max((len(each.operators) for each in self.maps), default=0)
-        place = rows + bool(given.input_maps)
-        if self.maps:
-            count = max(place + len(given.held_maps), 1)
+        maps = [*given.input_maps, *given.output_maps]
+        rows = max((len(each.operators) for each in maps), default=0)
+        if maps:
+            count = max(rows + bool(given.input_maps), 1)
             lines += [
                 f"double *const rows = malloc({count}*(samples + 1)*sizeof *rows);",
                 "if (rows == NULL) return -1;",
@@ -111,21 +108,40 @@ class _CProgram(EquationProgram):
                 *(f"if (samples > 0) {map_function(each)}(p, record, x, rows);" for each in given.input_maps),
                 f"mapped.{self.input} = x;",
             ]
-        before = f"mapped.{self.input}"
-        for number, (each, name) in enumerate(zip(given.held_maps, self.held.values(), strict=True)):
-            lines += [
-                f"double *const {name} = rows + {place + number}*samples;",
-                f"for (size_t k = 0; k < samples; ++k) {name}[k] = {before}[k];",
-                f"if (samples > 0) {map_function(each)}(p, record, {name}, rows);",
-                f"mapped.{name} = {name};",
-            ]
-            before = f"mapped.{name}"
-        return lines
+        return lines + self._map_moments(has_rows=bool(maps))
+
+    def _map_moments(self, has_rows: bool) -> list[str]:
+        """Write the statements that compute the input at three moments of each step."""
+        given = self.given
+        if not given.moment_maps:
+            return []
+        value = self.interpolate(given.system.input)
+        rows = max(len(each.operators) for each in given.moment_maps)
+        failure = "{ free(rows); return -1; }" if has_rows else "return -1;"
+        return [
+            "struct record fine = mapped;",
+            "fine.samples = 3*samples*STEPS;",
+            f"double *const moments = calloc({rows + 1}*(fine.samples + 1), sizeof *moments);",
+            f"if (moments == NULL) {failure}",
+            "for (size_t j = 0; j < fine.samples; ++j) {",
+            "    const size_t step = j/3;",
+            "    const double part = 0.5*(double)(j % 3);",
+            *(f"    {line}" for line in self.begin([value], "part")),
+            f"    moments[j] = {value};",
+            "}",
+            *(
+                f"if (samples > 0) {map_function(each)}(p, &fine, moments, moments + fine.samples);"
+                for each in given.moment_maps
+            ),
+            f"mapped.{self.moments} = moments;",
+        ]
 
     def map_output(self) -> list[str]:
         given = self.given
-        maps = [f"if (samples > 0) {map_function(each)}(p, record, y, rows);" for each in given.output_maps]
-        return [*maps, "free(rows);"] if self.maps else []
+        lines = [f"if (samples > 0) {map_function(each)}(p, record, y, rows);" for each in given.output_maps]
+        if given.moment_maps:
+            lines.append("free(moments);")
+        return [*lines, "free(rows);"] if given.input_maps or given.output_maps else lines
 
     def copy_output(self, column: str, count: int | None) -> list[str]:
         first = "" if count is None else f" && k < {count}"

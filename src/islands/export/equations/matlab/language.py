@@ -257,6 +257,7 @@ function value = limit_band(x, step, part, c)
 end
 
 """,
+    moment="{}(3*step + 2*part + 1)",
     between={
         "first-order": "interpolate({}, step, part, c)",
         "zero-order": "hold_sample({}, step, c)",

@@ -55,10 +55,22 @@ class _MatlabProgram(EquationProgram):
     def map_input(self) -> list[str]:
         column = f"r.{self.input}"
         lines = [f"{column} = {map_function(each)}(p, r, {column}, c);" for each in self.given.input_maps]
-        for each, name in zip(self.given.held_maps, self.held.values(), strict=True):
-            lines.append(f"r.{name} = {map_function(each)}(p, r, {column}, c);")
-            column = f"r.{name}"
-        return lines
+        if not self.given.moment_maps:
+            return lines
+        moments = f"r.{self.moments}"
+        lines += [
+            f"{moments} = zeros(3*r.samples*c.steps, 1);",
+            "for step = 0:r.samples*c.steps - 1",
+            "  for part = [0, 0.5, 1]",
+            f"    {self.language.moment.format(moments)} = {self.interpolate(self.given.system.input)};",
+            "  end",
+            "end",
+            "fine = r;",
+            f"fine.samples = numel({moments});",
+        ]
+        return lines + [
+            f"{moments} = {map_function(each)}(p, fine, {moments}, c);" for each in self.given.moment_maps
+        ]
 
     def map_output(self) -> list[str]:
         return [f"y = {map_function(each)}(p, r, y, c);" for each in self.given.output_maps]
