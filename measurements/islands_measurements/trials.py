@@ -45,6 +45,9 @@ BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
 #: Band of effects that are injected together.
 COMBINED_BAND = BANDS[1]
 
+#: Faults that act after the others: an encoder reads the position that drifts and disturbances have moved.
+LAST = frozenset(("cyclic-error",))
+
 
 class _Counts(NamedTuple):
     """Numbers of trials of a simulation: of each effect, without an effect, and of the other kinds."""
@@ -192,7 +195,8 @@ def _plan_injections(
         if many and len(names) < size:
             raise SettingsError(f"{size} effects at once need {size} names: give more with --effects")
         for turn in range(many):
-            yield tuple(map(str, rng.choice(names, size, replace=False))), turn, COMBINED_BAND
+            drawn = map(str, rng.choice(names, size, replace=False))
+            yield tuple(sorted(drawn, key=lambda name: name in LAST)), turn, COMBINED_BAND
     for turn in range(counts.mixed):
         yield tuple(str(rng.choice(each)) for each in (names, simulated.nameless)), turn, COMBINED_BAND
 
