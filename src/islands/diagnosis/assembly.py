@@ -18,6 +18,7 @@ from islands.diagnosis.inference.holdout import HoldoutGain, bound_gain, compute
 from islands.diagnosis.inference.residual_structure import find_residual_structure
 from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects
 from islands.diagnosis.inference.strategies import SearchOutcome
+from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives
 from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
 from islands.diagnosis.planning.next_experiment import design_next_experiment
 from islands.diagnosis.result import Candidate, Diagnosis
@@ -97,7 +98,7 @@ def extend_equations(
         is_single = len(added.hypothesis.effects) == 1
         screened = screen_effects(added.base, added.target, run) if is_single else ()
         added = replace(added, screened=screened, hypothesis=replace(added.hypothesis, fit=fit))
-        described = describe_effects(added, run)[0]
+        described = describe_effects(add_timing_alternatives(added, run), run)[0]
         findings += tuple(map(_withdraw_improbable, described))
     return replace(
         found,

@@ -48,7 +48,7 @@ from islands.diagnosis.inference.strategies import (
     search_with_ar_noise,
     search_with_model_error,
 )
-from islands.diagnosis.inference.timing_alternatives import find_timing_simulator
+from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives, find_timing_simulator
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
     EVIDENCE,
@@ -233,6 +233,7 @@ def _find_causes(
         interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
     interim.keep_terms(terms)
     run.progress("alternatives to the named causes")
+    outcome = add_timing_alternatives(outcome, run)
     found = interim.keep_diagnosis(make_diagnosis(record, outcome, base, terms, run))
     if terms is not None and replaces_effects(terms, base, outcome, target, run.rng):
         found = extend_equations(found, terms, target, run)

@@ -24,7 +24,6 @@ from islands.diagnosis.inference.jump_intervals import find_jump_intervals
 from islands.diagnosis.inference.resemblance import Resemblance, describe_curve_signal, find_resemblance
 from islands.diagnosis.inference.screening import ScreenedEffect, bic_penalty
 from islands.diagnosis.inference.strategies import SearchOutcome
-from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives
 from islands.diagnosis.inference.verdict import (
     Verdict,
     choose_reference_fit,
@@ -183,16 +182,10 @@ def describe_effects(
 
 def _list_alternatives(outcome: SearchOutcome, run: DiagnosisRun) -> Sequence[Alternatives]:
     """Return the alternatives to each effect of an outcome."""
-    base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
-    found = (
-        (Alternatives(Hypothesis(base, base.score, ()), outcome.screened),)
-        if len(hypothesis.effects) == 1
-        else hypothesis.alternatives or find_alternatives(hypothesis, target, run)
-    )
-    return [
-        add_timing_alternatives(each, effect, hypothesis.fit, target, run)
-        for effect, each in zip(hypothesis.effects, found, strict=True)
-    ]
+    base, hypothesis = outcome.base, outcome.hypothesis
+    if len(hypothesis.effects) == 1:
+        return (Alternatives(Hypothesis(base, base.score, ()), outcome.screened),)
+    return hypothesis.alternatives or find_alternatives(hypothesis, outcome.target, run)
 
 
 def _describe_effect(
@@ -278,18 +271,21 @@ def _list_screened(
 ) -> list[tuple[ScreenedEffect, CalibrationResult]]:
     """Return the effects and forms that could take the place of an effect, and the fits without them.
 
-    A form of which the effect is a special case is none of them.
+    A form of which the effect is a special case is none of them. Of an effect with several behaviours of the
+    input, the best one is taken.
     """
+    further = [each.get(effect.name) for each in (outcome.form_alternatives, outcome.timing_alternatives)]
+    effects = {*outcome.hypothesis.effects}
     compared = [alternatives]
-    forms = outcome.form_alternatives.get(effect.name)
-    if forms is not None and {*forms.without.effects, effect} == {*outcome.hypothesis.effects}:
-        compared.append(forms)
-    return [
-        (screened, each.without.fit)
-        for each in compared
-        for screened in each.screened
-        if effect.cause not in screened.effect.special_cases
-    ]
+    compared += [each for each in further if each and {*each.without.effects, effect} == effects]
+    found: dict[str, tuple[ScreenedEffect, CalibrationResult]] = {}
+    for each in compared:
+        for screened in each.screened:
+            known = found.get(screened.effect.name)
+            is_better = known is None or screened.score_gain(each.without.fit) > known[0].score_gain(known[1])
+            if is_better and effect.cause not in screened.effect.special_cases:
+                found[screened.effect.name] = screened, each.without.fit
+    return list(found.values())
 
 
 def _score_causes(

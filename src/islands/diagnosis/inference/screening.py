@@ -113,11 +113,6 @@ def screen_effects(
     screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
     if target.has_feedback:  # The input of the same sample contains the noise.
         screened = [each for each in screened if not acts_at_once(each.fit, MAX_LATE_RESPONSE)]
-    return sort_screened(screened, base)
-
-
-def sort_screened(screened: Sequence[ScreenedEffect], base: CalibrationResult) -> list[ScreenedEffect]:
-    """Return screened effects by their gains over a fit, the best first; ties keep their order."""
     return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
 
 

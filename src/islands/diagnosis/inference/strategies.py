@@ -82,6 +82,8 @@ class SearchOutcome:
     verdict : Verdict
     form_alternatives : mapping of str to Alternatives
         Free forms that could take the place of each of several effects.
+    timing_alternatives : mapping of str to Alternatives
+        Effects of time that could take the place of each of them, with another behaviour of the input.
     cancelled : mapping of str to tuple of str
         Causes that opposed an effect, and were removed, by its name.
     """
@@ -95,6 +97,7 @@ class SearchOutcome:
     residual_structure: Mapping[str, float]
     verdict: Verdict
     form_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
+    timing_alternatives: Mapping[str, Alternatives] = field(default_factory=dict)
     cancelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def with_fit(self, fit: CalibrationResult) -> "SearchOutcome":

@@ -16,9 +16,9 @@ from islands.diagnosis.calibration.intersample_selection import (
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, remove_each, with_effect
-from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects, sort_screened
+from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects
+from islands.diagnosis.inference.strategies import SearchOutcome
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.interface.effect import Effect
 from islands.effects.timing import DELAY, RESONANCE, SENSOR_LAG
 from islands.simulators.interface import Simulator
 
@@ -26,27 +26,18 @@ from islands.simulators.interface import Simulator
 _EFFECTS = (DELAY, SENSOR_LAG, RESONANCE)
 
 
-def add_timing_alternatives(
-    alternatives: Alternatives, effect: Effect, larger: CalibrationResult, target: Target, run: DiagnosisRun
-) -> Alternatives:
-    """Return the alternatives to an effect with those that need another behaviour of the input.
-
-    Parameters
-    ----------
-    alternatives : Alternatives
-    effect : Effect
-        If it is none of time, the alternatives are returned as they are.
-    larger : CalibrationResult
-        Fit with the effect.
-    """
-    if effect not in _EFFECTS:
-        return alternatives
-    without = alternatives.without
-    others = [each for each in _screen(without, larger, target, run) if each.effect != effect]
-    best: dict[str, ScreenedEffect] = {}
-    for each in sort_screened([*alternatives.screened, *others], without.fit):
-        best.setdefault(each.effect.name, each)
-    return replace(alternatives, screened=list(best.values()))
+def add_timing_alternatives(outcome: SearchOutcome, run: DiagnosisRun) -> SearchOutcome:
+    """Return an outcome with the alternatives to its effects of time that need another behaviour."""
+    base, hypothesis, target = outcome.base, outcome.hypothesis, outcome.target
+    effects = [effect for effect in hypothesis.effects if effect in _EFFECTS]
+    bare = Hypothesis(base, base.score, ())
+    single = len(hypothesis.effects) == 1
+    removed = [bare] * len(effects) if single else remove_each(hypothesis, effects, target, run.parallel_map)
+    found = {}
+    for effect, without in zip(effects, removed, strict=True):
+        screened = [each for each in _screen(without, hypothesis.fit, target, run) if each.effect != effect]
+        found[effect.name] = Alternatives(without, screened)
+    return replace(outcome, timing_alternatives=found)
 
 
 def find_timing_simulator(hypothesis: Hypothesis, target: Target, run: DiagnosisRun) -> Simulator | None:

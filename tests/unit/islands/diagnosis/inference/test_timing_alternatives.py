@@ -7,8 +7,9 @@ import scipy
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, with_effect
+from islands.diagnosis.inference.hypothesis import Hypothesis, with_effect
 from islands.diagnosis.inference.screening import screen_effects
+from islands.diagnosis.inference.strategies import make_outcome
 from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives, find_timing_simulator
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.baseline import OFFSET
@@ -55,19 +56,19 @@ def test_a_resonance_next_to_a_wrong_hold_is_a_delay_next_to_the_right_one() -> 
 
 def test_the_alternatives_to_an_effect_of_time_have_another_hold() -> None:
     hypothesis, without, target, run = find_in_late_record(RESONANCE)
-    alternatives = Alternatives(without, screen_effects(without.fit, target, run))
-    found = add_timing_alternatives(alternatives, RESONANCE, hypothesis.fit, target, run)
-    gains = {each.effect.name: each.score_gain(without.fit) for each in found.screened}
-    before = {each.effect.name: each.score_gain(without.fit) for each in alternatives.screened}
-    assert len(gains) == len(found.screened)
-    assert gains["delay"] > gains["resonance"] > before["delay"]
-    assert gains["resonance"] == before["resonance"]
-    delay = next(each.fit for each in found.screened if each.effect is DELAY)
-    assert delay.values[delay.simulation.get_slice(DELAY)][0] == pytest.approx(LATE, rel=0.05)
+    screened = screen_effects(without.fit, target, run)
+    outcome = make_outcome(without.fit, screened, target, hypothesis)
+    found = add_timing_alternatives(outcome, run).timing_alternatives["resonance"]
+    gains = {each.effect.name: each.score_gain(without.fit) for each in screened}
+    assert {each.effect for each in found.screened} == {DELAY, SENSOR_LAG}
+    best = max(found.screened, key=lambda each: each.score_gain(without.fit))
+    assert best.score_gain(without.fit) > gains["resonance"] > gains["delay"]
+    assert best.effect is DELAY
+    assert best.fit.values[best.fit.simulation.get_slice(DELAY)][0] == pytest.approx(LATE, rel=0.05)
 
 
 def test_another_effect_has_no_alternatives_of_another_hold() -> None:
     hypothesis, without, target, run = find_in_late_record(OFFSET)
-    alternatives = Alternatives(without, screen_effects(without.fit, target, run))
-    assert add_timing_alternatives(alternatives, OFFSET, hypothesis.fit, target, run) is alternatives
+    outcome = make_outcome(without.fit, screen_effects(without.fit, target, run), target, hypothesis)
+    assert not add_timing_alternatives(outcome, run).timing_alternatives
     assert find_timing_simulator(hypothesis, target, run) is None
