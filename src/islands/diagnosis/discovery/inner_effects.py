@@ -64,8 +64,8 @@ def search_inner_effects(
     inner = _find_best_effect(outcome.hypothesis, base, target, run)
     if inner is None:
         return outcome
-    fit = _select_simulator(inner.fit, target)
-    inner = _find_opposite_limits(replace(inner, fit=fit), base, target) or replace(inner, fit=fit)
+    inner = replace(inner, fit=_select_simulator(inner.fit, target))
+    inner = _find_opposite_limits(inner, base, target) or inner
     simulator = inner.fit.simulation.simulator
     own = run.with_effects(list_effects(simulator, run, [inner.effect]))
     searched = _search_with(inner, base, target, own)
