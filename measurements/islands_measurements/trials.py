@@ -45,8 +45,9 @@ BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
 #: Band of effects that are injected together.
 COMBINED_BAND = BANDS[1]
 
-#: Faults that act after the others: an encoder reads the position that drifts and disturbances have moved.
-LAST = frozenset(("cyclic-error",))
+#: Faults that act after others, in this order: disturbances act behind the actuator, and an encoder reads the
+#: position that drifts and disturbances have moved.
+LAST = ("second-input", "swept-disturbance", "periodic-disturbance", "swept-interference", "cyclic-error")
 
 
 class _Counts(NamedTuple):
@@ -196,9 +197,14 @@ def _plan_injections(
             raise SettingsError(f"{size} effects at once need {size} names: give more with --effects")
         for turn in range(many):
             drawn = map(str, rng.choice(names, size, replace=False))
-            yield tuple(sorted(drawn, key=lambda name: name in LAST)), turn, COMBINED_BAND
+            yield tuple(sorted(drawn, key=_get_place)), turn, COMBINED_BAND
     for turn in range(counts.mixed):
         yield tuple(str(rng.choice(each)) for each in (names, simulated.nameless)), turn, COMBINED_BAND
+
+
+def _get_place(name: str) -> int:
+    """Return the place of a fault among those that act after others; 0 for another one."""
+    return LAST.index(name) + 1 if name in LAST else 0
 
 
 def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:
