@@ -4,6 +4,7 @@ Errors of either imitate physics: a wrong intersample behaviour looks like a del
 like damping.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -59,7 +60,10 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
         near = [each for each in tried if tried[each].score < tried[chosen].score + MIN_IMPROVEMENT]
         chosen = min(near, key=lambda intersample: (_get_lead(tried[intersample]), tried[intersample].score))
     found = tried[chosen]
-    return (_refine_by_score(found, target) if chosen in irregular else found).simulation.simulator
+    if chosen in irregular:
+        # The changes of the output by dry friction do not decrease regularly with the step.
+        found = improve(found, target, _halve_step)
+    return found.simulation.simulator
 
 
 def _get_lead(fit: CalibrationResult) -> float:
@@ -70,17 +74,29 @@ def _get_lead(fit: CalibrationResult) -> float:
     )
 
 
-def _refine_by_score(fit: CalibrationResult, target: Target) -> CalibrationResult:
-    """Halve the step of a fit as long as that explains the record better.
+def improve(
+    fit: CalibrationResult,
+    target: Target,
+    change: Callable[[ExtendedSimulator], ExtendedSimulator | None],
+) -> CalibrationResult:
+    """Calibrate a simulation that is changed again and again, as long as that explains the record better.
 
-    The changes of the output by dry friction do not decrease regularly with the step.
+    Parameters
+    ----------
+    change : callable
+        ``simulation -> simulation``; None if there is no further change.
     """
-    while (finer := halve_step(fit.simulation.simulator)) is not None:
-        refitted = calibrate(_with_simulator(fit.simulation, finer), target, fit.values)
+    while (changed := change(fit.simulation)) is not None:
+        refitted = calibrate(changed, target, fit.values)
         if not refitted.score < fit.score - MIN_IMPROVEMENT:
             break
         fit = refitted
     return fit
+
+
+def _halve_step(simulation: ExtendedSimulator) -> ExtendedSimulator | None:
+    finer = halve_step(simulation.simulator)
+    return None if finer is None else _with_simulator(simulation, finer)
 
 
 def get_discretisation(simulator: Simulator) -> Discretisation:

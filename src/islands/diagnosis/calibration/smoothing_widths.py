@@ -5,18 +5,17 @@ requires a derivative. A record whose noise is small next to the effect shows th
 step, which would be taken for another law.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
 
 from islands.diagnosis.calibration.instants import Instant, move_instants
-from islands.diagnosis.calibration.intersample_selection import MIN_IMPROVEMENT
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.intersample_selection import improve
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.effects.baseline import JUMP
 from islands.effects.friction import COULOMB_FRICTION
 from islands.effects.interface.context import SimulationContext
 from islands.effects.time_variation import GAIN_STEP, INSTANTS, instant_bounds
+from islands.simulators.extended import ExtendedSimulator
 
 #: Width of a try relative to the one before.
 _NARROWER = 0.25
@@ -24,14 +23,11 @@ _NARROWER = 0.25
 #: Least width of dry friction relative to the typical rate, and of a step in samples.
 _LEAST_FRICTION, _LEAST_STEP = 2e-4, 0.1
 
-#: ``context -> context`` with a narrower width; None below the least one.
-_Narrow: TypeAlias = Callable[[SimulationContext], SimulationContext | None]
-
 
 def narrow_friction(fit: CalibrationResult, target: Target) -> SimulationContext:
     """Return the context of a fit, with a narrower dry friction if that explains the record better."""
     if COULOMB_FRICTION in fit.simulation.effects:
-        fit = _narrow(fit, target, _make_friction_narrower)
+        fit = improve(fit, target, _make_friction_narrower)
     return fit.simulation.context
 
 
@@ -48,25 +44,18 @@ def narrow_steps(fit: CalibrationResult, target: Target) -> CalibrationResult:
     distances = (latest - earliest) / (INSTANTS - 1), context.step_width * context.dt
     places = [simulation.get_slice(effect).start + 1 for effect in steps]
     fit = move_instants(fit, target, [Instant(each, earliest, latest, *distances) for each in places])
-    return _narrow(fit, target, _make_steps_narrower)
+    return improve(fit, target, _make_steps_narrower)
 
 
-def _narrow(fit: CalibrationResult, target: Target, make_narrower: _Narrow) -> CalibrationResult:
-    """Calibrate with narrower widths as long as that explains the record better."""
-    while (context := make_narrower(fit.simulation.context)) is not None:
-        narrower = calibrate(replace(fit.simulation, context=context), target, fit.values)
-        if not narrower.score < fit.score - MIN_IMPROVEMENT:
-            break
-        fit = narrower
-    return fit
-
-
-def _make_friction_narrower(context: SimulationContext) -> SimulationContext | None:
+def _make_friction_narrower(simulation: ExtendedSimulator) -> ExtendedSimulator | None:
+    context = simulation.context
     width = _NARROWER * context.force_coordinate.friction_smoothing
     coordinate = replace(context.force_coordinate, friction_smoothing=width)
-    return None if width < _LEAST_FRICTION else replace(context, force_coordinate=coordinate)
+    changed = replace(context, force_coordinate=coordinate)
+    return None if width < _LEAST_FRICTION else replace(simulation, context=changed)
 
 
-def _make_steps_narrower(context: SimulationContext) -> SimulationContext | None:
-    width = _NARROWER * context.step_width
-    return None if width < _LEAST_STEP else replace(context, step_width=width)
+def _make_steps_narrower(simulation: ExtendedSimulator) -> ExtendedSimulator | None:
+    width = _NARROWER * simulation.context.step_width
+    changed = replace(simulation.context, step_width=width)
+    return None if width < _LEAST_STEP else replace(simulation, context=changed)
