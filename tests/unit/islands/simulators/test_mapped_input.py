@@ -75,6 +75,27 @@ def test_a_map_of_a_linear_input_is_that_of_a_denser_record(name: str) -> None:
     assert error < 0.1 * coarse
 
 
+def test_a_play_reaches_the_peaks_of_a_band_limited_input_between_samples() -> None:
+    """The input has four samples for each period: at the samples alone, it turns too early."""
+    times = np.arange(TIMES * 400) / TIMES
+    u = sum(np.sin(2 * np.pi * f * times + 9.0 * f) for f in (0.05, 0.11, 0.17, 0.23))
+    effects = (CATALOGUE["backlash"],)
+    dense, sampled = record_of(np.asarray(u), DT / TIMES), record_of(np.asarray(u)[::TIMES])
+    simulator = ResampledSimulator(OSCILLATOR, InterSample.BAND_LIMITED, 8)
+    context = make_context(sampled, simulator, sampled.samples)
+    simulation = ExtendedSimulator(simulator, effects, context)
+    values = set_values(simulation)
+    part = simulation.get_slice(effects[0])
+    exact = ExtendedSimulator(OSCILLATOR, effects, make_context(dense, OSCILLATOR, dense.samples))
+    moved, _ = map_input([(effects[0], values[part])], context, is_continuous_time=False)
+    expected = exact.simulate(values)[::TIMES]
+    found = simulation.simulate(values)
+    of_samples = simulate(simulator, record_of(moved), ())
+    inner = slice(20, -20)  # the interpolation reads ten samples on each side
+    error, coarse = (float(np.sqrt(np.mean((each - expected)[inner] ** 2))) for each in (found, of_samples))
+    assert error < 0.1 * coarse
+
+
 @pytest.mark.parametrize("name", BETWEEN)
 def test_a_map_of_a_held_input_is_that_of_its_samples(name: str) -> None:
     record = record_of(wave())
