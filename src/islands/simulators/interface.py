@@ -52,7 +52,7 @@ class SimulationRun:
         return id(self.x), id(self.characteristic)
 
     def apply_characteristic(self, signal: Signal) -> Signal:
-        """Return values of the input after ``characteristic``, of any shape with the time along its rows."""
+        """Return values of the input after ``characteristic``; flattened, they are in the order of time."""
         if self.characteristic is None:
             return signal
         return self.characteristic(signal.reshape(-1)).reshape(signal.shape)

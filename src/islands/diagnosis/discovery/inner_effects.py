@@ -29,6 +29,7 @@ from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.screening import (
     ScreenedEffect,
     bic_penalty,
+    compute_cost,
     screen_effects,
     transfer_parameters,
 )
@@ -102,7 +103,7 @@ def _search_with(
     single, start = [ScreenedEffect(inner.effect, fit)], None
     if len(simulation.effects) > 1:
         single = screen_effects(without, target, run.with_effects([inner.effect]))
-        start = Hypothesis(fit, _compute_cost(fit, base), simulation.effects)
+        start = Hypothesis(fit, compute_cost(fit, base), simulation.effects)
     screened = [*single, *others]
     hypothesis, target = stepwise_search(without, screened, target, run, start=start)
     return make_outcome(without, screened, target, hypothesis)
@@ -162,7 +163,7 @@ def _find_best_effect(
     """
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(alone.fit.simulation, target, alone.fit.values)
-    best, least = None, _compute_cost(scored, base) - EQUIVALENCE_MARGIN
+    best, least = None, compute_cost(scored, base) - EQUIVALENCE_MARGIN
     unsigned = fit_unsigned_output(base, target, run)
     screened = [] if unsigned is None else [unsigned]
     starts = [base, scored] if alone.effects else [base]
@@ -172,12 +173,7 @@ def _find_best_effect(
         inner = _list_inner_effects(states.simulation.simulator, run)
         screened += screen_effects(states, target, run.with_effects(inner))
     for each in screened:
-        cost = _compute_cost(each.fit, base)
+        cost = compute_cost(each.fit, base)
         if cost < least:
             best, least = each, cost
     return best
-
-
-def _compute_cost(fit: CalibrationResult, base: CalibrationResult) -> float:
-    """Return the score of a fit plus the BIC penalties of its effects."""
-    return fit.score + sum(bic_penalty(effect, base) for effect in fit.simulation.effects)

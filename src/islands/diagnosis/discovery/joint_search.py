@@ -105,11 +105,9 @@ def _search_one_term(
     kept: Hypothesis, base: CalibrationResult, target: Target, run: DiagnosisRun
 ) -> TermSearchResult | None:
     """Search for a term with the effects of a hypothesis in the simulation of ``base``."""
-    simulation = base.simulation.with_effects(catalogue_order(kept.effects))
     whitened = whiten_target(target, kept.fit)
-    start = transfer_parameters(base.values, base.simulation, simulation)
-    transfer_effects(kept.fit.values, kept.fit.simulation, start, simulation)
-    terms = search_terms(calibrate(simulation, whitened, start), target, run, max_terms=1)
+    start = calibrate_with_effects(base, kept.effects, kept.fit, whitened)
+    terms = search_terms(start, target, run, max_terms=1)
     if terms is None:
         return None
     # Without the term, the fit may have moved an instant or a frequency to another optimum.
@@ -117,6 +115,16 @@ def _search_one_term(
     transfer_effects(kept.fit.values, kept.fit.simulation, values, terms.fit.simulation)
     again = calibrate(terms.fit.simulation, whitened, values)
     return replace(terms, fit=again) if again.score < terms.fit.score else terms
+
+
+def calibrate_with_effects(
+    base: CalibrationResult, effects: Sequence[Effect], known: CalibrationResult, target: Target
+) -> CalibrationResult:
+    """Calibrate a simulation with effects, from its values and those of the effects in another fit."""
+    simulation = base.simulation.with_effects(catalogue_order(effects))
+    start = transfer_parameters(base.values, base.simulation, simulation)
+    transfer_effects(known.values, known.simulation, start, simulation)
+    return calibrate(simulation, target, start)
 
 
 def assess_effects(terms: TermSearchResult, target: Target, run: DiagnosisRun) -> JointResult | None:

@@ -5,16 +5,16 @@ together with effects show it a better start: with these effects, and the noise 
 effect may be as good as the terms.
 """
 
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, whiten_target
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.discovery.joint_search import calibrate_with_effects
 from islands.diagnosis.discovery.missing_terms import MissingTerms
 from islands.diagnosis.inference.hypothesis import Hypothesis
-from islands.diagnosis.inference.screening import bic_penalty, transfer_effects, transfer_parameters
+from islands.diagnosis.inference.screening import compute_cost
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN, stepwise_search
 from islands.diagnosis.inference.strategies import SearchOutcome, assess_evidence, make_outcome
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import catalogue_order
 
 
 def search_instead_of_terms(
@@ -42,12 +42,8 @@ def search_instead_of_terms(
         return alone
     run.progress("effects instead of missing terms")
     whitened = whiten_target(target, found.fit)
-    simulation = base.simulation.with_effects(catalogue_order(found.effects))
-    values = transfer_parameters(base.values, base.simulation, simulation)
-    transfer_effects(found.fit.values, found.fit.simulation, values, simulation)
-    fit = calibrate(simulation, whitened, values)
-    cost = fit.score + sum(bic_penalty(effect, base) for effect in found.effects)
-    start = Hypothesis(fit, cost, found.effects)
+    fit = calibrate_with_effects(base, found.effects, found.fit, whitened)
+    start = Hypothesis(fit, compute_cost(fit, base), found.effects)
     hypothesis, whitened = stepwise_search(alone.base, alone.screened, whitened, run, start=start)
     is_larger = len(hypothesis.effects) > len(found.terms) + len(found.effects)
     if is_larger or hypothesis.cost > given.cost - MIN_GAIN:

@@ -69,6 +69,11 @@ def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     return (values + effect.extra_degrees_of_freedom) * float(np.log(base.noise.effective_samples))
 
 
+def compute_cost(fit: CalibrationResult, base: CalibrationResult) -> float:
+    """Return the score of a fit plus the BIC penalties of its effects."""
+    return fit.score + sum(bic_penalty(effect, base) for effect in fit.simulation.effects)
+
+
 def screen_effects(
     base: CalibrationResult, target: Target, run: DiagnosisRun, larger: CalibrationResult | None = None
 ) -> list[ScreenedEffect]:
