@@ -11,7 +11,9 @@ from islands.diagnosis.inference.noise_surrogates import (
     draw_surrogates,
     list_noise_models,
 )
+from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.effects.interface.effect import Signal
+from islands.estimation.noise_model import fit_noise
 from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import play_from
 
@@ -78,7 +80,7 @@ def explain_residual(
     The features are lags, rates, low-pass filters, plays and random cosines of the input and the simulated
     output. Features do not reach across the boundary of two recordings; folds, which are contiguous
     blocks, may contain one. If a surrogate of the residual is predicted as well, by chance, nothing is
-    explained.
+    explained. A mean that slow noise has by chance is subtracted first.
 
     Parameters
     ----------
@@ -97,7 +99,9 @@ def explain_residual(
         What is left of the residual.
     """
     is_known = ~np.isnan(residual)
-    raw, residual = _make_features(u, simulated, segments)[is_known], residual[is_known]
+    runs = count_runs(is_known, segments)
+    raw = _make_features(u, simulated, segments)[is_known]
+    residual = _subtract_chance_mean(residual[is_known], runs)
     designs = _make_designs(raw, rng)
     total = best = float(np.sum(residual[:, None] ** 2, axis=0)[0])
     left = residual
@@ -108,13 +112,23 @@ def explain_residual(
     explained = (total - best) / residual.size
     if explained <= MIN_FRACTION * float(np.mean(residual**2)):
         return explained, left
-    runs = count_runs(is_known, segments)
     noise = list_noise_models(residual, runs)[0]
     drawn = draw_surrogates(residual, noise, runs, Randomisation.PHASES, SURROGATES, rng.spawn(1)[0])
     surrogates = np.column_stack(list(drawn))
     by_chance = _predict_mean_square(designs, surrogates) / np.mean(surrogates**2, axis=0)
     is_by_chance = explained <= float(np.max(by_chance)) * float(np.mean(residual**2))
     return (0.0, residual) if is_by_chance else (explained, left)
+
+
+def _subtract_chance_mean(residual: Signal, segments: Sequence[int]) -> Signal:
+    """Return a residual without its mean, unless an offset would have a sufficient gain as an effect.
+
+    The constant of the regression predicts the mean of slow noise in all folds. Surrogates have none, since
+    their innovations are centred.
+    """
+    centred = residual - residual.mean()
+    costs = [fit_noise(each, segments=segments).minus_twice_log_likelihood for each in (residual, centred)]
+    return residual if costs[0] - costs[1] - np.log(residual.size) > MIN_GAIN else centred
 
 
 def _make_designs(raw: Signal, rng: np.random.Generator) -> list[Signal]:

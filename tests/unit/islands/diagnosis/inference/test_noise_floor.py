@@ -1,12 +1,20 @@
-"""Period detection, and the noise variance from repeated periods."""
+"""The explainable part of a residual, period detection, and the noise variance from repeated periods."""
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.diagnosis.inference.noise_floor import MIN_PERIOD, detect_period, noise_variance_from_periods
+from islands.diagnosis.inference.noise_floor import (
+    MIN_FRACTION,
+    MIN_PERIOD,
+    detect_period,
+    explainable_variance,
+    noise_variance_from_periods,
+)
+from islands_measurements.detection.injection.noise import NOISES
 
 Array = NDArray[np.float64]
 
@@ -15,6 +23,17 @@ def periodic(period: int, samples: int, seed: int = 0) -> Array:
     """Return a periodic signal with random values and no shorter period."""
     values = np.random.default_rng(seed).standard_normal(period)
     return np.resize(values, samples)
+
+
+@pytest.mark.parametrize(("noise", "is_explained"), [("pink", False), ("brown", False), ("white", True)])
+def test_mean_of_a_residual_is_explained_only_where_noise_has_none(noise: str, is_explained: bool) -> None:
+    for seed in (1, 2, 7):
+        rng = np.random.default_rng(seed)
+        u = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(1000))
+        y = scipy.signal.lfilter([0.05], [1.0, -0.95], u)
+        residual = 1.0 + NOISES[noise](rng, y)
+        explained = explainable_variance(residual, u, y, np.random.default_rng(0))
+        assert explained > 0.8 if is_explained else explained < MIN_FRACTION
 
 
 @given(st.integers(MIN_PERIOD, 120), st.floats(2.0, 9.0), st.integers(0, 99), st.floats(-50, 50))
