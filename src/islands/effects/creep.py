@@ -47,6 +47,11 @@ def _limit_kappa(context: SimulationContext, lower: float, upper: float) -> tupl
     return (-_MAX_EARLIER_STEP, _MAX_EARLIER_STEP) if context.has_resting_input else (lower, upper)
 
 
+def _limit_tau(context: SimulationContext) -> tuple[float, float]:
+    """Return the smallest and the largest time constant that a record resolves, in seconds."""
+    return 5 * context.dt, 1.5 * context.fit_end_time
+
+
 def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
     return y + values[0] * _creep(y, [float(np.exp(values[1]))], context)
 
@@ -54,7 +59,7 @@ def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContex
 def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("kappa", "", 0.0, 0.02, *_limit_kappa(context, -0.5, 1.0)),
-        Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * context.dt), np.log(1.5 * context.fit_end_time)),
+        Parameter("log_tau", "ln s", 0.0, 0.3, *np.log(_limit_tau(context))),
     )
 
 
@@ -92,6 +97,18 @@ EXPONENTIAL_CREEP = Effect(
 #: Time constants of the low-passes of logarithmic creep, in seconds.
 TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
+#: Minimum number of these time constants that a record resolves.
+_MIN_RESOLVED_TAUS = 3
+
+
+def _resolves_logarithm(context: SimulationContext) -> bool:
+    """Return whether a record resolves a decade of logarithmic creep.
+
+    Creep that ends within a few samples is a gain and, less its first value, an offset.
+    """
+    lower, upper = _limit_tau(context)
+    return sum(lower <= tau <= upper for tau in TAUS) >= _MIN_RESOLVED_TAUS
+
 
 def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
     return y + values[0] * _creep(y, TAUS, context)
@@ -123,6 +140,7 @@ LOGARITHMIC_CREEP = Effect(
         note="{f} is a sum of low-passes with the time constants "
         f"{', '.join(f'{tau:g}' for tau in TAUS[:-1])} and {TAUS[-1]:g} s, less their first values",
     ),
+    is_applicable=_resolves_logarithm,
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
     similar_to="exponential-creep",
     distinguished_by="the output continues at constant input, by equal steps in each decade of time",
