@@ -80,6 +80,7 @@ STICTION = Effect(
     starting_points=_stiction_starting_points,
     form=lambda u, values, _: stick(u, float(values[0])),
     equation=lambda _: MapEquation("z0", (("slider", "n0"),)),
+    acts_between_samples=True,
     formula=Formula(
         "stick(x, s)",
         symbols=("s",),

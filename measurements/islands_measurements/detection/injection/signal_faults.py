@@ -137,13 +137,15 @@ def backlash(_rng: np.random.Generator, strength: float) -> Map:
 
 
 def stiction(_rng: np.random.Generator, strength: float) -> Map:
-    """Stick-slip: the output jumps to the input when their distance exceeds ``strength``."""
+    """Stick-slip: the output jumps to the input when their distance reaches ``strength``.
+
+    It does so between two samples of the input, which is continuous.
+    """
 
     def follow(_drive: Excitation, u: Signal) -> Signal:
         positions, position = [], float(u[0])
         for target in u.tolist():
-            if abs(target - position) > strength:
-                position = target
+            position += strength * int((target - position) / strength)
             positions.append(position)
         return np.array(positions)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
+from islands.effects.interface.effect import Signal
 from islands.effects.timing import DELAY
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
@@ -78,16 +79,19 @@ def improve(
     fit: CalibrationResult,
     target: Target,
     change: Callable[[ExtendedSimulator], ExtendedSimulator | None],
+    refit: Callable[[ExtendedSimulator, Target, Signal], CalibrationResult] = calibrate,
 ) -> CalibrationResult:
-    """Calibrate a simulation that is changed again and again, as long as that explains the record better.
+    """Fit a simulation that is changed again and again, as long as that explains the record better.
 
     Parameters
     ----------
     change : callable
         ``simulation -> simulation``; None if there is no further change.
+    refit : callable
+        ``(simulation, target, values) -> fit``.
     """
     while (changed := change(fit.simulation)) is not None:
-        refitted = calibrate(changed, target, fit.values)
+        refitted = refit(changed, target, fit.values)
         if not refitted.score < fit.score - MIN_IMPROVEMENT:
             break
         fit = refitted

@@ -7,15 +7,18 @@ step, which would be taken for another law.
 
 from dataclasses import replace
 
-from islands.diagnosis.calibration.instants import Instant, move_instants
 from islands.diagnosis.calibration.intersample_selection import improve
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.pattern_search import Coordinate, search_pattern
 from islands.diagnosis.calibration.target import Target
 from islands.effects.baseline import JUMP
 from islands.effects.friction import COULOMB_FRICTION
-from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.effects.time_variation import GAIN_STEP, INSTANTS, instant_bounds
 from islands.simulators.extended import ExtendedSimulator
+
+#: Effects with an instant.
+_STEPS = frozenset((JUMP, GAIN_STEP))
 
 #: Width of a try relative to the one before.
 _NARROWER = 0.25
@@ -34,17 +37,24 @@ def narrow_friction(fit: CalibrationResult, target: Target) -> SimulationContext
 def narrow_steps(fit: CalibrationResult, target: Target) -> CalibrationResult:
     """Return a fit with steps at better instants, and narrower ones if these explain the record better.
 
-    The instant of a step is found with the wide one, whose derivative reaches farther.
+    The instants are searched for with each width: a wide step at the end of a recording is better a few
+    samples later, and from there a calibration does not move a narrower one back.
     """
-    simulation, context = fit.simulation, fit.simulation.context
-    steps = [effect for effect in (JUMP, GAIN_STEP) if effect in simulation.effects]
-    if not steps:
+    if not _STEPS.intersection(fit.simulation.effects):
         return fit
+
+    def refit(simulation: ExtendedSimulator, target: Target, values: Signal) -> CalibrationResult:
+        return _search_instants(calibrate(simulation, target, values), target)
+
+    return improve(_search_instants(fit, target), target, _make_steps_narrower, refit)
+
+
+def _search_instants(fit: CalibrationResult, target: Target) -> CalibrationResult:
+    simulation, context = fit.simulation, fit.simulation.context
     earliest, latest = instant_bounds(context)
-    distances = (latest - earliest) / (INSTANTS - 1), context.step_width * context.dt
-    places = [simulation.get_slice(effect).start + 1 for effect in steps]
-    fit = move_instants(fit, target, [Instant(each, earliest, latest, *distances) for each in places])
-    return improve(fit, target, _make_steps_narrower)
+    moves = (latest - earliest) / (INSTANTS - 1), context.step_width * context.dt
+    places = [simulation.get_slice(each).start + 1 for each in simulation.effects if each in _STEPS]
+    return search_pattern(fit, target, [Coordinate(each, earliest, latest, *moves) for each in places])
 
 
 def _make_friction_narrower(simulation: ExtendedSimulator) -> ExtendedSimulator | None:

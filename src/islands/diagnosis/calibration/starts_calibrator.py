@@ -16,6 +16,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     minimise,
     prior_precision,
 )
+from islands.diagnosis.calibration.pattern_search import search_jumps
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.effect import Signal
 from islands.parallel import ParallelMap
@@ -68,6 +69,10 @@ class StartsCalibrator:
         decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
         points = minimise(simulation, self.target, starts, iterations, decrease)
         best = points if has_model_error else [min(points, key=attrgetter("cost"))]
+        if not self.is_rough and any(effect.centre is not None for effect in simulation.effects):
+            fits = [compare_output(simulation, self.target, each.values, each.output) for each in best]
+            found = [search_jumps(fit, self.target) for fit in fits]
+            return [CalibratedStart(fit.values, fit.output) for fit in found]
         # Copies, since a row would keep the outputs of all points of its simulations in memory.
         return [CalibratedStart(point.values.copy(), point.output.copy()) for point in best]
 

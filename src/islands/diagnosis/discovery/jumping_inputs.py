@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.intersample_selection import get_discretisation, halve_step
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
+from islands.diagnosis.calibration.pattern_search import search_jumps
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.state_equations import (
@@ -26,7 +27,7 @@ from islands.diagnosis.inference.pulse_response import convolve, respond_to_puls
 from islands.diagnosis.inference.screening import ScreenedEffect, transfer_parameters
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import catalogue_order
-from islands.effects.hysteresis import STICTION
+from islands.effects.hysteresis import STICTION, is_held
 from islands.effects.interface.effect import Effect, Signal, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.errors import RecordError
@@ -44,6 +45,10 @@ _FINE = 8
 #: levels of successive numbers differ by a twentieth of a step, and by a tenth if they are many.
 _COUNTS = np.concatenate([np.arange(2.0, 40.0, 0.1), np.arange(40.0, 100.0, 0.2)])
 _OFFSETS = np.arange(-7, 9) / 16.0
+
+#: Breakaway distances of an input that is continuous, relative to its peak. It slips after each of them, so
+#: that an error of the distance adds up over a sweep. Closer ones than this are the same.
+_BREAKAWAYS, _NEAR_BREAKAWAY = np.geomspace(0.005, 0.6, 1000), 0.02
 
 #: Numbers of steps and offsets near the best ones that are compared then, relative to these. An input that
 #: takes all values tells them apart, and one with few levels permits a range.
@@ -109,6 +114,8 @@ def _search(
     for _ in range(_SEARCHES):
         fits = [_calibrate(plant, simulation, effect, point, target) for point in list_points(plant)]
         found = min(fits, key=lambda fit: fit.mean_square, default=None)
+        if found is not None:
+            found = search_jumps(found, target)
         if found is None or not found.mean_square < _MAX_RATIO * (best or base).mean_square:
             break
         best = found
@@ -161,18 +168,28 @@ def _estimate_plant(
 
 
 def _list_breakaways(plant: CalibrationResult, target: Target) -> list[Signal]:
-    """Return the breakaway distances that explain most of a residual."""
+    """Return the breakaway distances that explain most of a residual, different ones."""
     response, context = respond_to_pulse(plant), plant.simulation.context
     if response is None:
         return []
     projection = Projection(plant, target)
-    points = STICTION.starting_points(context, target.y - plant.output)
-    changes = [apply_map(STICTION, context.u, np.array(point), context) - context.u for point in points]
-    responses = np.array([projection(convolve(each, response, context.segments)) for each in changes])
-    explained = _explain(responses @ projection.residual, np.sum(responses**2, axis=1))
-    order = np.argsort(-explained)[:_STARTS]
+    distances = np.array([point for (point,) in STICTION.starting_points(context, target.y - plant.output)])
+    if not is_held(context.u):
+        distances = _BREAKAWAYS * context.input_peak
+    explained = np.zeros(distances.size)
+    for place, distance in enumerate(distances.tolist()):
+        change = apply_map(STICTION, context.u, np.array([distance]), context) - context.u
+        caused = projection(convolve(change, response, context.segments))
+        explained[place] = _explain(caused @ projection.residual, caused @ caused)
     least = _MIN_FRACTION * float(projection.residual @ projection.residual)
-    return [np.array(points[place]) for place in order if explained[place] > least]
+    found: list[Signal] = []
+    for _ in range(_STARTS):
+        best = int(np.argmax(explained))
+        if not explained[best] > least:
+            break
+        found.append(distances[best : best + 1])
+        explained[np.abs(distances - distances[best]) <= _NEAR_BREAKAWAY * distances[best]] = 0.0
+    return found
 
 
 def _list_steps(cells: _Cells, plant: CalibrationResult, target: Target) -> list[Signal]:

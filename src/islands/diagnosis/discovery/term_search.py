@@ -13,7 +13,6 @@ from operator import attrgetter
 import numpy as np
 
 from islands.data.segments import fill_gaps
-from islands.diagnosis.calibration.instants import Instant, move_instants
 from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -21,6 +20,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     estimate_covariance,
     whiten_target,
 )
+from islands.diagnosis.calibration.pattern_search import Coordinate, search_pattern
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.candidate_terms import (
@@ -301,11 +301,11 @@ def _move_instants(found: TermSearchResult, target: Target) -> TermSearchResult:
     """Return the equations with other instants of gates, as long as they fit better."""
     places = {parameter.name: place for place, parameter in enumerate(found.fit.simulation.parameters)}
     instants = [
-        Instant(places[each.parameters[1]], gate.earliest, gate.latest, gate.spacing, gate.change)
+        Coordinate(places[each.parameters[1]], gate.earliest, gate.latest, gate.spacing, gate.change)
         for each in found.terms
         if (gate := each.term.gate) is not None
     ]
-    return replace(found, fit=move_instants(found.fit, target, instants))
+    return replace(found, fit=search_pattern(found.fit, target, instants))
 
 
 def _select_discretisation(found: TermSearchResult, target: Target) -> TermSearchResult:

@@ -172,3 +172,8 @@ class ExtendedEquations:
     gain_signal: str = ""
     effects: tuple[str, ...] = ()
     core: SampledCore | None = None
+
+    @property
+    def has_kinks(self) -> bool:
+        """Whether maps act on the input between samples, so that it may have kinks there."""
+        return self.characteristic is not None or bool(self.moment_maps)

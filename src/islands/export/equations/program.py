@@ -114,6 +114,8 @@ class EquationProgram(ABC):
                 if function == RATE and given.core is not None:
                     return self.read_signal("find_central_rate", source, [])
                 reader = "find_rate" if function == RATE else "delay"
+                if function == RATE and name == given.system.input and given.has_kinks:
+                    reader = "find_limited_rate"
                 if is_held:
                     reader = "find_held_rate" if function == RATE else "delay_held"
                 tau = [self.code.write(each) for each in others]

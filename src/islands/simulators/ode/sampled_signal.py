@@ -1,7 +1,7 @@
 """Signals that a simulation reads three times in each step: at its start, in its middle and at its end."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,12 @@ class SampledSignal:
     Attributes
     ----------
     moments : ndarray, shape (samples, 3)
+    has_kinks : bool
+        Whether the signal has kinks or jumps within steps, as after a map.
     """
 
     moments: Signal
+    has_kinks: bool = False
 
     @classmethod
     def join(cls, start: Signal, middle: Signal, end: Signal) -> "SampledSignal":
@@ -58,15 +61,20 @@ class SampledSignal:
     def differentiate(self, dt: float) -> "SampledSignal":
         """Return the rate: the derivative of the parabola through the values of each step.
 
-        A held signal would have impulses; its rate is that of a ramp to the next value within the step.
+        A held signal would have impulses; its rate is that of a ramp to the next value within the step. A
+        parabola may turn next to a kink where the signal does not. The rate is then limited, so that its
+        integral and that of its magnitude by Simpson's rule are those of the signal.
         """
         if self.is_held:
             rate = np.append(np.diff(self.start), 0.0) / dt
             return SampledSignal.join(rate, rate, rate)
         first, second = self._list_rises()
-        return SampledSignal.join(
-            (3.0 * first - second) / dt, (first + second) / dt, (3.0 * second - first) / dt
-        )
+        start, middle, end = 3.0 * first - second, first + second, 3.0 * second - first
+        if self.has_kinks:
+            limits = np.minimum(2.0 * middle, 0.0), np.maximum(2.0 * middle, 0.0)
+            is_monotone = first * second >= 0.0
+            start, end = (np.where(is_monotone, np.clip(each, *limits), each) for each in (start, end))
+        return SampledSignal.join(start / dt, middle / dt, end / dt)
 
     def refine(self, parts: int) -> "SampledSignal":
         """Return the signal with each step divided, by the parabola through the values of the step."""
@@ -84,7 +92,7 @@ class SampledSignal:
 
     def scale(self, factors: Signal) -> "SampledSignal":
         """Return the signal multiplied by a factor for each step, shape (samples,)."""
-        return SampledSignal(self.moments * factors[:, None])
+        return replace(self, moments=self.moments * factors[:, None])
 
     def delay(self, seconds: float, dt: float) -> "SampledSignal":
         """Return the signal delayed by linear interpolation; before the first sample it is constant.

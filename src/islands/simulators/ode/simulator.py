@@ -258,7 +258,8 @@ class OdeSimulator(BatchSimulator):
                 if id(run.x) not in refined:
                     refined[id(run.x)] = refine_input(run.x, self._get_between(run, context), steps)
                 moments = refined[id(run.x)].moments
-                made[run.input_key] = SampledSignal(run.apply_characteristic(moments))
+                mapped = run.apply_characteristic(moments)
+                made[run.input_key] = SampledSignal(mapped, has_kinks=run.characteristic is not None)
             driving = made[run.input_key]
             if not isinstance(gain, float):
                 if self.system.gain:

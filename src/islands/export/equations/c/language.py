@@ -353,6 +353,18 @@ static double find_rate(
 }
 
 """,
+        "find_limited_rate": """\
+/* Return the rate of a signal with kinks: as find_rate, but a signal that does not turn has no other sign. */
+static double find_limited_rate(
+    read_signal read, const struct parameters *p, const struct record *r, size_t step, double part)
+{
+    const double middle = read(p, r, step, 0.5);
+    const double rise = middle - read(p, r, step, 0.0), second = read(p, r, step, 1.0) - middle;
+    const double rate = 3.0*rise - second + 4.0*part*(second - rise), largest = 2.0*(rise + second);
+    return (rise*second < 0.0 ? rate : fmin(fmax(rate, fmin(largest, 0.0)), fmax(largest, 0.0)))/STEP;
+}
+
+""",
         "find_held_rate": """\
 /* Return the rate of a signal that is held: that of a ramp to the next value within the step. */
 static double find_held_rate(

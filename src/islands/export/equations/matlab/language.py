@@ -292,6 +292,19 @@ function rate = find_rate(read, step, part, c)
 end
 
 """,
+        "find_limited_rate": """\
+function rate = find_limited_rate(read, step, part, c)
+% Rate of a signal with kinks: as find_rate, but a signal that does not turn has no other sign.
+  middle = read(step, 0.5);
+  rise = middle - read(step, 0);
+  second = read(step, 1) - middle;
+  rate = 3*rise - second + 4*part*(second - rise);
+  largest = 2*(rise + second);
+  if rise*second >= 0, rate = min(max(rate, min(largest, 0)), max(largest, 0)); end
+  rate = rate/c.step;
+end
+
+""",
         "find_held_rate": """\
 function rate = find_held_rate(read, r, step, c)
 % Rate of a signal that is held: that of a ramp to the next value within the step.

@@ -81,7 +81,7 @@ class _MatlabProgram(EquationProgram):
         return [f"given = min({count}, r.samples);", f"y(1:given) = {column}(1:given);"]
 
     def read_signal(self, function: str, source: Symbol, arguments: Sequence[str]) -> str:
-        record = [] if function == "find_rate" else ["r"]
+        record = [] if function in ("find_rate", "find_limited_rate") else ["r"]
         return self._call(function, f"@(step, part) {self.read(source)}", *record, "step", *arguments)
 
     def list_weights(self, weights: Sequence[Sequence[float]]) -> str:

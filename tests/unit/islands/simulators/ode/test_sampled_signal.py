@@ -39,6 +39,21 @@ def test_the_rate_of_a_parabola_is_exact() -> None:
         assert part == pytest.approx(2 * (time + ahead), abs=1e-12)
 
 
+@pytest.mark.parametrize("width", [0.02, 0.3, 1.7])
+def test_the_rate_of_a_signal_with_kinks_has_the_length_of_its_path(width: float) -> None:
+    """A hysteresis that does not depend on the rate follows the path of its input alone."""
+    moments = interpolate_linearly(FORCE).moments
+    for mapped in (np.round(moments / width) * width, np.clip(moments, -width, width)):
+        rate = SampledSignal(mapped, has_kinks=True).differentiate(DT)
+        halves = np.diff(mapped)
+        turns = (halves[:, 0] * halves[:, 1]) < 0.0
+        weights = np.array([1.0, 4.0, 1.0]) * DT / 6.0
+        assert rate.moments @ weights == pytest.approx(halves.sum(axis=1), abs=1e-12)
+        assert (np.abs(rate.moments) @ weights)[~turns] == pytest.approx(
+            np.abs(halves).sum(axis=1)[~turns], abs=1e-12
+        )
+
+
 def test_a_divided_step_keeps_lines_parabolas_and_held_values() -> None:
     line, held = interpolate_linearly(FORCE).refine(3), SampledSignal.join(FORCE, FORCE, FORCE).refine(4)
     steps = np.arange(3 * SAMPLES) / 3

@@ -116,7 +116,7 @@ def test_the_input_between_samples_is_that_of_the_simulation(name, hold, times, 
     simulator = replace(simulator, system=replace(simulator.system, steps=2))
     for effect in effects_of(name).values():
         is_inside = effect.site in (Site.CORE, Site.FORCE) and not effect.is_free
-        if is_inside or effect.name == "backlash":
+        if is_inside or effect.name in ("backlash", "dead-zone"):
             spec, expected = extend(simulator, record, [effect], hold, times)
             compare(run_c(spec, record, folder), expected)
 

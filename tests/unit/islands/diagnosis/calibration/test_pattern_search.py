@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration.instants import Instant, move_instants
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
+from islands.diagnosis.calibration.pattern_search import Coordinate, search_pattern
 from islands.diagnosis.calibration.target import Target
 from islands.effects.baseline import JUMP
 from islands.effects.time_variation import GAIN_STEP, instant_bounds
@@ -35,7 +35,7 @@ def test_an_instant_moves_to_the_true_one_over_many_samples(effect) -> None:
     start[part.start + 1] = WRONG
     calibrated = calibrate(simulation, target, start)
     assert abs(calibrated.values[part.start + 1] - TRUE) > 5 * DT
-    instant = Instant(part.start + 1, *instant_bounds(context), first=80 * DT, last=2 * DT)
-    moved = move_instants(calibrated, target, [instant])
+    instant = Coordinate(part.start + 1, *instant_bounds(context), largest=80 * DT, smallest=2 * DT)
+    moved = search_pattern(calibrated, target, [instant])
     assert moved.values[part.start + 1] == pytest.approx(TRUE, abs=2 * DT)
     assert moved.score < calibrated.score
