@@ -22,7 +22,7 @@ from islands.diagnosis.inference.cancellation import resolve_cancellation
 from islands.diagnosis.inference.central_values import centre_values
 from islands.diagnosis.inference.chance_gain import ForwardSelection
 from islands.diagnosis.inference.curve_ends import flatten_ends
-from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis
+from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, screen_others, with_effect
 from islands.diagnosis.inference.noise_floor import (
     MIN_FRACTION,
     explainable_variance,
@@ -54,6 +54,10 @@ WITH_MODEL_ERROR = "with model error: "
 #: explains as much of noise.
 MIN_SINGLE_FRACTION = 0.1
 
+
+#: Largest mean square with an effect, relative to that without effects, for which effects are added by
+#: ordinary least squares. Drifts seldom explain as much of coloured noise.
+MAX_UNWEIGHTED_RATIO = 0.5
 
 #: Probability that a residual without a cause is searched for model error.
 CHANCE_PROBABILITY = 0.1
@@ -127,15 +131,37 @@ def search_with_ar_noise(
     base, screened : CalibrationResult, sequence of ScreenedEffect
         The simulation without effects, and the effects screened on it by ordinary least squares.
     """
-    best = best_single(base, screened)
+    best, unweighted = best_single(base, screened), (base, screened, target)
     if best.noise.order:
         # Ordinary least squares would fit the coloured noise as well.
         run.progress("the noise is coloured: repeating with whitened residuals")
         target = whiten_target(target, best)
         base = calibrate(base.simulation, target, base.values)
         screened = screen_effects(base, target, run)
-    hypothesis, target = stepwise_search(base, screened, target, run)
-    return make_outcome(base, screened, target, hypothesis)
+    hypothesis, found_target = stepwise_search(base, screened, target, run)
+    if hypothesis.fit.noise.order:
+        joint = _add_unweighted(*unweighted, run)
+        if joint.cost < hypothesis.cost - MIN_GAIN:
+            hypothesis, found_target = stepwise_search(base, screened, target, run, start=joint)
+    return make_outcome(base, screened, found_target, hypothesis)
+
+
+def _add_unweighted(
+    base: CalibrationResult, screened: Sequence[ScreenedEffect], target: Target, run: DiagnosisRun
+) -> Hypothesis:
+    """Add effects by ordinary least squares, as long as most of the misfit is explained.
+
+    A noise model takes the responses to several effects for noise as long as one of them is missing.
+    """
+    hypothesis = Hypothesis(base, base.score, ())
+    for _ in range(MAX_EFFECTS):
+        if not screened or screened[0].fit.mean_square > MAX_UNWEIGHTED_RATIO * base.mean_square:
+            break
+        hypothesis = with_effect(hypothesis, screened[0])
+        if not hypothesis.fit.noise.order:
+            break
+        screened = screen_others(hypothesis, target, run)
+    return hypothesis
 
 
 def search_with_model_error(base: CalibrationResult, target: Target, run: DiagnosisRun) -> SearchOutcome:

@@ -242,6 +242,15 @@ def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch:
         (("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
         # With a linear input between samples, a resonance explains more than a delay.
         (("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
+        # A noise model takes the response to any two of the causes for noise.
+        (("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
+        # A step that is slightly too large is made up for by a gain.
+        pytest.param(
+            *(("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
+            marks=pytest.mark.nightly,
+        ),
+        # The path of the hysteresis is that of an input that jumps between samples.
+        (("stiction",), "bouc-wen-piezo", "white", 7996002),
     ],
 )
 def test_errors_of_the_calibration_are_no_further_causes(
