@@ -67,12 +67,16 @@ def extend(
     effects: Sequence[Effect] = (),
     hold: str = "first-order",
     times: int = 1,
+    known: Sequence[Effect] = (),
 ) -> tuple[LocalExtendedSpec, Array]:
-    """Return the document of a simulator with effects at their last starting points, and its output."""
+    """Return the document of a simulator with effects at their last starting points, and its output.
+
+    Those in ``known`` act in its order.
+    """
     if (hold, times) != ("first-order", 1):
         simulator = ResampledSimulator(simulator, InterSample(hold), times)
     context = make_context(record, simulator, record.samples)
-    simulation = ExtendedSimulator(simulator, catalogue_order(effects), context)
+    simulation = ExtendedSimulator(simulator, catalogue_order(effects, known), context)
     values = simulation.nominal
     residual = 0.01 * context.output_peak * np.sin(2 * np.pi * 7.3 * context.time)
     for effect in simulation.effects:

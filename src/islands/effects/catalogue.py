@@ -3,7 +3,7 @@
 To add an effect, define it in the file of its family and add it to `EFFECTS`.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from islands.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
 from islands.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
@@ -104,6 +104,9 @@ EFFECTS: tuple[Effect, ...] = (
     *FREE_FORMS,
 )
 
+#: Maps of an actuator whose response depends on their order.
+ACTUATOR_MAPS = (DEAD_ZONE, INPUT_SATURATION, RATE_LIMIT, QUANTISED_INPUT, BACKLASH, STICTION)
+
 #: Effects and free forms by name.
 CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}
 
@@ -139,8 +142,15 @@ def get_title(name: str) -> str:
     return "" if entry is None else entry.title
 
 
-def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Sort effects in the order in which they act: that of the catalogue, then other maps by name."""
+def catalogue_order(effects: Iterable[Effect], known: Sequence[Effect] = ()) -> tuple[Effect, ...]:
+    """Sort effects in the order in which they act: that of the catalogue, then other maps by name.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+    known : sequence of Effect
+        Effects that keep the order in which they are given.
+    """
     places = {name: place for place, name in enumerate(CATALOGUE)}
 
     def place(effect: Effect) -> tuple[int, str]:
@@ -149,4 +159,6 @@ def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
         # Effects on parameters and states are part of the equation; their order does not matter.
         return (-1, "") if effect.form is None else (len(places), effect.name)
 
-    return tuple(sorted(effects, key=place))
+    ordered = sorted(effects, key=place)
+    kept = iter([effect for effect in known if effect in ordered])
+    return tuple(next(kept, effect) if effect in known else effect for effect in ordered)

@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, ForceLaw, Site, apply_map
 from islands.simulators.interface import (
@@ -159,8 +160,8 @@ class ExtendedSimulator:
         return values
 
     def with_effects(self, effects: Sequence[Effect]) -> "ExtendedSimulator":
-        """Return the same simulator with other effects."""
-        return replace(self, effects=tuple(effects))
+        """Return the same simulator with other effects, of which those that it has keep their order."""
+        return replace(self, effects=catalogue_order(effects, self.effects))
 
     def simulate(
         self, values: Signal, effect_parameters: Mapping[str, float] = _NONE, forces: Forces = ()

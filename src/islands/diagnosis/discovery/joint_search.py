@@ -121,7 +121,8 @@ def calibrate_with_effects(
     base: CalibrationResult, effects: Sequence[Effect], known: CalibrationResult, target: Target
 ) -> CalibrationResult:
     """Calibrate a simulation with effects, from its values and those of the effects in another fit."""
-    simulation = base.simulation.with_effects(catalogue_order(effects))
+    effects = catalogue_order(effects, known.simulation.effects)
+    simulation = replace(base.simulation, effects=effects)
     start = transfer_parameters(base.values, base.simulation, simulation)
     transfer_effects(known.values, known.simulation, start, simulation)
     return calibrate(simulation, target, start)
@@ -145,5 +146,5 @@ def assess_effects(terms: TermSearchResult, target: Target, run: DiagnosisRun) -
 
 def _calibrate_with(fit: CalibrationResult, effects: Sequence[Effect], target: Target) -> CalibrationResult:
     """Calibrate the simulation of a fit with some of its effects."""
-    simulation = fit.simulation.with_effects(catalogue_order(effects))
+    simulation = fit.simulation.with_effects(effects)
     return calibrate(simulation, target, transfer_parameters(fit.values, fit.simulation, simulation))

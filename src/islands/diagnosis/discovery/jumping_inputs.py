@@ -26,7 +26,6 @@ from islands.diagnosis.discovery.state_equations import (
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.screening import ScreenedEffect, transfer_parameters
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import catalogue_order
 from islands.effects.hysteresis import STICTION, is_held
 from islands.effects.interface.effect import Effect, Signal, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
@@ -108,8 +107,7 @@ def _search(
     effect: Effect, base: CalibrationResult, target: Target, list_points: _ListPoints
 ) -> ScreenedEffect | None:
     """Return the best fit of an effect; None if it explains nothing."""
-    effects = catalogue_order((*base.simulation.effects, effect))
-    simulation = _halve_steps(base.simulation).with_effects(effects)
+    simulation = _halve_steps(base.simulation).with_effects((*base.simulation.effects, effect))
     plant, best = base, None
     for _ in range(_SEARCHES):
         fits = [_calibrate(plant, simulation, effect, point, target) for point in list_points(plant)]

@@ -48,7 +48,6 @@ from islands.diagnosis.inference.resolved_effects import may_be_zero
 from islands.diagnosis.inference.screening import bic_penalty, get_starting_points, transfer_parameters
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
 from islands.effects.timing import DELAY
@@ -370,7 +369,7 @@ def _with_effect(found: TermSearchResult, effect: Effect, target: Target) -> Ter
     """Return the equations with one more effect, calibrated with the terms and without them."""
     fits = []
     for fit in (found.base, found.fit):
-        simulation = fit.simulation.with_effects(catalogue_order((*fit.simulation.effects, effect)))
+        simulation = fit.simulation.with_effects((*fit.simulation.effects, effect))
         start = transfer_parameters(fit.values, fit.simulation, simulation)
         points = get_starting_points(effect, simulation, fill_gaps(target.y - fit.output))
         starts = np.tile(start, (len(points), 1))

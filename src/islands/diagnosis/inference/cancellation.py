@@ -15,7 +15,6 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import cross_validate_gain
 from islands.diagnosis.inference.hypothesis import Hypothesis, remove_each, without_effect
 from islands.diagnosis.inference.screening import transfer_parameters
-from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.effect import Effect
 
 #: Size of a joint response, relative to the smaller one of two responses, below which they are one finding.
@@ -83,7 +82,7 @@ def measure_cancellation(hypothesis: Hypothesis, pair: tuple[Effect, Effect], ta
     fit, responses = hypothesis.fit, []
     others = tuple(each for each in hypothesis.effects if each not in pair)
     for kept in ((*others, pair[0]), (*others, pair[1]), others):
-        simulation = fit.simulation.with_effects(catalogue_order(kept))
+        simulation = fit.simulation.with_effects(kept)
         values = transfer_parameters(fit.values, fit.simulation, simulation)
         reduced = evaluate_fit(simulation, target, values)
         responses.append(fit.output - reduced.output)

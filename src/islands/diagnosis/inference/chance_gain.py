@@ -20,7 +20,6 @@ from islands.diagnosis.inference.noise_surrogates import (
     list_noise_models,
 )
 from islands.diagnosis.inference.screening import DEPENDENCE, simulate_starting_points
-from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.effect import Effect, Signal
 
 #: Number of surrogates of each kind.
@@ -169,7 +168,7 @@ def _insert(signal: Signal, part: NDArray[np.bool_]) -> Signal:
 
 def _simulate_starting_points(base: CalibrationResult, effect: Effect, target: Target) -> Signal:
     """Return the responses to an effect at its starting points, shape (points, samples)."""
-    simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
+    simulation = base.simulation.with_effects((*base.simulation.effects, effect))
     return simulate_starting_points(base, simulation, effect, target)[1]
 
 

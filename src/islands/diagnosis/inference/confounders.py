@@ -14,7 +14,6 @@ from islands.data.segments import map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.screening import transfer_parameters
-from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.effect import Effect, Signal
 
 #: Factors on the strength of the confounder in its simulations; each moves the slips to other instants.
@@ -61,7 +60,7 @@ def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> C
         return None
     other, factor = effect.confounded_with
     remaining = (each for each in simulation.effects if each is not effect)
-    replaced = simulation.with_effects(catalogue_order((*remaining, other)))
+    replaced = simulation.with_effects((*remaining, other))
     values = transfer_parameters(fit.values, simulation, replaced)
     segments = target.fitted_segments
     excess_mean_square, expected = 0.0, np.zeros(sum(segments) - len(segments))

@@ -16,7 +16,6 @@ from islands.diagnosis.inference.screening import (
     transfer_parameters,
 )
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.effect import Effect
 from islands.parallel import ParallelMap
 
@@ -91,7 +90,7 @@ def remove_each(
     """Return a hypothesis without each of some of its effects in turn, refitted."""
     fit, reduced = hypothesis.fit, []
     remaining = [tuple(each for each in hypothesis.effects if each is not effect) for effect in effects]
-    simulations = [fit.simulation.with_effects(catalogue_order(each)) for each in remaining]
+    simulations = [fit.simulation.with_effects(each) for each in remaining]
     tasks = [(each, [transfer_parameters(fit.values, fit.simulation, each)]) for each in simulations]
     fits = calibrate_all(StartsCalibrator(target), tasks, parallel_map)
     for effect, others, simulation, found in zip(effects, remaining, simulations, fits, strict=True):

@@ -1,7 +1,7 @@
 """Screening: a simulation extended by each effect in turn, calibrated and sorted by score."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
@@ -9,11 +9,11 @@ import numpy as np
 from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
-from islands.diagnosis.calibration.starts_calibrator import calibrate_best
+from islands.diagnosis.calibration.starts_calibrator import CalibrationTask, calibrate_best
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.closed_loop import acts_at_once
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import catalogue_order
+from islands.effects.catalogue import ACTUATOR_MAPS
 from islands.effects.interface.effect import Effect, Signal, invalid_effect_error
 from islands.simulators.extended import ExtendedSimulator
 
@@ -37,6 +37,9 @@ MIN_CALIBRATED_EFFECTS = 5
 #: Fraction of the best promised gain below which a further effect is not calibrated. If the noise is small,
 #: every effect promises more than its penalty.
 MIN_PROMISE = 0.05
+
+#: Least decrease of the score by another order of maps than that of the catalogue.
+MIN_ORDER_GAIN = 6.0
 
 #: Largest response at the sample of a pulse, relative to the largest one, of an effect on a record with
 #: feedback within a sample. A delay of less than a sample interpolates, and reads the sample that follows.
@@ -107,15 +110,22 @@ def screen_effects(
             if index < MIN_CALIBRATED_EFFECTS
             or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
         ]
-    tasks = [(_extend(base, effect), starts) for _, effect, starts in candidates]
-    if larger is not None:
-        tasks = [
-            (simulation, [*starts, _start_from(larger, simulation, effect, starts[0])])
-            for (simulation, starts), (_, effect, _) in zip(tasks, candidates, strict=True)
-        ]
-    penalties = [bic_penalty(effect, base) for _, effect, _ in candidates]
+    tasks, added = list[CalibrationTask](), list[Effect]()
+    for _, effect, starts in candidates:
+        simulations = _list_orders(base, effect)
+        for simulation in simulations:
+            points = [transfer_parameters(values, simulations[0], simulation) for values in starts]
+            if larger is not None:
+                points.append(_start_from(larger, simulation, effect, points[0]))
+            tasks.append((simulation, points))
+            added.append(effect)
+    penalties = [bic_penalty(effect, base) for effect in added]
     fits = calibrate_best(tasks, penalties, target, run.parallel_map)
-    screened = [ScreenedEffect(effect, fit) for (_, effect, _), fit in zip(candidates, fits, strict=True)]
+    best: dict[str, ScreenedEffect] = {}
+    for effect, fit in zip(added, fits, strict=True):
+        if effect.name not in best or fit.score < best[effect.name].fit.score - MIN_ORDER_GAIN:
+            best[effect.name] = ScreenedEffect(effect, fit)
+    screened = list(best.values())
     if target.has_feedback:  # The input of the same sample contains the noise.
         screened = [each for each in screened if not acts_at_once(each.fit, MAX_LATE_RESPONSE)]
     return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
@@ -251,7 +261,23 @@ def _start_from(
 
 def _extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:
     """Return the simulation of a fit with one additional effect."""
-    return base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
+    return base.simulation.with_effects((*base.simulation.effects, effect))
+
+
+def _list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulator]:
+    """Return the simulations of a fit with one additional effect, in each place where it may act.
+
+    The first place is that of the catalogue. A map of an actuator may act on the other side of the others.
+    """
+    simulation = _extend(base, effect)
+    known = base.simulation.effects
+    places = [place for place, each in enumerate(known) if each in ACTUATOR_MAPS]
+    if effect not in ACTUATOR_MAPS or not places:
+        return [simulation]
+    is_first = simulation.effects.index(effect) <= places[0]
+    place = places[-1] + 1 if is_first else places[0]
+    effects = (*known[:place], effect, *known[place:])
+    return [simulation, replace(simulation, effects=effects)]
 
 
 def _sum_squares(signal: Signal) -> float:

@@ -1,6 +1,6 @@
-"""Plain names of the effects of the catalogue."""
+"""Plain names of the effects of the catalogue, and the order in which they act."""
 
-from islands.effects.catalogue import CATALOGUE, OF_EACH, get_title
+from islands.effects.catalogue import ACTUATOR_MAPS, CATALOGUE, OF_EACH, catalogue_order, get_title
 from islands.effects.interface.context import Parameter
 from islands.effects.scale import wrong_parameter
 
@@ -21,3 +21,13 @@ def test_the_plain_name_of_an_effect_on_a_state_contains_the_state() -> None:
 
 def test_an_effect_outside_of_the_catalogue_has_no_plain_name() -> None:
     assert get_title("own-effect") == ""
+
+
+def test_known_effects_keep_their_order_where_another_one_acts() -> None:
+    dead_zone, saturation, _, quantiser, backlash, _ = ACTUATOR_MAPS
+    known = (backlash, dead_zone)
+    assert catalogue_order((dead_zone, backlash)) == (dead_zone, backlash)
+    assert catalogue_order((dead_zone, backlash), known) == known
+    offset = CATALOGUE["offset"]
+    added = catalogue_order((dead_zone, offset, saturation, backlash, quantiser), known)
+    assert added == (backlash, saturation, quantiser, dead_zone, offset)

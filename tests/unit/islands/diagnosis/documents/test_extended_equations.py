@@ -65,6 +65,19 @@ def test_friction_and_a_delay_are_inserted_into_the_equation_of_motion() -> None
     ]
 
 
+def test_maps_of_an_actuator_are_written_in_the_order_in_which_they_act() -> None:
+    maps = CATALOGUE["backlash"], CATALOGUE["dead-zone"]
+    simulator = make_simulator("second-order", RECORD, {})
+    context = make_context(RECORD, simulator, 200)
+    written = []
+    for effects in (maps, maps[::-1]):
+        fit = cast("CalibrationResult", Fit(ExtendedSimulator(simulator, effects, context)))
+        written.append([line.text for line in write_extended_equations(fit, (), RECORD).lines])
+    assert written[0][0] == "u2 = play(u, b)"
+    assert "dv/dt = (sign(u2)*max(abs(u2) - d, 0) - c*v - k*x)/m" in written[0]
+    assert "dv/dt = (play(sign(u)*max(abs(u) - d, 0), b) - c*v - k*x)/m" in written[1]
+
+
 def test_without_forces_the_equation_has_no_symbol_for_them() -> None:
     assert "dv/dt = (u - c*v - k*x)/m" in texts("second-order", "offset")
 

@@ -54,9 +54,9 @@ def suppose(seed: int, effects: tuple[Effect, Effect], first: float) -> tuple[Hy
     shift = 0.1 if OFFSET in effects else 0.0
     record = Dataset(u, u + 0.2 * u**3 + shift + 0.01 * rng.standard_normal(SAMPLES), 0.1)
     simulator, target = RecordedOutput("theirs", u), make_target(record, 600, {})
-    base = ExtendedSimulator(simulator, (), make_context(record, simulator, 600))
+    simulation = ExtendedSimulator(simulator, effects, make_context(record, simulator, 600))
     is_fixed = np.array([True, False])
-    found = calibrate(base.with_effects(effects), target, np.array([first, 0.0]), is_fixed=is_fixed)
+    found = calibrate(simulation, target, np.array([first, 0.0]), is_fixed=is_fixed)
     return Hypothesis(found, found.score + sum(bic_penalty(each, found) for each in effects), effects), target
 
 

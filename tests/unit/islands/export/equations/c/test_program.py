@@ -211,6 +211,20 @@ def test_effects_of_channels_read_their_columns(folder):
 
 
 @needs_compiler
+@pytest.mark.parametrize("names", [("backlash", "dead-zone"), ("rate-limit", "input-saturation")])
+def test_maps_of_an_actuator_act_in_the_order_of_the_simulation(names, folder):
+    known = [effects_of("second-order")[each] for each in names]
+    record = made()["second-order"].record
+    outputs = []
+    for order in (known, known[::-1]):
+        spec, expected = extend(simulator_of("second-order"), record, known, known=order)
+        assert [each.name for each in spec.effects] == [each.name for each in order]
+        compare(run_c(spec, record, folder), expected)
+        outputs.append(expected)
+    assert np.ptp(outputs[0] - outputs[1]) > 1e-3 * np.ptp(outputs[0])
+
+
+@needs_compiler
 def test_stiction_of_a_held_input_moves_all_the_way(folder):
     record = made()["second-order"].record
     record = replace(record, u=record.u[np.arange(record.samples) // 20 * 20])
