@@ -13,7 +13,7 @@ from islands.diagnosis.calibration.intersample_selection import MIN_IMPROVEMENT
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, compare_output
 from islands.diagnosis.calibration.target import Target
 
-#: Sizes of the largest and of the smallest move of the values of a map that jumps, relative to its width.
+#: `Coordinate.largest` and `Coordinate.smallest` of the values of a map that jumps, relative to its width.
 LARGEST_MOVE, SMALLEST_MOVE = 0.005, 1e-5
 
 
@@ -27,7 +27,7 @@ class Coordinate(NamedTuple):
     lower, upper : float
         Bounds.
     largest, smallest : float
-        Sizes of the largest move, and of one that is not tried; sizes are halved.
+        Size of the largest move, which is halved again and again, and the size at which that ends.
     """
 
     place: int

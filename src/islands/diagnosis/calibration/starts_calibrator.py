@@ -69,12 +69,12 @@ class StartsCalibrator:
         decrease = ROUGH_DECREASE if self.is_rough else MIN_DECREASE
         points = minimise(simulation, self.target, starts, iterations, decrease)
         best = points if has_model_error else [min(points, key=attrgetter("cost"))]
+        ends = [CalibratedStart(point.values, point.output) for point in best]
         if not self.is_rough and any(effect.centre is not None for effect in simulation.effects):
-            fits = [compare_output(simulation, self.target, each.values, each.output) for each in best]
-            found = [search_jumps(fit, self.target) for fit in fits]
-            return [CalibratedStart(fit.values, fit.output) for fit in found]
+            fits = [search_jumps(compare_output(simulation, self.target, *end), self.target) for end in ends]
+            ends = [CalibratedStart(fit.values, fit.output) for fit in fits]
         # Copies, since a row would keep the outputs of all points of its simulations in memory.
-        return [CalibratedStart(point.values.copy(), point.output.copy()) for point in best]
+        return [CalibratedStart(end.values.copy(), end.output.copy()) for end in ends]
 
     def make_digest(self, task: CalibrationTask) -> str:
         """Return the SHA-256 of all numbers that the result of a task depends on.

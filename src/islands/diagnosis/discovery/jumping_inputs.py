@@ -24,10 +24,15 @@ from islands.diagnosis.discovery.state_equations import (
     transfer_linear_values,
 )
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
-from islands.diagnosis.inference.screening import ScreenedEffect, transfer_parameters
+from islands.diagnosis.inference.screening import (
+    ScreenedEffect,
+    choose_orders,
+    list_orders,
+    transfer_parameters,
+)
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.hysteresis import STICTION, is_held
-from islands.effects.interface.effect import Effect, Signal, apply_map
+from islands.effects.interface.effect import Effect, Signal, Site, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.errors import RecordError
 from islands.simulators.extended import ExtendedSimulator
@@ -65,8 +70,8 @@ _SEARCHES, _MAX_RATIO = 4, 0.99
 #: Number of times that the steps of a simulation are halved: an input passes a level between two samples.
 _HALVINGS = 3
 
-#: ``plant -> points``: values of an effect, the best first.
-_ListPoints: TypeAlias = Callable[[CalibrationResult], Sequence[Signal]]
+#: ``(plant, target) -> points``: values of an effect, the best first.
+_ListPoints: TypeAlias = Callable[[CalibrationResult, Target], Sequence[Signal]]
 
 
 class _Cells(NamedTuple):
@@ -94,23 +99,31 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
     target, run
         Arguments of a search, whose effects are searched for.
     """
-    found, known = [], base.simulation.effects
-    if QUANTISED_INPUT in run.effects and QUANTISED_INPUT not in known:
-        cells = _divide_input(base, target)
-        found.append(_search(QUANTISED_INPUT, base, target, lambda plant: _list_steps(cells, plant, target)))
-    if STICTION in run.effects and STICTION not in known:
-        found.append(_search(STICTION, base, target, lambda plant: _list_breakaways(plant, target)))
-    return [each for each in found if each is not None]
+    searches = ((QUANTISED_INPUT, _list_steps), (STICTION, _list_breakaways))
+    found = [
+        _search(effect, base, simulation, target, list_points)
+        for effect, list_points in searches
+        if effect in run.effects and effect not in base.simulation.effects
+        for simulation in list_orders(base, effect)
+    ]
+    return choose_orders(each for each in found if each is not None)
 
 
 def _search(
-    effect: Effect, base: CalibrationResult, target: Target, list_points: _ListPoints
+    effect: Effect,
+    base: CalibrationResult,
+    extended: ExtendedSimulator,
+    target: Target,
+    list_points: _ListPoints,
 ) -> ScreenedEffect | None:
-    """Return the best fit of an effect; None if it explains nothing."""
-    simulation = _halve_steps(base.simulation).with_effects((*base.simulation.effects, effect))
+    """Return the best fit of an effect in an extended simulation; None if it explains nothing."""
+    effects = extended.effects
+    before = [each for each in effects[: effects.index(effect)] if each.site == Site.INPUT]
+    simulation = _halve_steps(extended)
     plant, best = base, None
     for _ in range(_SEARCHES):
-        fits = [_calibrate(plant, simulation, effect, point, target) for point in list_points(plant)]
+        points = list_points(_apply_maps(plant, before, target), target)
+        fits = [_calibrate(plant, simulation, effect, point, target) for point in points]
         found = min(fits, key=lambda fit: fit.mean_square, default=None)
         if found is not None:
             found = search_jumps(found, target)
@@ -120,6 +133,18 @@ def _search(
         values = transfer_parameters(found.values, simulation, base.simulation)
         plant = evaluate_fit(base.simulation, target, values)
     return None if best is None else ScreenedEffect(effect, best)
+
+
+def _apply_maps(plant: CalibrationResult, maps: Sequence[Effect], target: Target) -> CalibrationResult:
+    """Return the fit of a simulation behind some of its maps of the input, which is their output."""
+    if not maps:
+        return plant
+    simulation, u = plant.simulation, plant.simulation.context.u
+    for effect in maps:
+        u = apply_map(effect, u, plant.values[simulation.get_slice(effect)], simulation.context)
+    others = simulation.with_effects([each for each in simulation.effects if each not in maps])
+    behind = replace(others, context=replace(simulation.context, u=u))
+    return evaluate_fit(behind, target, transfer_parameters(plant.values, simulation, others))
 
 
 def _halve_steps(simulation: ExtendedSimulator) -> ExtendedSimulator:
@@ -190,12 +215,12 @@ def _list_breakaways(plant: CalibrationResult, target: Target) -> list[Signal]:
     return found
 
 
-def _list_steps(cells: _Cells, plant: CalibrationResult, target: Target) -> list[Signal]:
+def _list_steps(plant: CalibrationResult, target: Target) -> list[Signal]:
     """Return steps and offsets that explain most of a residual, those of different steps."""
     response, context = respond_to_pulse(plant), plant.simulation.context
     if response is None:
         return []
-    projection = Projection(plant, target)
+    projection, cells = Projection(plant, target), _divide_input(plant, target)
     responses = np.column_stack(
         [projection(convolve(part, response, context.segments)) for part in cells.parts]
     )

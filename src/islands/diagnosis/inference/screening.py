@@ -1,6 +1,6 @@
 """Screening: a simulation extended by each effect in turn, calibrated and sorted by score."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -112,7 +112,7 @@ def screen_effects(
         ]
     tasks, added = list[CalibrationTask](), list[Effect]()
     for _, effect, starts in candidates:
-        simulations = _list_orders(base, effect)
+        simulations = list_orders(base, effect)
         for simulation in simulations:
             points = [transfer_parameters(values, simulations[0], simulation) for values in starts]
             if larger is not None:
@@ -121,11 +121,7 @@ def screen_effects(
             added.append(effect)
     penalties = [bic_penalty(effect, base) for effect in added]
     fits = calibrate_best(tasks, penalties, target, run.parallel_map)
-    best: dict[str, ScreenedEffect] = {}
-    for effect, fit in zip(added, fits, strict=True):
-        if effect.name not in best or fit.score < best[effect.name].fit.score - MIN_ORDER_GAIN:
-            best[effect.name] = ScreenedEffect(effect, fit)
-    screened = list(best.values())
+    screened = choose_orders(map(ScreenedEffect, added, fits))
     if target.has_feedback:  # The input of the same sample contains the noise.
         screened = [each for each in screened if not acts_at_once(each.fit, MAX_LATE_RESPONSE)]
     return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
@@ -264,7 +260,17 @@ def _extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:
     return base.simulation.with_effects((*base.simulation.effects, effect))
 
 
-def _list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulator]:
+def choose_orders(screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
+    """Return the best fit of each effect; the first one unless another order gains enough."""
+    best: dict[str, ScreenedEffect] = {}
+    for each in screened:
+        known = best.setdefault(each.effect.name, each)
+        if each.fit.score < known.fit.score - MIN_ORDER_GAIN:
+            best[each.effect.name] = each
+    return list(best.values())
+
+
+def list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulator]:
     """Return the simulations of a fit with one additional effect, in each place where it may act.
 
     The first place is that of the catalogue. A map of an actuator may act on the other side of the others.

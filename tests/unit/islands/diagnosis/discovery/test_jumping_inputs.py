@@ -1,6 +1,7 @@
 """Actuators that move in jumps: their values are found behind a slow plant, and noise has none."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.hysteresis import STICTION
 from islands.effects.interface.effect import Signal
 from islands.effects.quantiser import QUANTISED_INPUT
+from islands.kernels.memory_operators import play_from
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.output_equation import add_output_equation
@@ -102,6 +104,20 @@ def test_steps_are_found_behind_another_effect() -> None:
     assert fit_jumping_inputs(found.fit, target, DiagnosisRun([QUANTISED_INPUT])) == []
     hypothesis = Hypothesis(found.fit, found.fit.score, found.fit.simulation.effects)
     assert remove_unresolved(hypothesis, target) is hypothesis
+
+
+def test_steps_are_found_behind_a_play_though_the_catalogue_has_them_before_it() -> None:
+    """The search divides what the play leaves of the input."""
+    record, play = make_smooth_record(0.2, np.inf), CATALOGUE["backlash"]
+    moved = 0.2 * np.round(play_from(np.ascontiguousarray(record.u[:, 0]), 0.15) / 0.2)
+    noise = 0.002 * np.random.default_rng(8).standard_normal(record.samples)
+    base, target = fit(replace(record, y=lfilter([0.0, 0.3], [1.0, -0.9, 0.2], moved) + noise))
+    behind = screen_effects(base, target, DiagnosisRun([play]))[0].fit
+    (found,) = fit_jumping_inputs(behind, target, DiagnosisRun([QUANTISED_INPUT]))
+    simulation = found.fit.simulation
+    assert simulation.effects == (play, QUANTISED_INPUT)
+    width, step = (found.fit.values[simulation.get_slice(each)][0] for each in simulation.effects)
+    assert (width, step) == (pytest.approx(0.15, rel=0.03), pytest.approx(0.2, rel=0.01))
 
 
 def test_search_is_limited_to_the_effects_of_a_diagnosis() -> None:
