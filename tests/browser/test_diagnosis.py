@@ -204,6 +204,24 @@ def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
     expect(page.locator(".card", has=rows).locator(".facts")).to_contain_text("hold the input")
 
 
+def test_a_named_cause_is_shown_though_ten_others_have_a_better_score(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
+    """A cause that acts next to another one may explain nothing alone."""
+    simulation = {"kind": "linear", "order": 2, "delay": 1}
+    job = submit_diagnosis(desk, simulation=simulation, tolerance={})
+    candidates = [{"name": f"other-{place}", "score": 30.0 - place, "eta": 0.5} for place in range(12)]
+    candidates.append({"name": "thermal-drift", "score": -7.0, "eta": 0.0})
+    with stored(desk) as store:
+        outcome = replace(make_outcome(desk), document=RESULT | {"candidates": candidates})
+        store.leases.finish(taken(store, job), outcome)
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator("table.causes").first.locator("tbody tr")).to_have_count(11)
+    expect(page.locator("table.causes").first.locator(".named")).to_have_text(re.compile("thermal-drift"))
+    expect(page.locator(".facts").filter(has_text="Simulation")).to_contain_text("linear: order 2, delay 1")
+    expect(page.locator("details.rest summary")).to_have_text("2 further causes")
+
+
 def test_an_extended_difference_equation_is_typeset_and_exported(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:

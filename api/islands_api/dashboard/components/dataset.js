@@ -160,7 +160,9 @@ export function formatSimulation({ kind, name, column, ...options }) {
     // A parameter of equations has a value, a unit and a tolerance.
     ([each, value]) => `${each} = ${formatShort(value.value ?? value)}`,
   );
-  return [kind, name ?? column, parameters.join(", ")].filter(Boolean).join(": ");
+  const numbers = ["order", "delay"].filter((each) => options[each]);
+  const structure = numbers.map((each) => `${each} ${options[each]}`);
+  return [kind, name ?? column, [...structure, ...parameters].join(", ")].filter(Boolean).join(": ");
 }
 
 /** List the settings that only a discrepancy job has. */

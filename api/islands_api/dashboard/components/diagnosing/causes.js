@@ -3,7 +3,7 @@
 import { el, makeFacts, makeScrollable, makeTable, svg } from "../../lib/dom.js";
 import { formatNumber } from "../../lib/numbers.js";
 
-/** Number of causes that are shown at first. */
+/** Number of causes that are shown at first, besides the named ones. */
 const SHOWN = 10;
 
 /** Make a bar whose length is a share of the largest score. */
@@ -29,10 +29,12 @@ function makeName(name, place, titles) {
   return title ? [`${title} `, el("code", {}, name)] : [name];
 }
 
+/** Return whether an effect is a named cause; earlier versions have no others. */
+const isNamed = (effect) => effect !== undefined && effect.claimed !== false;
+
 function makeRow({ name, place, score, eta }, effect, most, hasEffects, titles) {
-  const isNamed = effect !== undefined && effect.claimed !== false;
   return [
-    el("span", { class: isNamed ? "named" : null }, ...makeName(name, place, titles)),
+    el("span", { class: isNamed(effect) ? "named" : null }, ...makeName(name, place, titles)),
     el("span", { class: "score" }, makeBar(score, most), formatNumber(score)),
     `${Math.floor(100 * eta)} %`,
     // No cause that passed all tests: both columns would be empty.
@@ -61,7 +63,9 @@ export function makeCauses({ candidates, effects, titles = {}, ...others }) {
   if (!candidates.length) return null;
   const most = Math.max(...candidates.map(({ score }) => score), 1e-9);
   const make = (part) => makeCauseTable(part, effects, most, titles);
-  const rest = candidates.slice(SHOWN);
+  const isShown = ({ name }, place) =>
+    place < SHOWN || isNamed(effects.find((effect) => effect.name === name));
+  const rest = candidates.filter((each, place) => !isShown(each, place));
   // Results of earlier versions have the experiment in words alone.
   const isUnsure = next === undefined && effects.some(({ equivalents }) => equivalents.length);
   const about =
@@ -72,7 +76,7 @@ export function makeCauses({ candidates, effects, titles = {}, ...others }) {
     { class: "card" },
     el("h2", {}, "Causes"),
     el("p", { class: "soft small" }, about),
-    make(candidates.slice(0, SHOWN)),
+    make(candidates.filter(isShown)),
     rest.length > 0 &&
       el("details", { class: "rest" }, el("summary", {}, `${rest.length} further causes`), make(rest)),
     isUnsure && makeFacts([["Experiment that separates them", words ?? "none was found"]]),
