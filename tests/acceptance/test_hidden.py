@@ -47,6 +47,14 @@ def mark_level(value: object) -> object:
     return value if value in FEW else pytest.param(value, marks=nightly)
 
 
+def mark_short(name: str) -> object:
+    """Return a name as `mark_level`, marked as a failure if its effect is not found in a short record."""
+    if name != "quantised-input":
+        return mark_level(name)
+    reason = "steps leave a white residual, in which no steps of an actuator are searched for"
+    return pytest.param(name, marks=[nightly, pytest.mark.xfail(reason=reason, strict=True)])
+
+
 def run(*effects: str, seed: int = SEED, **options: object) -> TrialOutcome:
     """Run a trial and check the number of equivalents."""
     trial = Trial(effects, seed, seconds=options.pop("seconds", SECONDS), **options)  # type: ignore[arg-type]
@@ -61,7 +69,7 @@ def is_named(found: TrialOutcome) -> bool:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", [mark_level(name) for name in PIEZO.known if name not in SCALE])
+@pytest.mark.parametrize("name", [mark_short(name) for name in PIEZO.known if name not in SCALE])
 def test_injected_effect_is_named_in_a_short_record(name: str) -> None:
     found = run(name, seed=SHORT_SEEDS.get(name, SEED), band=(1.0, 2.0), seconds=SHORT)
     assert is_named(found), found
