@@ -196,8 +196,9 @@ def _list_breakaways(plant: CalibrationResult, target: Target) -> list[Signal]:
     if response is None:
         return []
     projection = Projection(plant, target)
-    distances = np.array([point for (point,) in STICTION.starting_points(context, target.y - plant.output)])
-    if not is_held(context.u):
+    if is_held(context.u):
+        distances = np.ravel(STICTION.starting_points(context, target.y - plant.output))
+    else:
         distances = _BREAKAWAYS * context.input_peak
     explained = np.zeros(distances.size)
     for place, distance in enumerate(distances.tolist()):
