@@ -38,21 +38,13 @@ nightly = pytest.mark.nightly
 #: Cases of the level ci. In short records, they have effects of each family.
 FEW = (
     *("delay", "jump", "coulomb-friction", "gain-step", "cross-coupling", "dead-zone", "cyclic-error"),
-    *("exponential-creep", "second-hysteresis", "wrong-parameter", SEED, SEED + 2),
+    *("exponential-creep", "second-hysteresis", "wrong-parameter", "quantised-input", SEED, SEED + 2),
 )
 
 
 def mark_level(value: object) -> object:
     """Return a parameter value, marked nightly unless it belongs to the level ci."""
     return value if value in FEW else pytest.param(value, marks=nightly)
-
-
-def mark_short(name: str) -> object:
-    """Return a name as `mark_level`, marked as a failure if its effect is not found in a short record."""
-    if name != "quantised-input":
-        return mark_level(name)
-    reason = "steps leave a white residual, in which no steps of an actuator are searched for"
-    return pytest.param(name, marks=[nightly, pytest.mark.xfail(reason=reason, strict=True)])
 
 
 def run(*effects: str, seed: int = SEED, **options: object) -> TrialOutcome:
@@ -69,7 +61,7 @@ def is_named(found: TrialOutcome) -> bool:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", [mark_short(name) for name in PIEZO.known if name not in SCALE])
+@pytest.mark.parametrize("name", [mark_level(name) for name in PIEZO.known if name not in SCALE])
 def test_injected_effect_is_named_in_a_short_record(name: str) -> None:
     found = run(name, seed=SHORT_SEEDS.get(name, SEED), band=(1.0, 2.0), seconds=SHORT)
     assert is_named(found), found

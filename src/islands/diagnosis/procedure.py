@@ -204,8 +204,9 @@ def _find_causes(
     run.progress("analysing the residual")
     outcome = interim.keep_outcome(base, assess_evidence(outcome, run), run.effects, step=MODEL_ERROR)
     # Coloured noise may hide a discrepancy that no effect of the catalogue explains.
-    is_clean = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
-    inner = outcome if is_clean else search_inner_effects(outcome, base, target, run)
+    is_white = outcome.verdict == Verdict.NOTHING and not outcome.hypothesis.fit.noise.order
+    inner = search_inner_effects(outcome, base, target, run, is_white=is_white)
+    is_clean = is_white and inner is outcome
     searches = TermSearches(base, target, run)
     if not inner.leaves_white_noise:
         is_noise = outcome.verdict == Verdict.NOTHING and not is_clean

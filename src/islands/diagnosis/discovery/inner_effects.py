@@ -43,7 +43,11 @@ from islands.simulators.interface import Simulator
 
 
 def search_inner_effects(
-    outcome: SearchOutcome, base: CalibrationResult, target: Target, run: DiagnosisRun
+    outcome: SearchOutcome,
+    base: CalibrationResult,
+    target: Target,
+    run: DiagnosisRun,
+    is_white: bool = False,
 ) -> SearchOutcome:
     """Return the outcome of a search in equations with an effect inside of them, if that explains more.
 
@@ -55,6 +59,9 @@ def search_inner_effects(
         The simulation without effects, calibrated to unweighted residuals.
     target, run
         Arguments of the search.
+    is_white : bool
+        Whether no effect was found and the residual is white. Only the errors of an actuator that moves in
+        jumps are that random from one sample to the next, so that only these are searched for.
 
     Returns
     -------
@@ -62,7 +69,7 @@ def search_inner_effects(
         The given one if no such effect fits better by the margin of equivalents, or none withstands the
         tests. The base of another one is a fit of the equations.
     """
-    inner = _find_best_effect(outcome.hypothesis, base, target, run)
+    inner = _find_best_effect(outcome.hypothesis, base, target, run, is_white)
     if inner is None:
         return outcome
     inner = replace(inner, fit=_select_simulator(inner.fit, target))
@@ -154,7 +161,7 @@ def _list_inner_effects(simulator: Simulator, run: DiagnosisRun) -> list[Effect]
 
 
 def _find_best_effect(
-    alone: Hypothesis, base: CalibrationResult, target: Target, run: DiagnosisRun
+    alone: Hypothesis, base: CalibrationResult, target: Target, run: DiagnosisRun, is_white: bool
 ) -> ScreenedEffect | None:
     """Return the inner effect with the best fit; None if none fits better than the effects of a hypothesis.
 
@@ -164,16 +171,25 @@ def _find_best_effect(
     # The scores of a search with model error count other samples.
     scored = evaluate_fit(alone.fit.simulation, target, alone.fit.values)
     best, least = None, compute_cost(scored, base) - EQUIVALENCE_MARGIN
-    unsigned = fit_unsigned_output(base, target, run)
-    screened = [] if unsigned is None else [unsigned]
     starts = [base, scored] if alone.effects else [base]
-    screened += [each for start in starts for each in fit_jumping_inputs(start, target, run)]
-    fits = [states for start in starts for states in list_state_fits(start, target)]
-    for states in [*fits, *list_process_fits(base, target)]:
-        inner = _list_inner_effects(states.simulation.simulator, run)
-        screened += screen_effects(states, target, run.with_effects(inner))
+    screened = [each for start in starts for each in fit_jumping_inputs(start, target, run)]
+    if not is_white:
+        screened += _fit_within_equations(starts, base, target, run)
     for each in screened:
         cost = compute_cost(each.fit, base)
         if cost < least:
             best, least = each, cost
     return best
+
+
+def _fit_within_equations(
+    starts: Sequence[CalibrationResult], base: CalibrationResult, target: Target, run: DiagnosisRun
+) -> list[ScreenedEffect]:
+    """Return fits of the effects that other values or equations of a linear simulation permit."""
+    unsigned = fit_unsigned_output(base, target, run)
+    found = [] if unsigned is None else [unsigned]
+    fits = [states for start in starts for states in list_state_fits(start, target)]
+    for states in [*fits, *list_process_fits(base, target)]:
+        inner = _list_inner_effects(states.simulation.simulator, run)
+        found += screen_effects(states, target, run.with_effects(inner))
+    return found

@@ -50,6 +50,9 @@ _FINE = 8
 _COUNTS = np.concatenate([np.arange(2.0, 40.0, 0.1), np.arange(40.0, 100.0, 0.2)])
 _OFFSETS = np.arange(-7, 9) / 16.0
 
+#: Numbers of steps that are small against a cell, within twice the peak of an input that is continuous.
+_SMALL_COUNTS = np.arange(40.0, 300.0, 0.2)
+
 #: Breakaway distances of an input that is continuous, relative to its peak. It slips after each of them, so
 #: that an error of the distance adds up over a sweep. Closer ones than this are the same.
 _BREAKAWAYS, _NEAR_BREAKAWAY = np.geomspace(0.005, 0.6, 1000), 0.02
@@ -57,6 +60,9 @@ _BREAKAWAYS, _NEAR_BREAKAWAY = np.geomspace(0.005, 0.6, 1000), 0.02
 #: Numbers of steps and offsets near the best ones that are compared then, relative to these. An input that
 #: takes all values tells them apart, and one with few levels permits a range.
 _NEAR_COUNTS, _NEAR_OFFSETS = np.arange(-10, 11) / 50.0, np.arange(-4, 5) / 64.0
+
+#: Numbers of small steps up to the peak and offsets near the best ones, relative to these and to the step.
+_NEAR_LEVELS, _NEAR_PARTS = np.arange(-8, 9) / 100.0, np.arange(-8, 9) / 64.0
 
 #: Range of the size of a change relative to the expected one: cells that contain an edge reduce it.
 _SIZES = (0.6, 1.2)
@@ -74,6 +80,13 @@ _HALVINGS = 3
 _ListPoints: TypeAlias = Callable[[CalibrationResult, Target], Sequence[Signal]]
 
 
+class _Candidate(NamedTuple):
+    """Steps and offsets that are calibrated, and the decrease of the sum of squares."""
+
+    explained: float
+    points: tuple[Signal, ...]
+
+
 class _Cells(NamedTuple):
     """Cells of the input.
 
@@ -81,12 +94,67 @@ class _Cells(NamedTuple):
     ----------
     values : ndarray, shape (cells,)
         Mean value of the input in each cell.
-    parts : ndarray, shape (cells, samples)
-        Part of the time around each sample in which the input is in a cell.
+    places : ndarray of int, shape (times,)
+        The cell of each value of its course.
     """
 
     values: Signal
-    parts: Signal
+    places: NDArray[np.int64]
+
+
+class _InputResponse:
+    """Response of a plant to changes of its input, less what its parameters reproduce.
+
+    Parameters
+    ----------
+    plant : CalibrationResult
+    target : Target
+    pulse : ndarray
+        Response to a pulse, see `respond_to_pulse`.
+
+    Attributes
+    ----------
+    course : ndarray, shape (fine * samples,)
+        The input between samples.
+    is_stepwise : bool
+        Whether it changes at samples only, so that ``fine`` is one.
+    projection : Projection
+    """
+
+    def __init__(self, plant: CalibrationResult, target: Target, pulse: Signal) -> None:
+        context, simulator = plant.simulation.context, plant.simulation.simulator
+        intersample, _ = get_discretisation(simulator)
+        is_continuous = simulator.is_continuous_time and intersample != InterSample.ZOH
+        self.is_stepwise = not is_continuous or is_held(context.u)
+        self._fine = 1 if self.is_stepwise else _FINE
+        parts = [context.u[first:last] for first, last in context.bounds]
+        if not self.is_stepwise:
+            parts = [resample_input(part, intersample, self._fine)[0] for part in parts]
+        self.course = np.concatenate(parts)
+        self._segments, self._starts = context.segments, [first for first, _ in context.bounds]
+        # The average response of a lag to the first half of a pulse is half of that to all of it.
+        self._direct = 0.0 if self.is_stepwise else float(pulse[0] - pulse[1:2].sum() / 2.0)
+        self._pulse = pulse.copy()
+        self._pulse[0] -= self._direct
+        self.projection = Projection(plant, target)
+
+    def __call__(self, change: Signal) -> Signal:
+        """Return the response to a change with as many values as the course.
+
+        Where the input is linear between samples, a plant that responds at once has its value at each sample,
+        and another one its average around it.
+        """
+        parts = change.reshape(-1, self._fine)
+        rising = np.arange(self._fine) / self._fine**2
+        before = np.roll(parts @ rising, 1)
+        before[self._starts] = parts[self._starts, 0] * rising.sum()
+        means = parts @ (1.0 / self._fine - rising) + before
+        return self.projection(convolve(means, self._pulse, self._segments) + self._direct * parts[:, 0])
+
+    def explain(self, change: Signal) -> float:
+        """Return the decrease of the sum of squares by a change."""
+        caused = self(change)
+        return float(_explain(caused @ self.projection.residual, caused @ caused))
 
 
 def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
@@ -218,18 +286,30 @@ def _list_breakaways(plant: CalibrationResult, target: Target) -> list[Signal]:
 
 def _list_steps(plant: CalibrationResult, target: Target) -> list[Signal]:
     """Return steps and offsets that explain most of a residual, those of different steps."""
-    response, context = respond_to_pulse(plant), plant.simulation.context
-    if response is None:
+    pulse, context = respond_to_pulse(plant), plant.simulation.context
+    if pulse is None:
         return []
-    projection, cells = Projection(plant, target), _divide_input(plant, target)
+    respond = _InputResponse(plant, target, pulse)
+    found = _compare_levels(respond, context.u[: target.fitted], context.input_peak)
+    if not respond.is_stepwise:
+        found += _compare_sawteeth(respond, context.input_peak)
+    residual = respond.projection.residual
+    least = _MIN_FRACTION * float(residual @ residual)
+    found = sorted((each for each in found if each.explained > least), key=lambda each: -each.explained)
+    return [point for each in found[:_STARTS] for point in each.points]
+
+
+def _compare_levels(respond: _InputResponse, u: Signal, peak: float) -> list[_Candidate]:
+    """Compare steps and offsets by the levels of each cell of the input."""
+    cells = _divide_input(respond, u)
     responses = np.column_stack(
-        [projection(convolve(part, response, context.segments)) for part in cells.parts]
+        [respond((cells.places == cell).astype(float)) for cell in range(cells.values.size)]
     )
-    gram, products = responses.T @ responses, responses.T @ projection.residual
+    gram, products = responses.T @ responses, responses.T @ respond.projection.residual
 
     def compare(counts: Signal, offsets: Signal) -> tuple[Signal, Signal, Signal]:
         """Return steps and offsets, their levels in each cell, and the decrease of the sum of squares."""
-        steps = np.repeat(2.0 * context.input_peak / counts, offsets.size)
+        steps = np.repeat(2.0 * peak / counts, offsets.size)
         parts = np.tile(offsets, counts.size)
         places = cells.values / steps[:, None] - parts[:, None]
         levels = np.round(places)
@@ -238,21 +318,59 @@ def _list_steps(plant: CalibrationResult, target: Target) -> list[Signal]:
         return np.column_stack([steps, parts * steps]), levels, explained
 
     points, levels, explained = compare(_COUNTS, _OFFSETS)
-    counts = 2.0 * context.input_peak / points[:, 0]
-    least = _MIN_FRACTION * float(projection.residual @ projection.residual)
-    found: list[Signal] = []
+    counts = 2.0 * peak / points[:, 0]
+    found = []
     for _ in range(_STARTS):
         best = int(np.argmax(explained))
-        if not explained[best] > least:
-            break
         is_same = (levels == levels[best]).all(axis=1)
         near, _, near_explained = compare(
             np.maximum(counts[best] + _NEAR_COUNTS, _COUNTS[0]),
             points[best, 1] / points[best, 0] + _NEAR_OFFSETS,
         )
-        found += [points[is_same].mean(axis=0), near[int(np.argmax(near_explained))]]
-        explained[is_same | (np.abs(counts - counts[best]) < 1.0)] = 0.0
+        refined = near[int(np.argmax(near_explained))]
+        found.append(_Candidate(float(explained[best]), (points[is_same].mean(axis=0), refined)))
+        explained[is_same | (np.abs(counts - counts[best]) < 1.0)] = -np.inf
     return found
+
+
+def _compare_sawteeth(respond: _InputResponse, peak: float) -> list[_Candidate]:
+    """Compare small steps by the first harmonic of the rounding error, a sawtooth over the input.
+
+    Its phase is the offset. The other harmonics contain 39 % of the energy (Widrow and Kollar, Quantization
+    Noise, section 4).
+    """
+    turns = 1j * np.pi / peak * respond.course
+    wave, turn = np.exp(turns * _SMALL_COUNTS[0]), np.exp(turns * (_SMALL_COUNTS[1] - _SMALL_COUNTS[0]))
+    points, explained = [], []
+    for count in _SMALL_COUNTS:
+        step = 2.0 * peak / count
+        basis = step / np.pi * np.column_stack([respond(wave.imag), respond(wave.real)])
+        gram, products = basis.T @ basis, basis.T @ respond.projection.residual
+        weights = np.linalg.lstsq(gram, products, rcond=None)[0]
+        phase = np.arctan2(weights[1], -weights[0])
+        change = np.array([-np.cos(phase), np.sin(phase)])
+        points.append((step, phase / (2.0 * np.pi) * step))
+        explained.append(float(_explain(change @ products, change @ gram @ change)))
+        wave *= turn
+    left, found = np.array(explained), []
+    for _ in range(_STARTS):
+        best = int(np.argmax(left))
+        found.append(_refine_step(respond, *points[best]))
+        left[np.abs(_SMALL_COUNTS - _SMALL_COUNTS[best]) < 1.0] = -np.inf
+    return found
+
+
+def _refine_step(respond: _InputResponse, step: float, offset: float) -> _Candidate:
+    """Return the step and the offset near these whose rounding error explains most."""
+    peak = float(np.max(np.abs(respond.course)))
+    steps = 1.0 / (1.0 / step + _NEAR_LEVELS / peak)
+    points = [np.array([near, offset + part * step]) for near in steps for part in _NEAR_PARTS]
+    course, explained = respond.course, []
+    for size, place in points:
+        rounded = place + size * np.round((course - place) / size)
+        explained.append(respond.explain(rounded - course))
+    best = int(np.argmax(explained))
+    return _Candidate(explained[best], (points[best],))
 
 
 def _explain(products: Signal, squares: Signal) -> Signal:
@@ -261,29 +379,14 @@ def _explain(products: Signal, squares: Signal) -> Signal:
     return (2.0 * products - sizes * squares) * sizes
 
 
-def _divide_input(fit: CalibrationResult, target: Target) -> _Cells:
+def _divide_input(respond: _InputResponse, u: Signal) -> _Cells:
     """Divide the range of the input into cells: its values if they are few, else with equal durations."""
-    context, simulator = fit.simulation.context, fit.simulation.simulator
-    values = np.unique(context.u[: target.fitted])
-    intersample, _ = get_discretisation(simulator)
-    fine = _FINE if simulator.is_continuous_time and intersample != InterSample.ZOH else 1
-    if values.size <= _CELLS:
-        fine, edges = 1, (values[1:] + values[:-1]) / 2.0
+    values = np.unique(u)
+    if respond.is_stepwise and values.size <= _CELLS:
+        edges = (values[1:] + values[:-1]) / 2.0
     else:
-        edges = np.unique(np.quantile(context.u[: target.fitted], np.linspace(0.0, 1.0, _CELLS + 1)[1:-1]))
-    signals = [
-        resample_input(context.u[first:last], intersample, fine)[0] if fine > 1 else context.u[first:last]
-        for first, last in context.bounds
-    ]
-    cells = [np.searchsorted(edges, signal) for signal in signals]
-    joined, places = np.concatenate(signals), np.concatenate(cells)
-    counts = np.bincount(places, minlength=edges.size + 1)
-    means = np.bincount(places, joined, edges.size + 1) / np.maximum(counts, 1)
-    return _Cells(means, np.concatenate([_average(each, edges.size + 1, fine) for each in cells], axis=1))
-
-
-def _average(cells: NDArray[np.int64], count: int, fine: int) -> Signal:
-    """Return the part of the time around each sample in each cell: an input is linear between samples."""
-    weights = np.bartlett(2 * fine + 1)[1:-1] / fine
-    # One cell after the other: all of them together take hundreds of megabytes.
-    return np.array([np.convolve(cells == cell, weights, "same")[::fine] for cell in range(count)])
+        edges = np.unique(np.quantile(u, np.linspace(0.0, 1.0, _CELLS + 1)[1:-1]))
+    course, count = respond.course, edges.size + 1
+    places = np.searchsorted(edges, course)
+    durations = np.maximum(np.bincount(places, minlength=count), 1)
+    return _Cells(np.bincount(places, course, count) / durations, places)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from islands.data.segments import map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
@@ -32,7 +33,7 @@ def convolve(signal: Signal, response: Signal, segments: Sequence[int]) -> Signa
     """Return a signal filtered by an impulse response; before each recording it has its first value."""
 
     def convolve(part: Signal) -> Signal:
-        size = part.size + response.size - 1
+        size = scipy.fft.next_fast_len(part.size + response.size - 1, real=True)
         spectrum = np.fft.rfft(part - part[0], size) * np.fft.rfft(response, size)
         return np.asarray(np.fft.irfft(spectrum, size)[: part.size] + part[0] * response.sum())
 

@@ -25,6 +25,7 @@ from islands.kernels.memory_operators import play_from
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.output_equation import add_output_equation
+from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 
 #: Standard deviation of the noise.
@@ -62,9 +63,23 @@ def make_smooth_record(step: float, limit: float) -> Dataset:
     return Dataset(u, x + 0.002 * rng.standard_normal(u.size), 0.1, ("u_V",), "y_V", ("V",), "V")
 
 
-def fit(record: Dataset) -> tuple[CalibrationResult, Target]:
+def make_lag(direct: float) -> OdeSpec:
+    """Return a simulation of a lag, of which some input passes at once."""
+    document = {
+        "kind": "ode",
+        "name": "lag",
+        "input": "u",
+        "output": "x + d*u" if direct else "x",
+        "equations": "dx/dt = (u - x)/T",
+        "parameters": {"T": 0.05, "d": direct} if direct else {"T": 0.05},
+        "states": {"x": {"unit": "V"}},
+    }
+    return OdeSpec.model_validate(document)
+
+
+def fit(record: Dataset, simulation: str | OdeSpec = "linear:2") -> tuple[CalibrationResult, Target]:
     fitted = count_fitted_samples(record)
-    simulator = make_simulator("linear:2", record)
+    simulator = make_simulator(simulation, record)
     context = make_context(record, simulator, fitted)
     simulation = ExtendedSimulator(add_output_equation(simulator, context), (), context)
     target = make_target(record, fitted, {})
@@ -89,6 +104,27 @@ def test_small_steps_of_an_actuator_are_found() -> None:
     step = found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)][0]
     assert step == pytest.approx(0.05, rel=2e-3)
     assert found.fit.mean_square**0.5 < 1.1 * 0.002 < 0.6 * base.mean_square**0.5
+
+
+@pytest.mark.parametrize("direct", [0.0, 1.0])
+def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> None:
+    """A plant that responds at once has the steps at each sample, and another one their average."""
+    rng, fine = np.random.default_rng(3), 40
+    times = np.arange(600 * fine) / (100.0 * fine)
+    waves = zip(rng.uniform(0.3, 1.0, 6), np.arange(1.0, 7.0), rng.uniform(0.0, 6.0, 6), strict=True)
+    u = sum(size * np.sin(rate * times + phase) for size, rate, phase in waves)
+    step = 2.0 * np.max(np.abs(u)) / 157.3
+    moved = step * np.round(u / step)
+    decay = np.exp(-1.0 / (5.0 * fine))
+    y = (lfilter([1.0 - decay], [1.0, -decay], moved) + direct * moved)[::fine]
+    noise = (0.15 if direct else 0.03) * step * rng.standard_normal(y.size)
+    record = Dataset(u[::fine], y + noise, 0.01, ("u_V",), "y_V", ("V",), "V")
+    base, target = fit(record, make_lag(direct))
+    (found,) = fit_jumping_inputs(base, target, DiagnosisRun([QUANTISED_INPUT]))
+    assert found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)] == pytest.approx(
+        (step, 0.0), rel=1e-3, abs=0.05 * step
+    )
+    assert found.fit.mean_square < 0.7 * base.mean_square
 
 
 def test_steps_are_found_behind_another_effect() -> None:
