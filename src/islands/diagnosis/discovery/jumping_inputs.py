@@ -13,13 +13,19 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.diagnosis.calibration.intersample_selection import get_discretisation, halve_step
+from islands.diagnosis.calibration.intersample_selection import (
+    MIN_IMPROVEMENT,
+    get_discretisation,
+    halve_step,
+)
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
 from islands.diagnosis.calibration.pattern_search import search_jumps
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.state_equations import (
+    calibrate_states,
     get_linear,
+    list_state_fits,
     make_fitted_record,
     transfer_linear_values,
 )
@@ -28,6 +34,7 @@ from islands.diagnosis.inference.screening import (
     ScreenedEffect,
     choose_orders,
     list_orders,
+    transfer_effects,
     transfer_parameters,
 )
 from islands.diagnosis.run import DiagnosisRun
@@ -174,7 +181,26 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
         if effect in run.effects and effect not in base.simulation.effects
         for simulation in list_orders(base, effect)
     ]
-    return choose_orders(each for each in found if each is not None)
+    chosen = choose_orders(each for each in found if each is not None)
+    return [*chosen, *(fit for each in chosen for fit in _fit_between_samples(each, target))]
+
+
+def _fit_between_samples(found: ScreenedEffect, target: Target) -> list[ScreenedEffect]:
+    """Return the differential equations of a linear simulation behind a jumping actuator, if they fit better.
+
+    A difference equation reads its input at the samples, and an input that is continuous jumps between them.
+    """
+    simulation, better = found.fit.simulation, []
+    states = [] if is_held(simulation.context.u) else list_state_fits(found.fit, target)
+    for each in states:
+        extended = each.simulation.with_effects(simulation.effects)
+        start = transfer_parameters(each.values, each.simulation, extended)
+        transfer_effects(found.fit.values, simulation, start, extended)
+        fit = calibrate_states(evaluate_fit(extended, target, start), target)
+        fit = search_jumps(replace(fit, simulation=_halve_steps(fit.simulation)), target)
+        if fit.score < found.fit.score - MIN_IMPROVEMENT:
+            better.append(ScreenedEffect(found.effect, fit))
+    return better
 
 
 def _search(

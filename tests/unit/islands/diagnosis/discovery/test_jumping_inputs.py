@@ -12,6 +12,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.jumping_inputs import fit_jumping_inputs
+from islands.diagnosis.discovery.state_equations import get_linear
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.resolved_effects import remove_unresolved
 from islands.diagnosis.inference.screening import screen_effects
@@ -125,6 +126,25 @@ def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> 
         (step, 0.0), rel=1e-3, abs=0.05 * step
     )
     assert found.fit.mean_square < 0.7 * base.mean_square
+
+
+def test_slips_between_samples_need_differential_equations() -> None:
+    """Its difference equation reads the slips at the samples only."""
+    fine, times = 20, np.arange(24_000) / 1000.0
+    u = 2.0 * np.sin(1.3 * times) + np.sin(3.1 * times + 1.0)
+    moved, place = [], float(u[0])
+    for command in u.tolist():
+        place += 0.35 * np.trunc((command - place) / 0.35)
+        moved.append(place)
+    y = lfilter([0.00009], [1.0, -1.994, 0.99409], moved)[::fine]
+    noise = 0.001 * np.random.default_rng(1).standard_normal(y.size)
+    base, target = fit(Dataset(u[::fine], y + noise, 0.02, ("u_V",), "y_mm", ("V",), "mm"))
+    sampled, continuous = fit_jumping_inputs(base, target, DiagnosisRun([STICTION]))
+    assert get_linear(sampled.fit) is not None
+    assert continuous.fit.simulation.simulator.is_continuous_time
+    assert continuous.fit.mean_square**0.5 < 1.5 * 0.001 < 0.5 * sampled.fit.mean_square**0.5
+    part = continuous.fit.simulation.get_slice(STICTION)
+    assert continuous.fit.values[part] == pytest.approx(0.35, rel=1e-3)
 
 
 def test_steps_are_found_behind_another_effect() -> None:
