@@ -88,8 +88,8 @@ def _list_starting_points(
     residual: Signal,
     lines: Mapping[int, int],
     size: float,
-    rate: float,
     periods: int,
+    highest: float,
 ) -> tuple[tuple[float, ...], ...]:
     """Return points with the frequencies of the largest lines in spectra over the position.
 
@@ -99,10 +99,10 @@ def _list_starting_points(
         Number of lines by the order of the differences of the residual.
     size : float
         Amplitude.
-    rate : float
-        Typical rate of the position.
     periods : int
-        Least number of periods within its range.
+        Least number of periods within the range of the position.
+    highest : float
+        Highest spatial frequency.
     """
     x = _take_fitted(context)
     span = float(np.ptp(x))
@@ -111,9 +111,7 @@ def _list_starting_points(
     found: list[float] = []
     for order, count in lines.items():
         frequencies, spectrum = _compute_spatial_spectrum(x, _take_differences(residual[: x.size], order))
-        # At its typical rate, the position passes at most one period in a sample.
-        is_resolved = frequencies * rate * context.dt <= 1.0
-        spectrum[(frequencies < periods / span) | ~is_resolved] = 0.0
+        spectrum[(frequencies < periods / span) | (frequencies > highest)] = 0.0
         for _ in range(count):
             for known in found:
                 spectrum[np.abs(frequencies - known) < LINE_WIDTH / span] = 0.0
@@ -136,8 +134,10 @@ def _cogging_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
 
 def _cogging_starting_points(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
     coordinate = context.force_coordinate
+    # At its typical rate, the position passes at most one period in a sample.
+    highest = 1.0 / max(coordinate.rate * context.dt, np.finfo(float).tiny)
     return _list_starting_points(
-        context, residual, COGGING_LINES, 0.02 * coordinate.force, coordinate.rate, MIN_COGGING_PERIODS
+        context, residual, COGGING_LINES, 0.02 * coordinate.force, MIN_COGGING_PERIODS, highest
     )
 
 
@@ -175,9 +175,12 @@ def _cyclic_error_parameters(context: SimulationContext) -> tuple[Parameter, ...
 def _cyclic_error_starting_points(
     context: SimulationContext, residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
-    rate = float(np.std(context.take_differences(_take_fitted(context)))) / context.dt
+    # The position passes at most one period in a sample, or is known to within a radian of it.
+    change = float(np.std(context.take_differences(_take_fitted(context))))
+    error = 2.0 * pi * float(np.std(residual))
+    highest = 1.0 / max(min(change, error), np.finfo(float).tiny)
     return _list_starting_points(
-        context, residual, CYCLIC_LINES, 0.002 * context.output_peak, rate, MIN_CYCLIC_PERIODS
+        context, residual, CYCLIC_LINES, 0.002 * context.output_peak, MIN_CYCLIC_PERIODS, highest
     )
 
 
