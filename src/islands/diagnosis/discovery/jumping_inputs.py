@@ -317,7 +317,7 @@ def _list_steps(plant: CalibrationResult, target: Target) -> list[Signal]:
         return []
     respond = _InputResponse(plant, target, pulse)
     found = _compare_levels(respond, context.u[: target.fitted], context.input_peak)
-    if not respond.is_stepwise:
+    if not is_held(context.u):
         found += _compare_sawteeth(respond, context.input_peak)
     residual = respond.projection.residual
     least = _MIN_FRACTION * float(residual @ residual)
