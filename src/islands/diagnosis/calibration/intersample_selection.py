@@ -55,6 +55,9 @@ def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
         tried[intersample] = calibrate(_with_simulator(fit.simulation, candidate), target, fit.values)
         if not is_regular:
             irregular.add(intersample)
+        # Below the resolution, the scores of right and of almost right outputs do not differ.
+        if target.is_matched(tried[intersample].output):
+            return candidate
     best = min(tried, key=lambda intersample: tried[intersample].score)
     chosen = best if tried[best].score < tried[current].score - MIN_IMPROVEMENT else current
     if _get_lead(tried[chosen]) > 0.0:

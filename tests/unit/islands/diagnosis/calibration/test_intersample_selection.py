@@ -98,6 +98,19 @@ def test_intersample_behaviour_of_the_record_is_selected(intersample: InterSampl
     assert get_intersample(select_intersample(refitted, target)) == intersample
 
 
+def test_a_behaviour_that_matches_a_record_without_noise_is_selected() -> None:
+    """The residual of another one is below the least variance of a noise model as well."""
+    t = DT / FINE * np.arange(SAMPLES * FINE)
+    u = np.sin(2.0 * np.pi * 0.4 * t) + np.sin(2.0 * np.pi * 0.7 * t + 1.0)
+    y = simulate_finely(np.interp(t, t[::FINE], u[::FINE]))
+    fit, target = calibrate_to(recorded(u[::FINE], y, DT, ("N", "m")), oscillator())
+    target = replace(target, resolution=1e-6 * float(np.ptp(y)))
+    core = select_intersample(calibrate(fit.simulation, target, fit.values), target)
+    assert get_intersample(core) == InterSample.FOH
+    simulation = ExtendedSimulator(core, (), fit.simulation.context)
+    assert target.is_matched(calibrate(simulation, target, fit.values).output)
+
+
 @pytest.mark.parametrize("intersample", [InterSample.ZOH, InterSample.BAND_LIMITED])
 def test_wrong_intersample_behaviour_leaves_more_than_the_noise(intersample: InterSample) -> None:
     u, fine_u = make_inputs(intersample)
