@@ -58,7 +58,7 @@ _COUNTS = np.concatenate([np.arange(2.0, 40.0, 0.1), np.arange(40.0, 100.0, 0.2)
 _OFFSETS = np.arange(-7, 9) / 16.0
 
 #: Numbers of steps that are small against a cell, within twice the peak of an input that is continuous.
-_SMALL_COUNTS = np.arange(40.0, 300.0, 0.2)
+_SMALL_COUNTS = np.arange(40.0, 300.0, 0.4)
 
 #: Breakaway distances of an input that is continuous, relative to its peak. It slips after each of them, so
 #: that an error of the distance adds up over a sweep. Closer ones than this are the same.
@@ -69,7 +69,7 @@ _BREAKAWAYS, _NEAR_BREAKAWAY = np.geomspace(0.005, 0.6, 1000), 0.02
 _NEAR_COUNTS, _NEAR_OFFSETS = np.arange(-10, 11) / 50.0, np.arange(-4, 5) / 64.0
 
 #: Numbers of small steps up to the peak and offsets near the best ones, relative to these and to the step.
-_NEAR_LEVELS, _NEAR_PARTS = np.arange(-8, 9) / 100.0, np.arange(-8, 9) / 64.0
+_NEAR_LEVELS, _NEAR_PARTS = np.arange(-10, 11) / 100.0, np.arange(-8, 9) / 64.0
 
 #: Range of the size of a change relative to the expected one: cells that contain an edge reduce it.
 _SIZES = (0.6, 1.2)
