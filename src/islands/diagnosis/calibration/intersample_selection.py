@@ -117,12 +117,18 @@ def get_discretisation(simulator: Simulator) -> Discretisation:
 
 def list_other_holds(simulator: Simulator) -> list[Simulator]:
     """Return the simulator with each other intersample behaviour; none in discrete time."""
-    current, oversampling = get_discretisation(simulator)
+    current, _ = get_discretisation(simulator)
     return [
-        ResampledSimulator(_get_inner(simulator), intersample, oversampling)
+        set_intersample(simulator, intersample)
         for intersample in (InterSample if simulator.is_continuous_time else ())
         if intersample != current
     ]
+
+
+def set_intersample(simulator: Simulator, intersample: InterSample) -> Simulator:
+    """Return a simulator in continuous time with another intersample behaviour."""
+    _, oversampling = get_discretisation(simulator)
+    return ResampledSimulator(_get_inner(simulator), intersample, oversampling)
 
 
 def halve_step(simulator: Simulator) -> Simulator | None:

@@ -14,16 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.intersample_selection import (
-    MIN_IMPROVEMENT,
     get_discretisation,
     halve_step,
+    set_intersample,
 )
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
 from islands.diagnosis.calibration.pattern_search import search_jumps
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.state_equations import (
-    calibrate_states,
     get_linear,
     list_state_fits,
     make_fitted_record,
@@ -38,7 +37,7 @@ from islands.diagnosis.inference.screening import (
     transfer_parameters,
 )
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.hysteresis import STICTION, is_held
+from islands.effects.hysteresis import STICTION, is_held, stick
 from islands.effects.interface.effect import Effect, Signal, Site, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.errors import RecordError
@@ -64,6 +63,9 @@ _SMALL_COUNTS = np.arange(40.0, 300.0, 0.4)
 #: that an error of the distance adds up over a sweep. Closer ones than this are the same.
 _BREAKAWAYS, _NEAR_BREAKAWAY = np.geomspace(0.005, 0.6, 1000), 0.02
 
+#: Breakaway distances that are compared then, relative to the best of these. They are 0.5 % apart.
+_NEAR_RATIOS = 1.0 + np.arange(-10, 11) / 2000.0
+
 #: Numbers of steps and offsets near the best ones that are compared then, relative to these. An input that
 #: takes all values tells them apart, and one with few levels permits a range.
 _NEAR_COUNTS, _NEAR_OFFSETS = np.arange(-10, 11) / 50.0, np.arange(-4, 5) / 64.0
@@ -82,6 +84,9 @@ _SEARCHES, _MAX_RATIO = 4, 0.99
 
 #: Number of times that the steps of a simulation are halved: an input passes a level between two samples.
 _HALVINGS = 3
+
+#: Behaviours of an input that changes between samples.
+_CONTINUOUS = (InterSample.FOH, InterSample.BAND_LIMITED)
 
 #: ``(plant, target) -> points``: values of an effect, the best first.
 _ListPoints: TypeAlias = Callable[[CalibrationResult, Target], Sequence[Signal]]
@@ -139,8 +144,7 @@ class _InputResponse:
             parts = [resample_input(part, intersample, self._fine)[0] for part in parts]
         self.course = np.concatenate(parts)
         self._segments, self._starts = context.segments, [first for first, _ in context.bounds]
-        # The average response of a lag to the first half of a pulse is half of that to all of it.
-        self._direct = 0.0 if self.is_stepwise else float(pulse[0] - pulse[1:2].sum() / 2.0)
+        self._direct = 0.0 if self.is_stepwise else _find_direct_term(pulse)
         self._pulse = pulse.copy()
         self._pulse[0] -= self._direct
         self.projection = Projection(plant, target)
@@ -164,6 +168,16 @@ class _InputResponse:
         return float(_explain(caused @ self.projection.residual, caused @ caused))
 
 
+def _find_direct_term(pulse: Signal) -> float:
+    """Return the part of the response to a pulse that follows its input at once.
+
+    The response of a lag to the first half of the pulse is half of that to all of it, and less in a system of
+    higher order.
+    """
+    direct = float(pulse[0] - pulse[1:2].sum() / 2.0)
+    return direct if direct * pulse[0] > 0.0 else 0.0
+
+
 def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRun) -> list[ScreenedEffect]:
     """Return simulations whose actuator moves in jumps, if these explain a part of the misfit.
 
@@ -174,33 +188,60 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
     target, run
         Arguments of a search, whose effects are searched for.
     """
-    searches = ((QUANTISED_INPUT, _list_steps), (STICTION, _list_breakaways))
-    found = [
-        _search(effect, base, simulation, target, list_points)
-        for effect, list_points in searches
-        if effect in run.effects and effect not in base.simulation.effects
-        for simulation in list_orders(base, effect)
-    ]
-    chosen = choose_orders(each for each in found if each is not None)
-    return [*chosen, *(fit for each in chosen for fit in _fit_between_samples(each, target))]
+    found = []
+    for effect, list_points in ((QUANTISED_INPUT, _list_steps), (STICTION, _list_breakaways)):
+        if effect not in run.effects or effect in base.simulation.effects:
+            continue
+        own = _search_orders(effect, base, target, list_points)
+        for plant in _list_equations(base, base, target, [InterSample.FOH]):
+            calibrated = calibrate(plant.simulation, target, plant.values)
+            own += _search_orders(effect, calibrated, target, list_points)
+        if own:
+            # The plant behind an actuator is closer to the true one.
+            best = min(own, key=lambda each: each.fit.score)
+            for plant in _list_equations(best.fit, base, target, _CONTINUOUS):
+                own += _search_orders(effect, plant, target, list_points)
+        found += own
+    return choose_orders(found)
 
 
-def _fit_between_samples(found: ScreenedEffect, target: Target) -> list[ScreenedEffect]:
-    """Return the differential equations of a linear simulation behind a jumping actuator, if they fit better.
+def _list_equations(
+    fit: CalibrationResult,
+    base: CalibrationResult,
+    target: Target,
+    behaviours: Sequence[InterSample],
+) -> list[CalibrationResult]:
+    """Return the equations in continuous time of a linear simulation, behind the effects of ``base``.
 
-    A difference equation reads its input at the samples, and an input that is continuous jumps between them.
+    Its difference equation reads the input at the samples, and an actuator with a continuous input jumps
+    between them. There are none for another simulation or another input. A fit that has such equations has
+    them for other behaviours of the input.
     """
-    simulation, better = found.fit.simulation, []
-    states = [] if is_held(simulation.context.u) else list_state_fits(found.fit, target)
+    if get_linear(base) is None or is_held(base.simulation.context.u):
+        return []
+    # The same processes in another order differ by their states only.
+    states, known = [fit], [get_discretisation(fit.simulation.simulator)[0]]
+    if get_linear(fit):
+        states, known = list_state_fits(fit, target)[:1], []
+    found = []
     for each in states:
-        extended = each.simulation.with_effects(simulation.effects)
-        start = transfer_parameters(each.values, each.simulation, extended)
-        transfer_effects(found.fit.values, simulation, start, extended)
-        fit = calibrate_states(evaluate_fit(extended, target, start), target)
-        fit = search_jumps(replace(fit, simulation=_halve_steps(fit.simulation)), target)
-        if fit.score < found.fit.score - MIN_IMPROVEMENT:
-            better.append(ScreenedEffect(found.effect, fit))
-    return better
+        for behaviour in (one for one in behaviours if one not in known):
+            simulator = set_intersample(each.simulation.simulator, behaviour)
+            simulation = replace(each.simulation, simulator=simulator).with_effects(base.simulation.effects)
+            values = transfer_parameters(each.values, each.simulation, simulation)
+            transfer_effects(fit.values, fit.simulation, values, simulation)
+            found.append(evaluate_fit(simulation, target, values))
+    return found
+
+
+def _search_orders(
+    effect: Effect, plant: CalibrationResult, target: Target, list_points: _ListPoints
+) -> list[ScreenedEffect]:
+    """Return the best fits of an effect in front of a plant, in each order of maps."""
+    fits = [
+        _search(effect, plant, simulation, target, list_points) for simulation in list_orders(plant, effect)
+    ]
+    return [each for each in fits if each is not None]
 
 
 def _search(
@@ -286,26 +327,31 @@ def _estimate_plant(
 
 def _list_breakaways(plant: CalibrationResult, target: Target) -> list[Signal]:
     """Return the breakaway distances that explain most of a residual, different ones."""
-    response, context = respond_to_pulse(plant), plant.simulation.context
-    if response is None:
+    pulse, context = respond_to_pulse(plant), plant.simulation.context
+    if pulse is None:
         return []
-    projection = Projection(plant, target)
+    respond = _InputResponse(plant, target, pulse)
+
+    def explain(distances: Signal) -> Signal:
+        """Return the decrease of the sum of squares by each distance."""
+        course = respond.course
+        return np.array([respond.explain(stick(course, each) - course) for each in distances.tolist()])
+
     if is_held(context.u):
         distances = np.ravel(STICTION.starting_points(context, target.y - plant.output))
+        ratios = np.ones(1)
     else:
-        distances = _BREAKAWAYS * context.input_peak
-    explained = np.zeros(distances.size)
-    for place, distance in enumerate(distances.tolist()):
-        change = apply_map(STICTION, context.u, np.array([distance]), context) - context.u
-        caused = projection(convolve(change, response, context.segments))
-        explained[place] = _explain(caused @ projection.residual, caused @ caused)
-    least = _MIN_FRACTION * float(projection.residual @ projection.residual)
+        distances, ratios = _BREAKAWAYS * context.input_peak, _NEAR_RATIOS
+    explained = explain(distances)
+    residual = respond.projection.residual
+    least = _MIN_FRACTION * float(residual @ residual)
     found: list[Signal] = []
     for _ in range(_STARTS):
         best = int(np.argmax(explained))
         if not explained[best] > least:
             break
-        found.append(distances[best : best + 1])
+        near = distances[best] * ratios
+        found.append(near[[int(np.argmax(explain(near)))]])
         explained[np.abs(distances - distances[best]) <= _NEAR_BREAKAWAY * distances[best]] = 0.0
     return found
 
