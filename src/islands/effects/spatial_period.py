@@ -1,6 +1,7 @@
 """Effects that are periodic in the position: cogging of a motor, and the cyclic error of an encoder."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import product
 from math import cos, pi, sin
 from typing import Any
 
@@ -15,7 +16,7 @@ MIN_COGGING_PERIODS = 3
 
 #: Least number of periods of a cyclic error. The free curve of the output has eight intervals, and the
 #: error of such a curve has as many periods.
-MIN_CYCLIC_PERIODS = 10
+MIN_CYCLIC_PERIODS = 9
 
 #: Number of bins over the range of the position.
 BINS = 2048
@@ -84,7 +85,7 @@ def _take_differences(signal: Signal, order: int) -> Signal:
 
 
 def _list_starting_points(
-    context: SimulationContext,
+    positions: Sequence[Signal],
     residual: Signal,
     lines: Mapping[int, int],
     size: float,
@@ -95,6 +96,8 @@ def _list_starting_points(
 
     Parameters
     ----------
+    positions : sequence of ndarray, each of shape (samples,)
+        Positions in the estimation part.
     lines : mapping
         Number of lines by the order of the differences of the residual.
     size : float
@@ -104,12 +107,11 @@ def _list_starting_points(
     highest : float
         Highest spatial frequency.
     """
-    x = _take_fitted(context)
-    span = float(np.ptp(x))
-    if not span > 0.0:
-        return ()
     found: list[float] = []
-    for order, count in lines.items():
+    for x, (order, count) in product(positions, lines.items()):
+        span = float(np.ptp(x))
+        if not span > 0.0:
+            continue
         frequencies, spectrum = _compute_spatial_spectrum(x, _take_differences(residual[: x.size], order))
         spectrum[(frequencies < periods / span) | (frequencies > highest)] = 0.0
         for _ in range(count):
@@ -137,7 +139,12 @@ def _cogging_starting_points(context: SimulationContext, residual: Signal) -> tu
     # At its typical rate, the position passes at most one period in a sample.
     highest = 1.0 / max(coordinate.rate * context.dt, np.finfo(float).tiny)
     return _list_starting_points(
-        context, residual, COGGING_LINES, 0.02 * coordinate.force, MIN_COGGING_PERIODS, highest
+        [_take_fitted(context)],
+        residual,
+        COGGING_LINES,
+        0.02 * coordinate.force,
+        MIN_COGGING_PERIODS,
+        highest,
     )
 
 
@@ -175,12 +182,15 @@ def _cyclic_error_parameters(context: SimulationContext) -> tuple[Parameter, ...
 def _cyclic_error_starting_points(
     context: SimulationContext, residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
+    measured = _take_fitted(context)
     # The position passes at most one period in a sample, or is known to within a radian of it.
-    change = float(np.std(context.take_differences(_take_fitted(context))))
+    change = float(np.std(context.take_differences(measured)))
     error = 2.0 * pi * float(np.std(residual))
     highest = 1.0 / max(min(change, error), np.finfo(float).tiny)
+    # The measured position contains the error, and the simulated one those of other causes.
+    positions = measured, measured - residual[: measured.size]
     return _list_starting_points(
-        context, residual, CYCLIC_LINES, 0.002 * context.output_peak, MIN_CYCLIC_PERIODS, highest
+        positions, residual, CYCLIC_LINES, 0.002 * context.output_peak, MIN_CYCLIC_PERIODS, highest
     )
 
 

@@ -54,6 +54,16 @@ def test_starting_points_ignore_the_level_and_trends_over_the_position(effect: E
     assert found[0] == pytest.approx(10.0, abs=0.25 / RANGE)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_cyclic_error_has_its_line_over_the_simulated_position(seed: int) -> None:
+    """The reading falls where the position rises; the simulated position has the line."""
+    x, pitch = move_back_and_forth()[::8], 0.1
+    error = 1.8 * pitch / (2 * np.pi) * np.sin(2 * np.pi * x / pitch)
+    noise = 0.5 * np.std(error) * np.random.default_rng(seed).standard_normal(x.size)
+    found = find_frequencies(CYCLIC_ERROR, x + error + noise, error + noise)
+    assert np.min(np.abs(np.array(found) - 1.0 / pitch)) < 0.25 / RANGE
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_a_measured_position_that_changes_is_needed(effect: Effect) -> None:
     assert effect.is_applicable(make_axis_context(move_back_and_forth()))
