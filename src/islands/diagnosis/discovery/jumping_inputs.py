@@ -221,7 +221,7 @@ def _list_equations(
         return []
     # The same processes in another order differ by their states only.
     states, known = [fit], [get_discretisation(fit.simulation.simulator)[0]]
-    if get_linear(fit):
+    if get_linear(fit) is not None:
         states, known = list_state_fits(fit, target)[:1], []
     found = []
     for each in states:
