@@ -22,10 +22,13 @@ def respond_to_pulse(fit: CalibrationResult) -> Signal | None:
         return np.ones(1)
     first, last = max(context.bounds, key=lambda bounds: bounds[1] - bounds[0])
     middle, size = (first + last) // 2, PULSE * context.input_peak
-    u = context.u.copy()
-    u[middle] += size
-    pulsed = replace(simulation, context=replace(context, u=u))
-    response: Signal = ((pulsed.simulate(fit.values) - fit.output) / size)[middle:last]
+    outputs = []
+    # A hysteresis does not return after a pulse: what remains has the same sign after the opposite one.
+    for change in (size, -size):
+        u = context.u.copy()
+        u[middle] += change
+        outputs.append(replace(simulation, context=replace(context, u=u)).simulate(fit.values))
+    response: Signal = ((outputs[0] - outputs[1]) / (2.0 * size))[middle:last]
     return response if np.isfinite(response).all() and response.any() else None
 
 
