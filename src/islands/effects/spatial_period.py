@@ -97,21 +97,22 @@ def _list_starting_points(
     Parameters
     ----------
     positions : sequence of ndarray, each of shape (samples,)
-        Positions in the estimation part.
+        Positions in the estimation part, the measured one first.
     lines : mapping
         Number of lines by the order of the differences of the residual.
     size : float
         Amplitude.
     periods : int
-        Least number of periods within the range of the position.
+        Least number of periods within the range of the measured position.
     highest : float
         Highest spatial frequency.
     """
+    span = float(np.ptp(positions[0]))
+    if not span > 0.0:
+        return ()
     found: list[float] = []
-    for x, (order, count) in product(positions, lines.items()):
-        span = float(np.ptp(x))
-        if not span > 0.0:
-            continue
+    moving = [x for x in positions if np.ptp(x) > 0.0]
+    for x, (order, count) in product(moving, lines.items()):
         frequencies, spectrum = _compute_spatial_spectrum(x, _take_differences(residual[: x.size], order))
         spectrum[(frequencies < periods / span) | (frequencies > highest)] = 0.0
         for _ in range(count):
