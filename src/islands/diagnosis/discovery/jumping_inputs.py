@@ -188,14 +188,14 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
     target, run
         Arguments of a search, whose effects are searched for.
     """
+    plants = [base]
+    for plant in _list_equations(base, base, target, [InterSample.FOH]):
+        plants.append(calibrate(plant.simulation, target, plant.values))
     found = []
     for effect, list_points in ((QUANTISED_INPUT, _list_steps), (STICTION, _list_breakaways)):
         if effect not in run.effects or effect in base.simulation.effects:
             continue
-        own = _search_orders(effect, base, target, list_points)
-        for plant in _list_equations(base, base, target, [InterSample.FOH]):
-            calibrated = calibrate(plant.simulation, target, plant.values)
-            own += _search_orders(effect, calibrated, target, list_points)
+        own = [each for plant in plants for each in _search_orders(effect, plant, target, list_points)]
         if own:
             # The plant behind an actuator is closer to the true one.
             best = min(own, key=lambda each: each.fit.score)

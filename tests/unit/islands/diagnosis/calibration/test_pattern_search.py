@@ -65,4 +65,4 @@ def test_the_values_of_a_jump_are_found_next_to_them(effect, true, wrong) -> Non
     calibrated = calibrate(simulation, target, start)
     assert np.max(np.abs(calibrated.values[part] - true)) > 0.001 * true[0]
     moved = search_jumps(calibrated, target)
-    assert moved.values[part] == pytest.approx(true, abs=3e-4 * true[0])
+    assert moved.values[part] == pytest.approx(true, rel=3e-4)

@@ -97,11 +97,12 @@ def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int
     assert exact == ([] if name == "none" else [name])
 
 
-@pytest.mark.parametrize(("size", "part"), [(0.05, 0.6), (0.02, 0.9)])
-def test_small_steps_of_an_actuator_are_found(size: float, part: float) -> None:
-    """They are more than fifty, and more than a hundred, within the range of the input."""
-    base, target = fit(make_smooth_record(size, np.inf))
+@pytest.mark.parametrize(("size", "part", "count"), [(0.05, 0.6, 50.0), (0.02, 0.9, 100.0)])
+def test_small_steps_of_an_actuator_are_found(size: float, part: float, count: float) -> None:
+    record = make_smooth_record(size, np.inf)
+    base, target = fit(record)
     (found,) = fit_jumping_inputs(base, target, DiagnosisRun([QUANTISED_INPUT]))
+    assert 2.0 * np.abs(record.u).max() / size > count
     step = found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)][0]
     assert step == pytest.approx(size, rel=2e-3)
     assert found.fit.mean_square**0.5 < 1.1 * 0.002 < part * base.mean_square**0.5
