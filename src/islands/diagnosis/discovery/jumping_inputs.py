@@ -188,9 +188,8 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
     target, run
         Arguments of a search, whose effects are searched for.
     """
-    plants = [base]
-    for plant in _list_equations(base, base, target, [InterSample.FOH]):
-        plants.append(calibrate(plant.simulation, target, plant.values))
+    continuous = _list_equations(base, base, target, [InterSample.FOH])
+    plants = [base, *(calibrate(each.simulation, target, each.values) for each in continuous)]
     found = []
     for effect, list_points in ((QUANTISED_INPUT, _list_steps), (STICTION, _list_breakaways)):
         if effect not in run.effects or effect in base.simulation.effects:
