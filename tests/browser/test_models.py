@@ -187,6 +187,7 @@ def test_figures_are_loaded_when_they_scroll_into_view(
     assert not [url for url in asked if "/figures/" in url]
     page.locator(".rendered").first.scroll_into_view_if_needed()
     expect(page.get_by_text("Drawing…").first).to_be_visible()
+    assert unreadable(page) == []
     page.unroute("**/figures/*")
     page.locator(".rendered").last.scroll_into_view_if_needed()
     expect(page.locator(".gallery img")).to_have_count(4, timeout=DRAWN)

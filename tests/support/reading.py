@@ -72,6 +72,20 @@ _CONTRASTS = """() => {
   return [...written, ...drawn].sort((a, b) => a[0] - b[0]);
 }"""
 
+#: Script that stops the endless animations in the middle of their course, where a text that fades is palest.
+_STOP_ANIMATIONS = """() => {
+  for (const animation of document.getAnimations()) {
+    const { duration, iterations } = animation.effect.getComputedTiming();
+    if (iterations !== Infinity) continue;
+    animation.pause();
+    animation.currentTime = duration / 2;
+  }
+}"""
+
+#: Script that continues the animations.
+_CONTINUE_ANIMATIONS = """() => document.getAnimations()
+  .filter((animation) => animation.playState === "paused").forEach((animation) => animation.play())"""
+
 #: Script that returns missing labels, wrong headings and clipped content.
 _DEFECTS = """() => {
   const all = (selector) => [...document.querySelectorAll(selector)].filter((node) => node.checkVisibility());
@@ -94,7 +108,9 @@ def unreadable(page: Any) -> list[str]:
     page.evaluate("document.fonts.ready")
     width, whole = page.evaluate("[innerWidth, document.documentElement.scrollWidth]")
     cut = [f"the page is {whole} pixels wide, the screen {width}"] if whole > width else []
+    page.evaluate(_STOP_ANIMATIONS)
     contrasts = page.evaluate(_CONTRASTS)
+    page.evaluate(_CONTINUE_ANIMATIONS)
     assert contrasts, "the page has no text"
     pale = [str(each) for each in contrasts if each[0] < _CONTRAST]
     return [*cut, *pale, *page.evaluate(_DEFECTS), *find_markup_defects(page)]
