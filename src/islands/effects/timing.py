@@ -173,7 +173,10 @@ _STARTING_RATES = 16
 
 
 def _rate_limit_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    limited: Signal = limit_rate(u, context.dt / values[0]) if values[0] > 0.0 else u
+    if values[0] <= 0.0:
+        return u
+    intervals = context.dt if context.intervals is None else context.intervals
+    limited: Signal = limit_rate(u, intervals / values[0])
     return limited
 
 
@@ -215,6 +218,7 @@ RATE_LIMIT = Effect(
     starting_points=_rate_limit_starting_points,
     form=_rate_limit_form,
     equation=lambda _: MapEquation("z0", (("limit-rate", "n0"),)),
+    acts_between_samples=True,
     is_applicable=_has_rates_to_limit,
     formula=Formula(
         "limit_rate(x, 1/r)",

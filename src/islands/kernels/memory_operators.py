@@ -49,11 +49,11 @@ def jumper(u, breakaway, x):
 
 
 @kernel
-def _limit_steps(u, step, x):
+def _limit_steps(u, steps, x):
     at = u[0]
     x[0] = at
     for k in range(1, u.size):
-        change, gap = u[k] - u[k - 1], u[k - 1] - at
+        change, gap, step = u[k] - u[k - 1], u[k - 1] - at, steps[k]
         # The fraction of the interval after which the output meets the input, which is linear in it.
         closing = np.copysign(step, gap) - change
         met = 0.0 if gap == 0.0 else 1.0
@@ -111,19 +111,34 @@ def _follow(u, dt, slow, times, x):
 
 
 #: Steps of a lag that grows with its error in a sampling interval.
-GROWING_LAG_STEPS = 4
+GROWING_LAG_STEPS = 8
+
+#: Weights of the four samples around a sampling interval in the changes of their cubic in each of its steps.
+_CUBIC_CHANGES = np.diff(
+    [
+        [
+            -s * (s - 1) * (s - 2) / 6,
+            (s * s - 1) * (s - 2) / 2,
+            -s * (s + 1) * (s - 2) / 2,
+            s * (s * s - 1) / 6,
+        ]
+        for s in np.arange(GROWING_LAG_STEPS + 1) / GROWING_LAG_STEPS
+    ],
+    axis=0,
+)
 
 
 @kernel
-def _follow_by_gap(u, step, tau, inverse_rate, x):
+def _follow_by_gap(u, weights, step, tau, inverse_rate, x):
     ratio = step / tau
     # The part of a step at which the slope is taken: exact for a constant lag, and stable for a short one.
     part = -1.0 / math.expm1(-ratio) - 1.0 / ratio
-    gap = 0.0
+    gap, last = 0.0, u.size - 1
     x[0] = u[0]
     for k in range(1, u.size):
-        change = (u[k] - u[k - 1]) / GROWING_LAG_STEPS
-        for _ in range(GROWING_LAG_STEPS):
+        before, here, after, later = u[max(k - 2, 0)], u[k - 1], u[k], u[min(k + 1, last)]
+        for row in weights:
+            change = row[0] * before + row[1] * here + row[2] * after + row[3] * later
             ahead = gap + part * change
             # The gap at that part solves gap + part step gap/(tau + inverse_rate |gap|) = ahead.
             size = abs(ahead)
@@ -144,11 +159,15 @@ def play_from(u, width):
 def limit_rate(u, step):
     """Return ``u`` (samples,) with a limited rate of change.
 
-    The output starts at ``u[0]`` and follows the input, which is linear between samples, by at most ``step``
-    in each sampling interval.
+    The output starts at ``u[0]`` and follows the input, which is linear between samples.
+
+    Parameters
+    ----------
+    step : float or ndarray, shape (samples,)
+        Largest change of the output in each sampling interval, or in the interval before each sample.
     """
     x = np.empty_like(u)
-    _limit_steps(np.ascontiguousarray(u), step, x)
+    _limit_steps(np.ascontiguousarray(u), np.broadcast_to(step, u.shape), x)
     return x
 
 
@@ -176,7 +195,7 @@ def lag_by_gap(u, dt, tau, inverse_rate):
     """Return ``u`` (samples,) with a lag that grows with its error: ``x' = e/(tau + inverse_rate |e|)``.
 
     The error ``e`` is ``u - x``, and the rate of the output is below ``1/inverse_rate``. The output starts at
-    ``u[0]``, and the input is linear between samples.
+    ``u[0]``, and the input is a cubic through four neighbouring samples.
 
     Parameters
     ----------
@@ -190,5 +209,6 @@ def lag_by_gap(u, dt, tau, inverse_rate):
     x = np.array(u)
     if tau > 0.0:
         step = dt / GROWING_LAG_STEPS
-        _follow_by_gap(np.ascontiguousarray(u), step, max(tau, LEAST_LAG * dt), inverse_rate, x)
+        least = max(tau, LEAST_LAG * dt)
+        _follow_by_gap(np.ascontiguousarray(u), _CUBIC_CHANGES, step, least, inverse_rate, x)
     return x

@@ -33,9 +33,9 @@ class SimulationRun:
         Index of the run of the same call from which this one differs by a small change. Its output is needed
         for derivatives: a simulator that fits states may fit those of this run to first order.
     characteristic : callable or None
-        Map of the input that acts on the values between samples as well, ``values -> values`` of shape
-        (values,) in the order of time; None for none. Only simulators in continuous time have runs with one.
-        Runs with the same map have the same object.
+        Map of the input that acts on the values between samples as well, ``(values, intervals) -> values`` of
+        shape (values,) in the order of time; None for none. The intervals before the values are in seconds.
+        Only simulators in continuous time have runs with one. Runs with the same map have the same object.
     """
 
     values: Signal
@@ -44,18 +44,29 @@ class SimulationRun:
     forces: Forces
     intersample_values: Signal | None = None
     near: int | None = None
-    characteristic: Callable[[Signal], Signal] | None = None
+    characteristic: Callable[[Signal, Signal], Signal] | None = None
 
     @property
     def input_key(self) -> tuple[int, int]:
         """Key of the input and its characteristic; runs with the same objects have the same one."""
         return id(self.x), id(self.characteristic)
 
-    def apply_characteristic(self, signal: Signal) -> Signal:
-        """Return values of the input after ``characteristic``; flattened, they are in the order of time."""
+    def apply_characteristic(self, signal: Signal, dt: float) -> Signal:
+        """Return values of the input after ``characteristic``.
+
+        Parameters
+        ----------
+        signal : ndarray, shape (steps,) or (steps, 3)
+            Value at the start of each step, or those at its start, in its middle and at its end.
+        dt : float
+            Duration of a step in seconds.
+        """
         if self.characteristic is None:
             return signal
-        return self.characteristic(signal.reshape(-1)).reshape(signal.shape)
+        intervals = np.full(signal.shape, dt if signal.ndim == 1 else 0.5 * dt)
+        if signal.ndim > 1:
+            intervals[:, 0] = 0.0
+        return self.characteristic(signal.reshape(-1), intervals.reshape(-1)).reshape(signal.shape)
 
 
 class Simulator(ABC):
@@ -197,10 +208,10 @@ class Simulator(ABC):
             own, x = context, run.x
             if run.intersample_values is not None:
                 moments = np.column_stack([run.x, *run.intersample_values])
-                x, *between = np.ascontiguousarray(run.apply_characteristic(moments).T)
+                x, *between = np.ascontiguousarray(run.apply_characteristic(moments, context.dt).T)
                 own = replace(context, u=x, intersample_values=np.stack(between))
             elif run.characteristic is not None:
-                x = run.apply_characteristic(run.x)
+                x = run.apply_characteristic(run.x, context.dt)
             output = self.simulate(run.values, x, own, run.effect_parameters, run.forces)
             outputs.append(output[::every])
         return np.stack(outputs)

@@ -119,7 +119,7 @@ class LinearSimulator(Simulator):
         self, runs: Sequence[SimulationRun], context: SimulationContext, every: int = 1
     ) -> Signal:
         """Simulate several runs; those with the same input share its delay, and equal forces."""
-        inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
+        inputs = {run.input_key: run.apply_characteristic(run.x, context.dt) for run in runs}
         deviations = {key: delay_samples(x, self.delay) - self.reference_input for key, x in inputs.items()}
         found = np.empty((len(runs), runs[0].x.size))
         for row, run in zip(found, runs, strict=True):

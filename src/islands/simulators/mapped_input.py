@@ -1,6 +1,7 @@
 """Input of a simulation after the maps of effects."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ class MappedInput(NamedTuple):
     """
 
     x: Signal
-    characteristic: Callable[[Signal], Signal] | None
+    characteristic: Callable[[Signal, Signal], Signal] | None
 
 
 def count_sampled_maps(effects: Sequence[Effect]) -> int:
@@ -40,9 +41,12 @@ def map_input(
     """
     last = count_sampled_maps([effect for effect, _ in maps]) if is_continuous_time else len(maps)
 
-    def apply(part: Sequence[tuple[Effect, Signal]], signal: Signal) -> Signal:
+    def apply(
+        part: Sequence[tuple[Effect, Signal]], signal: Signal, intervals: Signal | None = None
+    ) -> Signal:
+        given = replace(context, intervals=intervals)
         for effect, values in part:
-            signal = apply_map(effect, signal, values, context)
+            signal = apply_map(effect, signal, values, given)
         return signal
 
     return MappedInput(apply(maps[:last], context.u), partial(apply, maps[last:]) if maps[last:] else None)

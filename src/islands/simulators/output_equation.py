@@ -73,7 +73,7 @@ class OutputEquation(SimulatorWrapper, BatchSimulator):
         found = []
         for run, key in zip(runs, keys, strict=True):
             if run.input_key not in signals:
-                u = run.apply_characteristic(run.x)
+                u = run.apply_characteristic(run.x, context.dt)
                 signals[run.input_key] = {INPUT: u, RATE: np.gradient(u) / context.dt, TIME: context.time}
             own = dict(zip(names, run.values[count:].tolist(), strict=True))
             known = {**signals[run.input_key], SIMULATED: simulated[key], **own}

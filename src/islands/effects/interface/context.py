@@ -94,6 +94,9 @@ class SimulationContext:
         Context of all recordings, if this is the context of one of several.
     step_width : float
         Width of steps over time in samples; they are smoothed so that their instants have derivatives.
+    intervals : ndarray, shape (values,), or None
+        Seconds before each value of the signal of a map that has values between samples, zero for the second
+        one of an instant; None if its values are ``dt`` apart.
     """
 
     u: Signal
@@ -113,6 +116,7 @@ class SimulationContext:
     measured: Signal | None = None
     whole: "SimulationContext | None" = None
     step_width: float = 2.0
+    intervals: Signal | None = None
 
     def __post_init__(self) -> None:
         if self.force_coordinate is None:

@@ -69,9 +69,9 @@ class Effect:
         estimation part, for a map that jumps. Another input tells such values apart. The first value is a
         width, the others are distances. None if every change of a value changes the response.
     acts_between_samples : bool
-        Whether a map of the input depends on the order of values and not on their instants. In continuous
-        time it is then applied to the interpolated input: a dead zone or a limit is not reached at a sample,
-        but between two of them.
+        Whether a map of the input depends on the order of values, and on the ``intervals`` of the context,
+        and not on their instants. In continuous time it is then applied to the interpolated input: a dead
+        zone or a limit is not reached at a sample, but between two of them.
     is_gain : bool
         Whether the effect is a gain. Gains are searched for only if every parameter except initial states has
         a tolerance; otherwise calibration absorbs them.

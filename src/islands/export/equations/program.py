@@ -254,7 +254,10 @@ class EquationProgram(ABC):
                 lines.append(f"{self.language.declare}{result} = {value};")
             else:
                 function = "interpolate_at" if name == "interpolate" else name.replace("-", "_")
-                lines += self.apply_operator(function, result, [self.code.write(each) for each in arguments])
+                texts = [self.code.write(each) for each in arguments]
+                if name == "limit-rate":
+                    texts.append("3" if given in self.given.moment_maps else "1")
+                lines += self.apply_operator(function, result, texts)
                 local[result] = self._at(result)
         return local, lines
 

@@ -62,8 +62,9 @@ class SampledSignal:
         """Return the rate: the derivative of the parabola through the values of each step.
 
         A held signal would have impulses; its rate is that of a ramp to the next value within the step. A
-        parabola may turn next to a kink where the signal does not. The rate is then limited, so that its
-        integral and that of its magnitude by Simpson's rule are those of the signal.
+        parabola may turn next to a kink where the signal does not. The rate of a signal with kinks is such
+        that its integral and that of its magnitude by Simpson's rule are those of the signal, and continuous
+        in its values.
         """
         if self.is_held:
             rate = np.append(np.diff(self.start), 0.0) / dt
@@ -72,8 +73,9 @@ class SampledSignal:
         start, middle, end = 3.0 * first - second, first + second, 3.0 * second - first
         if self.has_kinks:
             limits = np.minimum(2.0 * middle, 0.0), np.maximum(2.0 * middle, 0.0)
-            is_monotone = first * second >= 0.0
-            start, end = (np.where(is_monotone, np.clip(each, *limits), each) for each in (start, end))
+            turns, is_late = first * second < 0.0, np.abs(first) >= np.abs(second)
+            start = np.where(turns, _choose_turning_rate(first, second, is_late), np.clip(start, *limits))
+            end = np.where(turns, _choose_turning_rate(second, first, ~is_late), np.clip(end, *limits))
         return SampledSignal.join(start / dt, middle / dt, end / dt)
 
     def refine(self, parts: int) -> "SampledSignal":
@@ -107,6 +109,19 @@ class SampledSignal:
         fine = np.append(self.moments[:, :2].reshape(-1), self.moments[-1, 2])
         places = 0.5 * np.arange(fine.size)
         return SampledSignal.join(*(np.interp(steps + part, places, fine) for part in (0.0, 0.5, 1.0)))
+
+
+def _choose_turning_rate(near: Signal, far: Signal, is_far: NDArray[np.bool_]) -> Signal:
+    """Return the rate at an end of a step in which a signal turns, times the duration of the step.
+
+    Parameters
+    ----------
+    near, far : ndarray, shape (samples,)
+        How much the signal rises in the half of the step at this end, and in the other one.
+    is_far : ndarray of bool, shape (samples,)
+        Whether the signal rises more in the half at this end, so that it turns in the other one.
+    """
+    return np.where(is_far, 2.0 * near - 4.0 * far, 6.0 * near)
 
 
 def interpolate_linearly(signal: Signal) -> SampledSignal:

@@ -159,7 +159,7 @@ class OdeSimulator(BatchSimulator):
         else:
             outputs = self._fit_shots(self.shots, program, active, runs, context)[:, ::every]
         if not self._has_force_equation and runs[0].forces:
-            inputs = {run.input_key: run.apply_characteristic(run.x) for run in runs}
+            inputs = {run.input_key: run.apply_characteristic(run.x, context.dt) for run in runs}
             coordinates = [inputs[run.input_key] for run in runs]
             further = sum_output_forces(coordinates, context, [run.forces for run in runs])
             outputs = outputs + further[:, ::every]
@@ -258,7 +258,7 @@ class OdeSimulator(BatchSimulator):
                 if id(run.x) not in refined:
                     refined[id(run.x)] = refine_input(run.x, self._get_between(run, context), steps)
                 moments = refined[id(run.x)].moments
-                mapped = run.apply_characteristic(moments)
+                mapped = run.apply_characteristic(moments, context.dt / steps)
                 made[run.input_key] = SampledSignal(mapped, has_kinks=run.characteristic is not None)
             driving = made[run.input_key]
             if not isinstance(gain, float):

@@ -1,4 +1,4 @@
-"""Maps of the input: static ones, a play and stick-slip act on the values between samples as well."""
+"""Maps of the input: static ones, play, stick-slip and a rate limit act on the values between samples too."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from support.simulated_records import DT, recorded, wave
 Array = NDArray[np.float64]
 
 BETWEEN = sorted(name for name, effect in CATALOGUE.items() if effect.acts_between_samples)
-STATIC = [name for name in BETWEEN if name not in ("backlash", "stiction")]
+STATIC = [name for name in BETWEEN if name not in ("backlash", "stiction", "rate-limit")]
 
 OSCILLATOR = make_oscillator(0.5, 4.0, 200.0)
 
@@ -30,10 +30,12 @@ def record_of(u: Array, dt: float = DT) -> Dataset:
     return recorded(u, u, dt)
 
 
-def simulate(simulator: Simulator, record: Dataset, effects: tuple[Effect, ...]) -> Array:
+def simulate(
+    simulator: Simulator, record: Dataset, effects: tuple[Effect, ...], values: Array | None = None
+) -> Array:
     context = make_context(record, simulator, record.samples)
     simulation = ExtendedSimulator(simulator, effects, context)
-    return simulation.simulate(set_values(simulation))
+    return simulation.simulate(set_values(simulation) if values is None else values)
 
 
 def set_values(simulation: ExtendedSimulator) -> Array:
@@ -55,7 +57,8 @@ def test_a_static_map_acts_on_each_value_alone(name: str) -> None:
     order = np.random.default_rng(4).permutation(record.samples)
     _, mapped = map_input([(effect, values)], context, is_continuous_time=True)
     assert mapped is not None
-    assert np.array_equal(mapped(context.u[order]), mapped(context.u)[order])
+    intervals = np.zeros(record.samples)
+    assert np.array_equal(mapped(context.u[order], intervals), mapped(context.u, intervals)[order])
 
 
 @pytest.mark.parametrize("name", BETWEEN)
@@ -64,22 +67,24 @@ def test_a_map_of_a_linear_input_is_that_of_a_denser_record(name: str) -> None:
     times = np.arange(TIMES * (u.size - 1) + 1) / TIMES
     dense = record_of(np.interp(times, np.arange(u.size), u), DT / TIMES)
     effects = (CATALOGUE[name],)
-    exact = simulate(OSCILLATOR, dense, effects)[::TIMES]
-    found = simulate(ResampledSimulator(OSCILLATOR, oversampling=8), record_of(u), effects)
     context = make_context(record_of(u), OSCILLATOR, u.size)
     simulation = ExtendedSimulator(OSCILLATOR, effects, context)
-    values = set_values(simulation)[simulation.get_slice(effects[0])]
-    sampled, _ = map_input([(effects[0], values)], context, is_continuous_time=False)
+    values = set_values(simulation)
+    exact = simulate(OSCILLATOR, dense, effects, values)[::TIMES]
+    found = simulate(ResampledSimulator(OSCILLATOR, oversampling=8), record_of(u), effects, values)
+    own = values[simulation.get_slice(effects[0])]
+    sampled, _ = map_input([(effects[0], own)], context, is_continuous_time=False)
     of_samples = simulate(ResampledSimulator(OSCILLATOR, oversampling=8), record_of(sampled), ())
     error, coarse = (float(np.sqrt(np.mean((each - exact) ** 2))) for each in (found, of_samples))
     assert error < 0.1 * coarse
 
 
-def test_a_play_reaches_the_peaks_of_a_band_limited_input_between_samples() -> None:
+@pytest.mark.parametrize("name", ["backlash", "rate-limit"])
+def test_a_map_follows_a_band_limited_input_between_samples(name: str) -> None:
     """The input has four samples for each period: at the samples alone, it turns too early."""
     times = np.arange(TIMES * 400) / TIMES
     u = sum(np.sin(2 * np.pi * f * times + 9.0 * f) for f in (0.05, 0.11, 0.17, 0.23))
-    effects = (CATALOGUE["backlash"],)
+    effects = (CATALOGUE[name],)
     dense, sampled = record_of(np.asarray(u), DT / TIMES), record_of(np.asarray(u)[::TIMES])
     simulator = ResampledSimulator(OSCILLATOR, InterSample.BAND_LIMITED, 8)
     context = make_context(sampled, simulator, sampled.samples)
@@ -96,7 +101,7 @@ def test_a_play_reaches_the_peaks_of_a_band_limited_input_between_samples() -> N
     assert error < 0.1 * coarse
 
 
-@pytest.mark.parametrize("name", BETWEEN)
+@pytest.mark.parametrize("name", [name for name in BETWEEN if name != "rate-limit"])
 def test_a_map_of_a_held_input_is_that_of_its_samples(name: str) -> None:
     record = record_of(np.repeat(wave(150), 4))
     held = ResampledSimulator(OSCILLATOR, InterSample.ZOH, 4)
@@ -109,12 +114,22 @@ def test_a_map_of_a_held_input_is_that_of_its_samples(name: str) -> None:
     )
 
 
+def test_a_rate_limit_of_a_held_input_makes_ramps() -> None:
+    record, effects = record_of(np.repeat(wave(80), 5)), (CATALOGUE["rate-limit"],)
+    held = ResampledSimulator(OSCILLATOR, InterSample.ZOH, 16)
+    simulation = ExtendedSimulator(held, effects, make_context(record, held, record.samples))
+    values = set_values(simulation)
+    dense = record_of(np.repeat(record.u[:, 0], TIMES), DT / TIMES)
+    exact = simulate(ResampledSimulator(OSCILLATOR, InterSample.ZOH), dense, effects, values)[::TIMES]
+    assert simulation.simulate(values) == pytest.approx(exact, abs=1e-3 * np.ptp(exact))
+
+
 def test_a_static_map_before_another_map_acts_on_the_samples() -> None:
-    """A rate limit needs samples, and the order of the maps is kept."""
+    """A delay needs samples, and the order of the maps is kept."""
     record = record_of(wave())
     context = make_context(record, OSCILLATOR, record.samples)
-    zone, limit = CATALOGUE["dead-zone"], CATALOGUE["rate-limit"]
-    maps = [(each, np.array(each.starting_points(context, context.u)[0])) for each in (zone, limit)]
+    zone, delay = CATALOGUE["dead-zone"], CATALOGUE["delay"]
+    maps = [(each, np.array(each.starting_points(context, context.u)[0])) for each in (zone, delay)]
     x, characteristic = map_input(maps, context, is_continuous_time=True)
     assert characteristic is None
     assert np.array_equal(x, map_input(maps, context, is_continuous_time=False).x)

@@ -354,14 +354,19 @@ static double find_rate(
 
 """,
         "find_limited_rate": """\
-/* Return the rate of a signal with kinks: as find_rate, but a signal that does not turn has no other sign. */
+/* Return the rate of a signal with kinks: its integral, and that of its magnitude, are those of the signal by
+   Simpson's rule. */
 static double find_limited_rate(
     read_signal read, const struct parameters *p, const struct record *r, size_t step, double part)
 {
     const double middle = read(p, r, step, 0.5);
     const double rise = middle - read(p, r, step, 0.0), second = read(p, r, step, 1.0) - middle;
     const double rate = 3.0*rise - second + 4.0*part*(second - rise), largest = 2.0*(rise + second);
-    return (rise*second < 0.0 ? rate : fmin(fmax(rate, fmin(largest, 0.0)), fmax(largest, 0.0)))/STEP;
+    const double near = part < 0.5 ? rise : second, far = part < 0.5 ? second : rise;
+    const int is_late = fabs(rise) >= fabs(second);
+    if (part == 0.5) return (rise + second)/STEP;
+    if (rise*second < 0.0) return ((part < 0.5) == is_late ? 2.0*near - 4.0*far : 6.0*near)/STEP;
+    return fmin(fmax(rate, fmin(largest, 0.0)), fmax(largest, 0.0))/STEP;
 }
 
 """,

@@ -101,13 +101,15 @@ static void slider(const double *x, double *z, size_t samples, double breakaway)
 }
 """,
         "limit-rate": """\
-/* Rate limiter: z follows x, which is linear between samples, by at most a rate per second. */
-static void limit_rate(const double *x, double *z, size_t samples, double inverse_rate)
+/* Rate limiter: z follows x, which is linear between its values, by at most a rate per second. There is one
+   value for each sample, or three for each step: at its start, in its middle and at its end. */
+static void limit_rate(const double *x, double *z, size_t count, double inverse_rate, int values)
 {
-    const double step = inverse_rate > 0.0 ? DT/inverse_rate : INFINITY;
     double at = x[0];
     z[0] = at;
-    for (size_t k = 1; k < samples; ++k) {
+    for (size_t k = 1; k < count; ++k) {
+        const double interval = values == 1 ? DT : k % 3 == 0 ? 0.0 : 0.5*STEP;
+        const double step = inverse_rate > 0.0 ? interval/inverse_rate : INFINITY;
         const double change = x[k] - x[k-1], gap = x[k-1] - at, closing = copysign(step, gap) - change;
         const double met = gap*closing > 0.0 ? gap/closing : gap == 0.0 ? 0.0 : 1.0;
         if (met >= 1.0) at += copysign(step, gap);
@@ -146,20 +148,27 @@ static void lag_unevenly(const double *x, double *z, size_t samples, double slow
 }
 """,
         "lag-by-gap": """\
-/* Lag of x, which is linear between samples, that grows with the gap: z' = gap/(tau + inverse_rate*|gap|). */
+/* Lag of x, a cubic through four neighbouring samples, that grows with the gap:
+   z' = gap/(tau + inverse_rate*|gap|). */
 static void lag_by_gap(const double *x, double *z, size_t samples, double tau, double inverse_rate)
 {
-    const double step = DT/4.0, least = fmax(tau, 1e-9*DT), ratio = step/least;
+    const double step = DT/8.0, least = fmax(tau, 1e-9*DT), ratio = step/least;
     const double part = -1.0/expm1(-ratio) - 1.0/ratio;
     double gap = 0.0;
     z[0] = x[0];
     for (size_t k = 1; k < samples; ++k) {
-        for (int turn = 0; turn < 4 && tau > 0.0; ++turn) {
-            const double ahead = gap + part*(x[k] - x[k-1])/4.0, size = fabs(ahead);
+        const double before = x[k > 1 ? k - 2 : 0], after = x[k + 1 < samples ? k + 1 : samples - 1];
+        double at = x[k-1];
+        for (int turn = 1; turn <= 8 && tau > 0.0; ++turn) {
+            const double s = turn/8.0;
+            const double next = s*(s - 1.0)*((s + 1.0)*after - (s - 2.0)*before)/6.0
+                                + (s + 1.0)*(s - 2.0)*((s - 1.0)*x[k-1] - s*x[k])/2.0;
+            const double ahead = gap + part*(next - at), size = fabs(ahead);
             const double half = 0.5*(least + part*step - inverse_rate*size);
             const double root = sqrt(half*half + inverse_rate*size*least);
             const double middle = half > 0.0 ? size*least/(half + root) : (root - half)/inverse_rate;
             gap += (copysign(middle, ahead) - gap)/part;
+            at = next;
         }
         z[k] = x[k] - gap;
     }

@@ -294,13 +294,24 @@ end
 """,
         "find_limited_rate": """\
 function rate = find_limited_rate(read, step, part, c)
-% Rate of a signal with kinks: as find_rate, but a signal that does not turn has no other sign.
+% Rate of a signal with kinks: its integral and that of its magnitude (Simpson's rule) are those of the signal.
   middle = read(step, 0.5);
   rise = middle - read(step, 0);
   second = read(step, 1) - middle;
   rate = 3*rise - second + 4*part*(second - rise);
   largest = 2*(rise + second);
-  if rise*second >= 0, rate = min(max(rate, min(largest, 0)), max(largest, 0)); end
+  ends = [rise, second, rise];
+  near = ends(1 + (part > 0.5));
+  far = ends(2 + (part > 0.5));
+  if part == 0.5
+    rate = rise + second;
+  elseif rise*second >= 0
+    rate = min(max(rate, min(largest, 0)), max(largest, 0));
+  elseif (part < 0.5) == (abs(rise) >= abs(second))
+    rate = 2*near - 4*far;
+  else
+    rate = 6*near;
+  end
   rate = rate/c.step;
 end
 

@@ -76,12 +76,15 @@ function z = slider(x, breakaway, c)
 end
 """,
         "limit-rate": """\
-function z = limit_rate(x, inverse_rate, c)
-% Rate limiter: z follows x, which is linear between samples, by at most a rate per second.
+function z = limit_rate(x, inverse_rate, values, c)
+% Rate limiter: z follows x, which is linear between its values, by at most a rate per second. There is one
+% value for each sample, or three for each step: at its start, in its middle and at its end.
   z = x;
   if ~(inverse_rate > 0), return; end
-  step = c.dt/inverse_rate;
+  steps = c.dt/inverse_rate;
+  if values == 3, steps = [0, c.step/2, c.step/2]/inverse_rate; end
   for k = 2:numel(x)
+    step = steps(mod(k - 1, values) + 1);
     change = x(k) - x(k-1);
     gap = x(k-1) - z(k-1);
     met = double(gap ~= 0);
@@ -135,17 +138,23 @@ end
 """,
         "lag-by-gap": """\
 function z = lag_by_gap(x, tau, inverse_rate, c)
-% Lag of x, which is linear between samples, that grows with the gap: z' = gap/(tau + inverse_rate*abs(gap)).
+% Lag of x, a cubic through four neighbouring samples, that grows with the gap:
+% z' = gap/(tau + inverse_rate*abs(gap)).
   z = x;
   if ~(tau > 0), return; end
   tau = max(tau, 1e-9*c.dt);
-  ratio = c.dt/4/tau;
+  ratio = c.dt/8/tau;
   part = -1/expm1(-ratio) - 1/ratio;
   gap = 0;
   for k = 2:numel(x)
-    for turn = 1:4
-      ahead = gap + part*(x(k) - x(k-1))/4;
-      half = 0.5*(tau + part*c.dt/4 - inverse_rate*abs(ahead));
+    before = x(max(k - 2, 1));
+    after = x(min(k + 1, numel(x)));
+    at = x(k-1);
+    for s = (1:8)/8
+      next = s*(s - 1)*((s + 1)*after - (s - 2)*before)/6 ...
+        + (s + 1)*(s - 2)*((s - 1)*x(k-1) - s*x(k))/2;
+      ahead = gap + part*(next - at);
+      half = 0.5*(tau + part*c.dt/8 - inverse_rate*abs(ahead));
       root = sqrt(half*half + inverse_rate*abs(ahead)*tau);
       if half > 0
         middle = abs(ahead)*tau/(half + root);
@@ -153,6 +162,7 @@ function z = lag_by_gap(x, tau, inverse_rate, c)
         middle = (root - half)/inverse_rate;
       end
       gap = gap + (sign(ahead)*middle - gap)/part;
+      at = next;
     end
     z(k) = x(k) - gap;
   end
