@@ -57,9 +57,16 @@ def _find_cancelled(
             break
         alone = dict(zip(pair[::-1], remove_each(hypothesis, pair, target), strict=True))
         kept, other = sorted(pair, key=lambda each: alone[each].cost)
-        if sizes[pair] < MAX_CANCELLED or not _gain_alone(alone, target, rng):
+        if sizes[pair] < MAX_CANCELLED or not (
+            _whiten_together(hypothesis, alone) or _gain_alone(alone, target, rng)
+        ):
             return kept, other, alone[kept]
     return None
+
+
+def _whiten_together(hypothesis: Hypothesis, alone: Mapping[Effect, Hypothesis]) -> bool:
+    """Return whether two effects leave white noise, and neither of them alone does."""
+    return not hypothesis.fit.noise.order and all(each.fit.noise.order for each in alone.values())
 
 
 def _gain_alone(alone: Mapping[Effect, Hypothesis], target: Target, rng: np.random.Generator) -> bool:

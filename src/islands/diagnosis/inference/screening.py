@@ -66,10 +66,15 @@ class ScreenedEffect:
 
 def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     """Return the BIC penalty of an effect: log n for each of its degrees of freedom."""
+    return count_degrees(effect, base) * float(np.log(base.noise.effective_samples))
+
+
+def count_degrees(effect: Effect, base: CalibrationResult) -> int:
+    """Count the degrees of freedom of an effect: its values in all recordings, and its selected instants."""
     parameters = effect.parameters(base.simulation.context)
     further_recordings = max(len(base.simulation.parts) - 1, 0)
     values = len(parameters) + further_recordings * sum(each.initial for each in parameters)
-    return (values + effect.extra_degrees_of_freedom) * float(np.log(base.noise.effective_samples))
+    return values + effect.extra_degrees_of_freedom
 
 
 def compute_cost(fit: CalibrationResult, base: CalibrationResult) -> float:

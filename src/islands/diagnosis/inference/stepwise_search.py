@@ -18,7 +18,7 @@ from islands.diagnosis.inference.hypothesis import (
     screen_others,
     with_effect,
 )
-from islands.diagnosis.inference.screening import SCORE_TIE, ScreenedEffect
+from islands.diagnosis.inference.screening import SCORE_TIE, ScreenedEffect, count_degrees
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects import model_form
 from islands.effects.interface.effect import Effect
@@ -201,11 +201,13 @@ def refine_by_swaps(
             candidates += [each for each in larger if each.cost < hypothesis.cost - min_gain]
         best = min(candidates, key=attrgetter("rank"), default=hypothesis)
         if best.cost > hypothesis.cost - SCORE_TIE:
-            smaller = _find_smaller(hypothesis, alternatives, target, min_gain, run)
-            if smaller is None:
+            other = _find_smaller(hypothesis, alternatives, target, min_gain, run)
+            if other is None and _count_causes(hypothesis) < max_effects:
+                other = _split_effect(hypothesis, target, min_gain, run)
+            if other is None:
                 return replace(hypothesis, alternatives=alternatives), target
-            complete = smaller.effects
-            (hypothesis,), target = refit_with_ar_noise([smaller], target)
+            complete = other.effects
+            (hypothesis,), target = refit_with_ar_noise([other], target)
             continue
         if set(best.effects) == set(hypothesis.effects) and best.cost > hypothesis.cost - MIN_GAIN:
             # Same effects with slightly better values: another pass would not find others.
@@ -239,6 +241,27 @@ def _find_smaller(
     reduced = [eliminate_backward(each, target, min_gain, run) for each in near]
     smaller = [each for each in reduced if each.cost < limit and len(each.effects) < len(hypothesis.effects)]
     return min(smaller, key=attrgetter("rank"), default=None)
+
+
+def _split_effect(
+    hypothesis: Hypothesis, target: Target, min_gain: float, run: DiagnosisRun
+) -> Hypothesis | None:
+    """Return a hypothesis with two effects of a family in place of one with more values; None if not better.
+
+    An effect that imitates two others explains more than either of them: the beam does not reach both.
+    """
+    if target.effective_samples is not None:
+        return None
+    fit, found = hypothesis.fit, []
+    flexible = [each for each in hypothesis.effects if count_degrees(each, fit) > 2]
+    reduced = remove_each(hypothesis, flexible, target, run.parallel_map)
+    for effect, without in zip(flexible, reduced, strict=True):
+        others = [each for each in run.effects if each.family == effect.family and each is not effect]
+        family = run.with_effects(others)
+        firsts = [with_effect(without, each) for each in screen_others(without, target, family)[:BEAM_WIDTH]]
+        found += _extend_beam(((first, screen_others(first, target, family)[:1]) for first in firsts), None)
+    better = [each for each in found if each.cost < hypothesis.cost - min_gain]
+    return min(better, key=attrgetter("rank"), default=None)
 
 
 def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:

@@ -57,7 +57,7 @@ MIN_SINGLE_FRACTION = 0.1
 
 #: Largest mean square with an effect, relative to that without effects, for which effects are added by
 #: ordinary least squares. Drifts seldom explain as much of coloured noise.
-MAX_UNWEIGHTED_RATIO = 0.5
+MAX_UNWEIGHTED_RATIO = 0.8
 
 #: Probability that a residual without a cause is searched for model error.
 CHANCE_PROBABILITY = 0.1

@@ -294,7 +294,8 @@ end
 """,
         "find_limited_rate": """\
 function rate = find_limited_rate(read, step, part, c)
-% Rate of a signal with kinks: its integral and that of its magnitude (Simpson's rule) are those of the signal.
+% Rate of a signal with kinks: its integral, and that of its magnitude, are those of the signal by
+% Simpson's rule.
   middle = read(step, 0.5);
   rise = middle - read(step, 0);
   second = read(step, 1) - middle;

@@ -94,6 +94,24 @@ def test_opposed_effects_have_to_gain_without_each_other(seed: int, monkeypatch:
     assert resolve_cancellation(hypothesis, with_model_error, np.random.default_rng(0))[0] is hypothesis
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_opposed_effects_that_only_together_leave_white_noise_are_two(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cancellation, "cross_validate_gain", lambda *_: -1.0)
+    rng = np.random.default_rng(seed)
+    u = np.sin(0.02 * np.arange(SAMPLES)) + np.sin(0.0334 * np.arange(SAMPLES))
+    error = 0.3 * u**3 - 0.4 * np.abs(u) * u
+    record = Dataset(u, u + error + 0.01 * rng.standard_normal(SAMPLES), 0.1)
+    simulator, target, effects = RecordedOutput("theirs", u), make_target(record, 600, {}), (QUADRATIC, CUBIC)
+    simulation = ExtendedSimulator(simulator, effects, make_context(record, simulator, 600))
+    found = calibrate(simulation, target, simulation.nominal)
+    penalties = sum(bic_penalty(each, found) for each in effects)
+    hypothesis = Hypothesis(found, found.score + penalties, effects)
+    assert MAX_CANCELLED < measure_cancellation(hypothesis, effects, target) < MAX_OPPOSED
+    assert resolve_cancellation(hypothesis, target, rng) == (hypothesis, {})
+
+
 @pytest.mark.nightly
 def test_causes_of_a_diagnosis_do_not_cancel() -> None:
     """An input between samples that no intersample behaviour has is made up for by creeps of both signs."""
