@@ -16,7 +16,7 @@ def context() -> SimulationContext:
     u = 40 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.11 * time)
     channels = {"T_K": np.cumsum(rng.normal(size=time.size)), "w_V": rng.normal(size=time.size)}
     units = {"T_K": "K", "w_V": "V"}
-    return SimulationContext(u, 0.01, channels, units, 40.0, 33.0, "V", "um", 11.0, measured=u)
+    return SimulationContext(u, 0.01, channels, units, 40.0, 33.0, "V", "um", 11.0, measured=0.8 * u)
 
 
 @pytest.fixture(scope="module")

@@ -150,11 +150,15 @@ DEAD_ZONE = Effect(
 
 #: Starting points of a saturation, as parts of the peak that it cuts off.
 _INPUT_CUTS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
-_OUTPUT_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
+_OUTPUT_CUTS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
+
+#: Largest part of the peak that a saturation cuts off, and largest part by which the limit of an output
+#: exceeds the peak of the nominal simulation. The calibrated output may be larger than that.
+_MAX_CUT, _MAX_EXCESS = 0.8, 0.5
 
 
-def _write_limit(peak: float) -> str:
-    level = f"{peak}*(1 - max(n0, 0))"
+def _write_limit(peak: float, cut: str) -> str:
+    level = f"{peak}*(1 - {cut})"
     return f"min(max(x, -({level})), {level})"
 
 
@@ -163,7 +167,7 @@ def _write_clip(get_range: Callable[[SimulationContext], tuple[float, str]]) -> 
 
     def list_quantities(values: Signal, context: SimulationContext) -> tuple[FormulaQuantity, ...]:
         peak, unit = get_range(context)
-        return (FormulaQuantity("L", peak * (1.0 - max(float(values[0]), 0.0)), unit),)
+        return (FormulaQuantity("L", peak * (1.0 - float(values[0])), unit),)
 
     return Formula(
         "clip(x, -L, L)", quantities=list_quantities, note="clip({x}, -{L}, {L}) is {x}, limited to +-{L}"
@@ -175,8 +179,8 @@ def _input_saturation_form(u: Signal, values: Signal, context: SimulationContext
     return np.clip(u, -level, level)
 
 
-def _saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
+def _input_saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("cut", "", 0.0, 0.02, 0.0, _MAX_CUT),)
 
 
 INPUT_SATURATION = Effect(
@@ -185,10 +189,10 @@ INPUT_SATURATION = Effect(
     summary="Saturation of the amplifier: u is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.INPUT,
-    parameters=_saturation_parameters,
+    parameters=_input_saturation_parameters,
     starting_points=lambda _context, _residual: tuple((cut,) for cut in _INPUT_CUTS),
     form=_input_saturation_form,
-    equation=lambda context: MapEquation(_write_limit(context.input_peak)),
+    equation=lambda context: MapEquation(_write_limit(context.input_peak, "max(n0, 0)")),
     acts_between_samples=True,
     formula=_write_clip(lambda context: (context.input_peak, context.input_unit)),
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
@@ -200,8 +204,22 @@ INPUT_SATURATION = Effect(
 
 
 def _output_saturation_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    level = context.output_peak * (1.0 - max(values[0], 0.0))
-    return np.clip(y, -level, level) if values[0] > 0.0 else y
+    level = context.output_peak * (1.0 - values[0])
+    return np.clip(y, -level, level) if values[0] else y
+
+
+def _output_saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("cut", "", 0.0, 0.02, -_MAX_EXCESS, _MAX_CUT),)
+
+
+def _output_saturation_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    """Return limits below the largest measured value: a record reaches its limit, but for the noise."""
+    measured = context.measured
+    peak = context.output_peak if measured is None else float(np.max(np.abs(measured)))
+    cuts = (1.0 - (1.0 - cut) * peak / context.output_peak for cut in _OUTPUT_CUTS)
+    return tuple((cut,) for cut in cuts if -_MAX_EXCESS < cut < _MAX_CUT)
 
 
 OUTPUT_SATURATION = Effect(
@@ -210,10 +228,10 @@ OUTPUT_SATURATION = Effect(
     summary="Saturation of the sensor: y is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.OUTPUT,
-    parameters=_saturation_parameters,
-    starting_points=lambda _context, _residual: tuple((cut,) for cut in _OUTPUT_CUTS),
+    parameters=_output_saturation_parameters,
+    starting_points=_output_saturation_starting_points,
     form=_output_saturation_form,
-    equation=lambda context: MapEquation(f"where(n0, {_write_limit(context.output_peak)}, x)"),
+    equation=lambda context: MapEquation(f"where(abs(n0), {_write_limit(context.output_peak, 'n0')}, x)"),
     formula=_write_clip(lambda context: (context.output_peak, context.output_unit)),
     source="Doebelin, Measurement Systems, section 3",
     linear_parameters=0,

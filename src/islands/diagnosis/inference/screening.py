@@ -13,8 +13,8 @@ from islands.diagnosis.calibration.starts_calibrator import CalibrationTask, cal
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.closed_loop import acts_at_once
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import ACTUATOR_MAPS
-from islands.effects.interface.effect import Effect, Signal, invalid_effect_error
+from islands.effects.catalogue import ACTUATOR_MAPS, SENSOR_MAPS
+from islands.effects.interface.effect import Effect, Signal, Site, invalid_effect_error
 from islands.simulators.extended import ExtendedSimulator
 
 #: Maximum number of starting points per effect that are calibrated.
@@ -278,17 +278,26 @@ def choose_orders(screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
 def list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulator]:
     """Return the simulations of a fit with one additional effect, in each place where it may act.
 
-    The first place is that of the catalogue. A map of an actuator may act on the other side of the others.
+    The first place is that of the catalogue. A map of an actuator may act on the other side of the others,
+    and a map of a sensor on the other side of the other maps of the output.
     """
     simulation = _extend(base, effect)
     known = base.simulation.effects
-    places = [place for place, each in enumerate(known) if each in ACTUATOR_MAPS]
-    if effect not in ACTUATOR_MAPS or not places:
+    places = [place for place, each in enumerate(known) if _depends_on_order(effect, each)]
+    if not places:
         return [simulation]
     is_first = simulation.effects.index(effect) <= places[0]
     place = places[-1] + 1 if is_first else places[0]
     effects = (*known[:place], effect, *known[place:])
     return [simulation, replace(simulation, effects=effects)]
+
+
+def _depends_on_order(effect: Effect, other: Effect) -> bool:
+    """Return whether the response to two effects depends on the order in which they act."""
+    if effect in ACTUATOR_MAPS:
+        return other in ACTUATOR_MAPS
+    are_maps = all(each.site == Site.OUTPUT and not each.is_free for each in (effect, other))
+    return are_maps and (effect in SENSOR_MAPS or other in SENSOR_MAPS)
 
 
 def _sum_squares(signal: Signal) -> float:
