@@ -21,7 +21,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.equation_simulator import find_equations
-from islands.diagnosis.discovery.jumping_inputs import fit_jumping_inputs
+from islands.diagnosis.discovery.jumping_inputs import find_stick_slip, fit_jumping_inputs
 from islands.diagnosis.discovery.state_equations import list_process_fits, list_state_fits
 from islands.diagnosis.discovery.unsigned_output import fit_unsigned_output
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
@@ -82,6 +82,10 @@ def search_inner_effects(
     has_inner = inner.effect in fit.simulation.effects
     if has_inner and get_discretisation(fit.simulation.simulator) != get_discretisation(simulator):
         searched = _search_with(replace(inner, fit=fit), base, target, own)
+    if (slipping := find_stick_slip(searched.hypothesis, searched.target, run)) is not None:
+        inner = slipping
+        own = run.with_effects(list_effects(simulator, run, [inner.effect]))
+        searched = _search_with(inner, base, target, own)
     found = assess_evidence(searched, own)
     possible = [inner.effect, *_list_inner_effects(simulator, run)]
     is_inner = any(effect in possible for effect in found.hypothesis.effects)

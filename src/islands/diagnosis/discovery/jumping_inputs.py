@@ -28,16 +28,18 @@ from islands.diagnosis.discovery.state_equations import (
     make_fitted_record,
     transfer_linear_values,
 )
+from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.screening import (
     ScreenedEffect,
     choose_orders,
+    compute_cost,
     list_orders,
     transfer_effects,
     transfer_parameters,
 )
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.hysteresis import STICTION, is_held, stick
+from islands.effects.hysteresis import BACKLASH, STICTION, is_held, stick
 from islands.effects.interface.effect import Effect, Signal, Site, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.errors import RecordError
@@ -202,6 +204,22 @@ def fit_jumping_inputs(base: CalibrationResult, target: Target, run: DiagnosisRu
                 own += _search_orders(effect, plant, target, list_points)
         found += own
     return choose_orders(found)
+
+
+def find_stick_slip(hypothesis: Hypothesis, target: Target, run: DiagnosisRun) -> ScreenedEffect | None:
+    """Return stick-slip in place of steps and a play, if that has the lower cost; None otherwise.
+
+    With a play of half a step they are the same: a slider moves by the breakaway distance each time.
+    """
+    fit, pair = hypothesis.fit, (QUANTISED_INPUT, BACKLASH)
+    if not {*pair} <= {*hypothesis.effects} or STICTION not in run.effects:
+        return None
+    others = [each for each in fit.simulation.effects if each not in pair]
+    simulation = fit.simulation.with_effects((*others, STICTION))
+    step = fit.values[fit.simulation.get_slice(QUANTISED_INPUT)][:1]
+    found = search_jumps(_calibrate(fit, simulation, STICTION, step, target), target)
+    is_better = compute_cost(found, fit) < compute_cost(fit, fit)
+    return ScreenedEffect(STICTION, found) if is_better else None
 
 
 def _list_equations(

@@ -11,15 +11,16 @@ from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.discovery.jumping_inputs import fit_jumping_inputs
+from islands.diagnosis.discovery.jumping_inputs import find_stick_slip, fit_jumping_inputs
 from islands.diagnosis.discovery.state_equations import get_linear
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.resolved_effects import remove_unresolved
-from islands.diagnosis.inference.screening import screen_effects
+from islands.diagnosis.inference.screening import compute_cost, screen_effects, transfer_parameters
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.hysteresis import STICTION
+from islands.effects.hysteresis import BACKLASH, STICTION
+from islands.effects.hysteresis import stick as stick_between_samples
 from islands.effects.interface.effect import Signal
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.kernels.memory_operators import play_from
@@ -174,6 +175,28 @@ def test_steps_are_found_behind_a_play_though_the_catalogue_has_them_before_it()
     assert simulation.effects == (play, QUANTISED_INPUT)
     width, step = (found.fit.values[simulation.get_slice(each)][0] for each in simulation.effects)
     assert (width, step) == (pytest.approx(0.15, rel=0.03), pytest.approx(0.2, rel=0.01))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_steps_and_a_play_of_half_a_step_are_stick_slip(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u = lfilter([0.1], [1.0, -0.9], rng.standard_normal(1200))
+    x = lfilter([0.0, 0.3], [1.0, -0.9, 0.2], stick_between_samples(u, 0.2))
+    base, target = fit(Dataset(u, x + 0.01 * rng.standard_normal(u.size), 0.1, ("u_V",), "y_V", ("V",), "V"))
+    pair = (QUANTISED_INPUT, BACKLASH)
+    simulation = base.simulation.with_effects(pair)
+    start = transfer_parameters(base.values, base.simulation, simulation)
+    start[simulation.get_slice(QUANTISED_INPUT)] = 0.2, u[0] % 0.2 - 0.1
+    start[simulation.get_slice(BACKLASH)] = 0.095
+    is_given = np.arange(start.size) >= start.size - 3
+    together = calibrate(simulation, target, start, is_fixed=is_given)
+    assert together.mean_square**0.5 < 0.013
+    hypothesis = Hypothesis(together, compute_cost(together, together), pair)
+    found = find_stick_slip(hypothesis, target, DiagnosisRun([STICTION]))
+    assert found is not None
+    assert found.fit.values[found.fit.simulation.get_slice(STICTION)] == pytest.approx([0.2], rel=1e-3)
+    assert found.fit.mean_square**0.5 == pytest.approx(0.01, rel=0.1)
+    assert find_stick_slip(hypothesis, target, DiagnosisRun(pair)) is None
 
 
 def test_search_is_limited_to_the_effects_of_a_diagnosis() -> None:
