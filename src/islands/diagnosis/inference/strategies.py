@@ -55,9 +55,9 @@ WITH_MODEL_ERROR = "with model error: "
 MIN_SINGLE_FRACTION = 0.1
 
 
-#: Largest mean square with an effect, relative to that without effects, for which effects are added by
-#: ordinary least squares. Drifts seldom explain as much of coloured noise.
-MAX_UNWEIGHTED_RATIO = 0.8
+#: Largest mean square with one effect more, relative to that without it, for which effects are added by
+#: ordinary least squares. Next to a true one, others have 0.88 or more of autoregressive noise.
+MAX_UNWEIGHTED_RATIO = 0.85
 
 #: Probability that a residual without a cause is searched for model error.
 CHANCE_PROBABILITY = 0.1
@@ -141,21 +141,23 @@ def search_with_ar_noise(
     hypothesis, found_target = stepwise_search(base, screened, target, run)
     if hypothesis.fit.noise.order:
         joint = _add_unweighted(*unweighted, run)
-        if joint.cost < hypothesis.cost - MIN_GAIN:
-            hypothesis, found_target = stepwise_search(base, screened, target, run, start=joint)
+        if len(joint.effects) > 1:
+            other, other_target = stepwise_search(base, screened, target, run, start=joint)
+            if other.cost < hypothesis.cost - MIN_GAIN:
+                hypothesis, found_target = other, other_target
     return make_outcome(base, screened, found_target, hypothesis)
 
 
 def _add_unweighted(
     base: CalibrationResult, screened: Sequence[ScreenedEffect], target: Target, run: DiagnosisRun
 ) -> Hypothesis:
-    """Add effects by ordinary least squares, as long as most of the misfit is explained.
+    """Add effects by ordinary least squares, as long as each explains a part of what the others leave.
 
     A noise model takes the responses to several effects for noise as long as one of them is missing.
     """
     hypothesis = Hypothesis(base, base.score, ())
     for _ in range(MAX_EFFECTS):
-        if not screened or screened[0].fit.mean_square > MAX_UNWEIGHTED_RATIO * base.mean_square:
+        if not screened or screened[0].fit.mean_square > MAX_UNWEIGHTED_RATIO * hypothesis.fit.mean_square:
             break
         hypothesis = with_effect(hypothesis, screened[0])
         if not hypothesis.fit.noise.order:
