@@ -152,9 +152,8 @@ DEAD_ZONE = Effect(
 _INPUT_CUTS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 _OUTPUT_CUTS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)
 
-#: Largest part of the peak that a saturation cuts off, and largest part by which the limit of an output
-#: exceeds the peak of the nominal simulation. The calibrated output may be larger than that.
-_MAX_CUT, _MAX_EXCESS = 0.8, 0.5
+#: Largest part of the peak that a saturation cuts off.
+_MAX_CUT = 0.8
 
 
 def _write_limit(peak: float, cut: str) -> str:
@@ -208,18 +207,25 @@ def _output_saturation_form(y: Signal, values: Signal, context: SimulationContex
     return np.clip(y, -level, level) if values[0] else y
 
 
-def _output_saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("cut", "", 0.0, 0.02, -_MAX_EXCESS, _MAX_CUT),)
+def _measure_peak(context: SimulationContext) -> float:
+    """Return the largest measured value, relative to the peak of the nominal simulation."""
+    if context.measured is None:
+        return 1.0
+    return float(np.max(np.abs(context.measured))) / context.output_peak or 1.0
+
+
+def _output_saturation_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    peak = _measure_peak(context)
+    lower, upper = 1.0 - max(peak, 1.0), 1.0 - (1.0 - _MAX_CUT) * min(peak, 1.0)
+    return (Parameter("cut", "", 0.0, 0.02, lower, upper),)
 
 
 def _output_saturation_starting_points(
     context: SimulationContext, _residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
     """Return limits below the largest measured value: a record reaches its limit, but for the noise."""
-    measured = context.measured
-    peak = context.output_peak if measured is None else float(np.max(np.abs(measured)))
-    cuts = (1.0 - (1.0 - cut) * peak / context.output_peak for cut in _OUTPUT_CUTS)
-    return tuple((cut,) for cut in cuts if -_MAX_EXCESS < cut < _MAX_CUT)
+    peak = _measure_peak(context)
+    return tuple((1.0 - (1.0 - cut) * peak,) for cut in _OUTPUT_CUTS)
 
 
 OUTPUT_SATURATION = Effect(

@@ -167,7 +167,7 @@ def limit_rate(u, step):
         Largest change of the output in each sampling interval, or in the interval before each sample.
     """
     x = np.empty_like(u)
-    _limit_steps(np.ascontiguousarray(u), np.broadcast_to(step, u.shape), x)
+    _limit_steps(np.ascontiguousarray(u), np.full(u.shape, step), x)
     return x
 
 

@@ -1,5 +1,7 @@
 """Saturation of a sensor: its limit may exceed the nominal output, and a drift acts before or after it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,21 @@ def simulate(stiffness: float) -> np.ndarray:
     u, oscillator = wave(1500), make_oscillator(0.5, 4.0, stiffness)
     simulation = ExtendedSimulator(oscillator, (), make_context(recorded(u, u), oscillator, u.size))
     return simulation.simulate(simulation.nominal)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.05, 0.9, 1.0, 1.1, 30.0])
+def test_limits_of_a_sensor_begin_within_the_measured_values(ratio: float) -> None:
+    """Whatever the scale of the nominal simulation is."""
+    u, oscillator = wave(400), make_oscillator(0.5, 4.0, 200.0)
+    context = make_context(recorded(u, u), oscillator, u.size)
+    context = replace(context, measured=ratio * context.output_peak * np.sin(0.1 * np.arange(u.size)))
+    effect = CATALOGUE["output-saturation"]
+    (cut,), points = effect.parameters(context), effect.starting_points(context, u)
+    assert cut.lower <= cut.nominal == 0.0 < cut.upper
+    assert all(cut.lower < point < cut.upper for (point,) in points)
+    levels = [context.output_peak * (1.0 - point) for (point,) in points]
+    assert max(levels) < np.abs(context.measured).max() or ratio == 0.0
+    assert min(levels) > 0.0
 
 
 @pytest.mark.ci
