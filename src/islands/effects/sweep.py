@@ -74,12 +74,14 @@ def _starting_points(
         if not response.any():
             return ()
     residual = residual / size
-    found = find_sweep(residual, response, MIN_CHANGE)
-    if found is None:
-        return ()
-    cosine, sine = _fit_amplitudes(found, residual, response)
-    frequency, rate = found.frequency / context.dt, found.rate / context.dt**2
-    return ((cosine * unit, sine * unit, frequency, rate),)
+    points = []
+    # The response spreads a weak sweep over time, so that it may be more distinct without it.
+    for found in {find_sweep(residual, each, MIN_CHANGE): None for each in (response, None)}:
+        if found is not None:
+            cosine, sine = _fit_amplitudes(found, residual, response)
+            frequency, rate = found.frequency / context.dt, found.rate / context.dt**2
+            points.append((cosine * unit, sine * unit, frequency, rate))
+    return tuple(points)
 
 
 def _fit_amplitudes(sweep: SweptLine, residual: Signal, response: Signal | None) -> tuple[float, float]:

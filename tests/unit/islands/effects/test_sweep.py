@@ -8,6 +8,7 @@ import islands
 from islands.effects.interface.context import SimulationContext
 from islands.effects.sweep import SWEPT_DISTURBANCE, SWEPT_INTERFERENCE
 from islands.effects.sweep_search import compute_response, find_sweep, measure_line, respond
+from islands_measurements.detection.trial import Trial, run_trial
 
 DT, SAMPLES = 0.005, 2000
 
@@ -68,7 +69,7 @@ def make_context(u: np.ndarray, measured: np.ndarray) -> SimulationContext:
 def test_a_sweep_behind_a_resonance_starts_with_the_force_that_acts() -> None:
     u, wave = draw_input(4), 0.4 * make_wave(0.5, 15.0)
     residual = move(wave)
-    (point,) = SWEPT_DISTURBANCE.starting_points(make_context(u, move(u) + residual), residual)
+    point, *_ = SWEPT_DISTURBANCE.starting_points(make_context(u, move(u) + residual), residual)
     cosine, sine, frequency, rate = point
     assert (frequency, rate) == (pytest.approx(0.5, abs=0.15), pytest.approx(1.45, abs=0.02))
     assert np.hypot(cosine, sine) == pytest.approx(0.4, rel=0.2)
@@ -105,3 +106,10 @@ def test_a_sweep_is_named_by_the_place_where_it_acts(acts_at_input: bool) -> Non
     assert values["rate"].value == pytest.approx(14.5 / (SAMPLES * DT), abs=0.01)
     assert f"{name} sweeps from 0." in found.summary
     assert found.effects[0].depends_on_time
+
+
+@pytest.mark.ci
+def test_a_weak_force_is_found_though_the_response_spreads_its_sweep() -> None:
+    """At half of the noise, its search began at 34 Hz, and an interference had a confidence of 1.00."""
+    found = run_trial(Trial(("swept-disturbance",), 6999000, band=(0.2, 1.0), core="second-order"))
+    assert found.within_set
