@@ -209,9 +209,8 @@ def _output_saturation_form(y: Signal, values: Signal, context: SimulationContex
 
 def _measure_peak(context: SimulationContext) -> float:
     """Return the largest measured value, relative to the peak of the nominal simulation."""
-    if context.measured is None:
-        return 1.0
-    return float(np.max(np.abs(context.measured))) / context.output_peak or 1.0
+    measured = context.fitted_output
+    return 1.0 if measured is None else float(np.max(np.abs(measured))) / context.output_peak or 1.0
 
 
 def _output_saturation_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
@@ -426,9 +425,10 @@ def state_range(state: str, unit: str) -> Effect:
     label = f"{STATE_RANGE.name}:{state}"
 
     def find_range(context: SimulationContext) -> tuple[float, float]:
-        if context.measured is None:
+        measured = context.fitted_output
+        if measured is None:
             return -context.output_peak, context.output_peak
-        return float(np.min(context.measured)), float(np.max(context.measured))
+        return float(np.min(measured)), float(np.max(measured))
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
         low, high = find_range(context)

@@ -132,6 +132,11 @@ class SimulationContext:
         return self.start_time + self.dt * np.arange(self.u.size, dtype=np.float64)
 
     @property
+    def fitted_output(self) -> Signal | None:
+        """Measured output of the estimation part, without gaps; None for a simulation without a record."""
+        return None if self.measured is None else self.measured[: round(self.fit_end_time / self.dt)]
+
+    @property
     def bounds(self) -> tuple[tuple[int, int], ...]:
         """First sample of every recording and the sample after its last."""
         return find_bounds(self.segments, self.u.size)

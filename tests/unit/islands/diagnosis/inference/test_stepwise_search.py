@@ -273,7 +273,9 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
         # The flow and the offset oppose each other, and only both together leave white noise.
         (("outflow-law", "cross-coupling", "offset"), 6998005, "cascaded-tanks"),
         # By ordinary least squares, a jump is added in place of the step of the gain.
-        (("state-clip", "gain-step", "linear-drift"), 6999015, "cascaded-tanks"),
+        pytest.param(
+            ("state-clip", "gain-step", "linear-drift"), 6999015, "cascaded-tanks", marks=pytest.mark.nightly
+        ),
         # The noise model takes two of them for noise, and the first one explains half of the misfit.
         pytest.param(
             ("viscous", "jump", "exponential-creep"), 6998005, "bouc-wen-piezo", marks=pytest.mark.nightly
