@@ -76,7 +76,8 @@ def _starting_points(
     residual = residual / size
     points = []
     # The response spreads a weak sweep over time, so that it may be more distinct without it.
-    for found in {find_sweep(residual, each, MIN_CHANGE): None for each in (response, None)}:
+    responses = [None] if response is None else [response, None]
+    for found in dict.fromkeys(find_sweep(residual, each, MIN_CHANGE) for each in responses):
         if found is not None:
             cosine, sine = _fit_amplitudes(found, residual, response)
             frequency, rate = found.frequency / context.dt, found.rate / context.dt**2

@@ -72,10 +72,7 @@ class SampledSignal:
         first, second = self._list_rises()
         start, middle, end = 3.0 * first - second, first + second, 3.0 * second - first
         if self.has_kinks:
-            limits = np.minimum(2.0 * middle, 0.0), np.maximum(2.0 * middle, 0.0)
-            turns, is_late = first * second < 0.0, np.abs(first) >= np.abs(second)
-            start = np.where(turns, _choose_turning_rate(first, second, is_late), np.clip(start, *limits))
-            end = np.where(turns, _choose_turning_rate(second, first, ~is_late), np.clip(end, *limits))
+            start, end = _find_rate_at_end(first, second), _find_rate_at_end(second, first)
         return SampledSignal.join(start / dt, middle / dt, end / dt)
 
     def refine(self, parts: int) -> "SampledSignal":
@@ -111,17 +108,18 @@ class SampledSignal:
         return SampledSignal.join(*(np.interp(steps + part, places, fine) for part in (0.0, 0.5, 1.0)))
 
 
-def _choose_turning_rate(near: Signal, far: Signal, is_far: NDArray[np.bool_]) -> Signal:
-    """Return the rate at an end of a step in which a signal turns, times the duration of the step.
+def _find_rate_at_end(near: Signal, far: Signal) -> Signal:
+    """Return the rate of a signal with kinks at an end of each step, times the duration of the step.
 
     Parameters
     ----------
     near, far : ndarray, shape (samples,)
         How much the signal rises in the half of the step at this end, and in the other one.
-    is_far : ndarray of bool, shape (samples,)
-        Whether the signal rises more in the half at this end, so that it turns in the other one.
     """
-    return np.where(is_far, 2.0 * near - 4.0 * far, 6.0 * near)
+    largest = 2.0 * (near + far)
+    steady = np.clip(3.0 * near - far, np.minimum(largest, 0.0), np.maximum(largest, 0.0))
+    turning = np.where(np.abs(near) >= np.abs(far), 2.0 * near - 4.0 * far, 6.0 * near)
+    return np.where(near * far < 0.0, turning, steady)
 
 
 def interpolate_linearly(signal: Signal) -> SampledSignal:

@@ -361,12 +361,11 @@ static double find_limited_rate(
 {
     const double middle = read(p, r, step, 0.5);
     const double rise = middle - read(p, r, step, 0.0), second = read(p, r, step, 1.0) - middle;
-    const double rate = 3.0*rise - second + 4.0*part*(second - rise), largest = 2.0*(rise + second);
     const double near = part < 0.5 ? rise : second, far = part < 0.5 ? second : rise;
-    const int is_late = fabs(rise) >= fabs(second);
+    const double largest = 2.0*(rise + second);
     if (part == 0.5) return (rise + second)/STEP;
-    if (rise*second < 0.0) return ((part < 0.5) == is_late ? 2.0*near - 4.0*far : 6.0*near)/STEP;
-    return fmin(fmax(rate, fmin(largest, 0.0)), fmax(largest, 0.0))/STEP;
+    if (near*far < 0.0) return (fabs(near) >= fabs(far) ? 2.0*near - 4.0*far : 6.0*near)/STEP;
+    return fmin(fmax(3.0*near - far, fmin(largest, 0.0)), fmax(largest, 0.0))/STEP;
 }
 
 """,

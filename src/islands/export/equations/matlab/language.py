@@ -299,16 +299,15 @@ function rate = find_limited_rate(read, step, part, c)
   middle = read(step, 0.5);
   rise = middle - read(step, 0);
   second = read(step, 1) - middle;
-  rate = 3*rise - second + 4*part*(second - rise);
   largest = 2*(rise + second);
   ends = [rise, second, rise];
   near = ends(1 + (part > 0.5));
   far = ends(2 + (part > 0.5));
   if part == 0.5
     rate = rise + second;
-  elseif rise*second >= 0
-    rate = min(max(rate, min(largest, 0)), max(largest, 0));
-  elseif (part < 0.5) == (abs(rise) >= abs(second))
+  elseif near*far >= 0
+    rate = min(max(3*near - far, min(largest, 0)), max(largest, 0));
+  elseif abs(near) >= abs(far)
     rate = 2*near - 4*far;
   else
     rate = 6*near;
