@@ -60,7 +60,15 @@ def test_rounding_is_nothing() -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("noise", ["slow", "in band", "pink", "steps"])
+@pytest.mark.parametrize(
+    "noise",
+    [
+        "slow",
+        "pink",
+        pytest.param("in band", marks=pytest.mark.nightly),
+        pytest.param("steps", marks=pytest.mark.nightly),
+    ],
+)
 def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
     found = islands.diagnose(make_noisy_record(noise, 7), "linear:2")
     assert found.verdict == Verdict.NOISE
@@ -91,8 +99,9 @@ def test_an_error_over_the_input_without_a_name_is_no_noise(seed: int) -> None:
     assert "above-noise-level" in [each.name for each in stated.record_findings]
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
+)
 def test_a_line_that_moves_is_a_disturbance_with_a_name_or_unknown(seed: int) -> None:
     record = make_swept_force(seed)
     assert islands.diagnose(record, "linear:2").claimed_names[0] == "swept-disturbance"

@@ -229,7 +229,10 @@ def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch:
     ("effects", "core", "noise", "seed"),
     [
         # A hold fits better next to one of the effects alone, and makes the others half a sample early.
-        (("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
+        pytest.param(
+            *(("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
+            marks=pytest.mark.nightly,
+        ),
         (("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
         # A jump of many standard deviations is sharper than the step that is calibrated.
         (("ageing", "jump"), "cascaded-tanks", "white", 7750012),
@@ -239,18 +242,27 @@ def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch:
             marks=pytest.mark.nightly,
         ),
         # The instants that the calibration starts from are many samples apart.
-        (("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
+        pytest.param(
+            *(("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
+            marks=pytest.mark.nightly,
+        ),
         # With a linear input between samples, a resonance explains more than a delay.
-        (("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
+        pytest.param(
+            *(("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
+            marks=pytest.mark.nightly,
+        ),
         # A noise model takes the response to any two of the causes for noise.
-        (("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
+        pytest.param(
+            *(("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
+            marks=pytest.mark.nightly,
+        ),
         # A step that is slightly too large is made up for by a gain.
         pytest.param(
             *(("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
             marks=pytest.mark.nightly,
         ),
         # The path of the hysteresis is that of an input that jumps between samples.
-        (("stiction",), "bouc-wen-piezo", "white", 7996002),
+        pytest.param(*(("stiction",), "bouc-wen-piezo", "white", 7996002), marks=pytest.mark.nightly),
     ],
 )
 def test_errors_of_the_calibration_are_no_further_causes(

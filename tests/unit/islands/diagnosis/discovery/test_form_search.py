@@ -89,7 +89,7 @@ def test_effect_in_addition_to_a_free_form_is_named() -> None:
     assert found.gain.after.rmse < 0.02
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_uneven_lag_is_a_family_with_its_time_constants() -> None:
     """A valve opens with a time constant of 0.3 s and closes with 0.1 s, ahead of a first-order process."""
 
