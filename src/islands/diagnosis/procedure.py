@@ -230,7 +230,8 @@ def _find_causes(
     run.progress("searching for missing terms")
     terms = None if is_clean else find_missing_terms(searches, outcome, run)
     if terms and (again := search_instead_of_terms(terms, outcome, base, target, run)) is not outcome:
-        outcome, terms = again, compare_terms(terms, again, base, target)
+        base, outcome = calibrate(again.base.simulation, target, again.base.values), again
+        terms = compare_terms(terms, outcome, base, target)
         interim.keep_outcome(base, outcome, run.effects, step=MISSING_TERMS)
     interim.keep_terms(terms)
     run.progress("alternatives to the named causes")

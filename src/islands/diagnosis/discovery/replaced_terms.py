@@ -5,12 +5,15 @@ together with effects show it a better start: with these effects, and the noise 
 effect may be as good as the terms.
 """
 
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, whiten_target
+from dataclasses import replace
+
+from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
+from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, whiten_target
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.joint_search import calibrate_with_effects
 from islands.diagnosis.discovery.missing_terms import MissingTerms
 from islands.diagnosis.inference.hypothesis import Hypothesis
-from islands.diagnosis.inference.screening import compute_cost
+from islands.diagnosis.inference.screening import compute_cost, screen_effects
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN, stepwise_search
 from islands.diagnosis.inference.strategies import SearchOutcome, assess_evidence, make_outcome
 from islands.diagnosis.inference.verdict import Verdict
@@ -43,11 +46,18 @@ def search_instead_of_terms(
     run.progress("effects instead of missing terms")
     whitened = whiten_target(target, found.fit)
     fit = calibrate_with_effects(base, found.effects, found.fit, whitened)
-    start = Hypothesis(fit, compute_cost(fit, base), found.effects)
-    hypothesis, whitened = stepwise_search(alone.base, alone.screened, whitened, run, start=start)
+    initial, screened = alone.base, alone.screened
+    simulator = select_intersample(fit, whitened)
+    if get_discretisation(simulator) != get_discretisation(fit.simulation.simulator):
+        # The misfit that terms explain had hidden that another intersample behaviour fits better.
+        initial = calibrate(replace(base.simulation, simulator=simulator), target, base.values)
+        screened = screen_effects(initial, target, run)
+        fit = calibrate(replace(fit.simulation, simulator=simulator), whitened, fit.values)
+    start = Hypothesis(fit, compute_cost(fit, initial), found.effects)
+    hypothesis, whitened = stepwise_search(initial, screened, whitened, run, start=start)
     is_larger = len(hypothesis.effects) > len(found.terms) + len(found.effects)
     if is_larger or hypothesis.cost > given.cost - MIN_GAIN:
         return alone
-    outcome = assess_evidence(make_outcome(alone.base, alone.screened, whitened, hypothesis), run)
+    outcome = assess_evidence(make_outcome(initial, screened, whitened, hypothesis), run)
     has_all = set(outcome.hypothesis.effects) == set(hypothesis.effects)
     return outcome if has_all and outcome.verdict != Verdict.UNKNOWN else alone

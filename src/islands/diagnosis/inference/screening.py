@@ -219,7 +219,7 @@ class StartFinder:
         list of (float, ndarray)
             Remaining sum of squares and parameter values, the smallest sum first.
         """
-        base, projection, simulation = self.base, self.projection, _extend(self.base, effect)
+        base, projection, simulation = self.base, self.projection, extend(self.base, effect)
         part = simulation.get_slice(effect)
         points, changes = simulate_starting_points(base, simulation, effect, self.target)
         responses = [projection(change) for change in changes]
@@ -260,7 +260,7 @@ def _start_from(
     return values
 
 
-def _extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:
+def extend(base: CalibrationResult, effect: Effect) -> ExtendedSimulator:
     """Return the simulation of a fit with one additional effect."""
     return base.simulation.with_effects((*base.simulation.effects, effect))
 
@@ -281,7 +281,7 @@ def list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulat
     The first place is that of the catalogue. A map of an actuator may act on the other side of the others,
     and a map of a sensor on the other side of the other maps of the output.
     """
-    simulation = _extend(base, effect)
+    simulation = extend(base, effect)
     known = base.simulation.effects
     places = [place for place, each in enumerate(known) if _depends_on_order(effect, each)]
     if not places:

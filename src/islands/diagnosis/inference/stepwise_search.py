@@ -9,7 +9,7 @@ import numpy as np
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, whiten_target
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, calibrate_all
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.inference.chance_gain import ForwardSelection
+from islands.diagnosis.inference.effect_pairs import add_pair, rank_pairs
 from islands.diagnosis.inference.hypothesis import (
     Alternatives,
     Hypothesis,
@@ -95,7 +95,7 @@ def stepwise_search(
             least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
             beam = [each for each in beam if base.score - each.cost >= least]
     refined, new_target = refine_by_swaps(best, target, run, max_effects)
-    if not pairs and refined.effects and refined.fit.noise.order:
+    if not pairs and refined.fit.noise.order:
         return _add_pair(refined, new_target, run, max_effects)
     return refined, new_target
 
@@ -109,12 +109,14 @@ def _add_pair(
     """
     min_gain = 2.0 * _get_min_further_gain(target, run.effects)
     others = [effect for effect in run.effects if effect not in hypothesis.effects and not effect.is_tuned]
-    if ForwardSelection(hypothesis.fit, target, others, 2).compute_gain() < min_gain:
-        return hypothesis, target
-    firsts = [with_effect(hypothesis, each) for each in screen_others(hypothesis, target, run)[:BEAM_WIDTH]]
-    pairs = _extend_beam(((first, screen_others(first, target, run)[:1]) for first in firsts), None)
+    ranked = rank_pairs(hypothesis.fit, target, others, PAIR_SEEDS)
+    added = [add_pair(hypothesis, each, target, run) for each in ranked if each.gain > min_gain]
+    pairs = sorted((each for each in added if each is not None), key=attrgetter("rank"))[:BEAM_WIDTH]
     beam, refitted = refit_with_ar_noise(pairs, target, run.parallel_map)
     if not beam or beam[0].cost > hypothesis.cost - min_gain:
+        return hypothesis, target
+    if not hypothesis.effects and beam[0].fit.noise.order:
+        # Any two effects explain a part of coloured noise.
         return hypothesis, target
     found, refitted = refine_by_swaps(beam[0], refitted, run, max_effects)
     is_better = _count_causes(found) <= max_effects and found.cost < hypothesis.cost - min_gain
