@@ -104,7 +104,9 @@ def rank_pairs(
     return list(pairs.values())
 
 
-def add_pair(hypothesis: Hypothesis, pair: EffectPair, target: Target, run: DiagnosisRun) -> Hypothesis | None:
+def add_pair(
+    hypothesis: Hypothesis, pair: EffectPair, target: Target, run: DiagnosisRun
+) -> Hypothesis | None:
     """Return a hypothesis with a pair of effects, calibrated; None if the second one has no response."""
     simulation = extend(hypothesis.fit, pair.first)
     first = evaluate_fit(simulation, target, pair.start)

@@ -261,6 +261,11 @@ def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch:
             *(("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
             marks=pytest.mark.nightly,
         ),
+        # A hold fits better next to two of the effects, and terms explain the third one.
+        pytest.param(
+            *(("offset", "thermal-drift", "cyclic-error"), "cascaded-tanks", "white", 6999011),
+            marks=pytest.mark.nightly,
+        ),
         # The path of the hysteresis is that of an input that jumps between samples.
         pytest.param(*(("stiction",), "bouc-wen-piezo", "white", 7996002), marks=pytest.mark.nightly),
     ],

@@ -272,6 +272,8 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
         pytest.param(("delay", "clock-skew"), 6998003, "bouc-wen-piezo", marks=pytest.mark.nightly),
         # The flow and the offset oppose each other, and only both together leave white noise.
         (("outflow-law", "cross-coupling", "offset"), 6998005, "cascaded-tanks"),
+        # They oppose each other, and the noise model takes what is left of both for noise.
+        (("jump", "linear-drift"), 6999209, "cascaded-tanks"),
         # By ordinary least squares, a jump is added in place of the step of the gain.
         pytest.param(
             ("state-clip", "gain-step", "linear-drift"), 6999015, "cascaded-tanks", marks=pytest.mark.nightly
@@ -287,6 +289,7 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
         "one-for-two",
         "two-for-one",
         "opposed",
+        "opposed-alone",
         "unweighted-swap",
         "unweighted",
     ],
