@@ -108,7 +108,7 @@ EFFECTS: tuple[Effect, ...] = (
 ACTUATOR_MAPS = (DEAD_ZONE, INPUT_SATURATION, RATE_LIMIT, QUANTISED_INPUT, BACKLASH, STICTION)
 
 #: Maps of a sensor whose response depends on their order with the other maps of the output.
-SENSOR_MAPS = (SENSOR_HYSTERESIS, ABSOLUTE_VALUE_SENSOR, UNSIGNED_SENSOR, OUTPUT_SATURATION)
+SENSOR_MAPS = (SENSOR_HYSTERESIS, ABSOLUTE_VALUE_SENSOR, UNSIGNED_SENSOR, OUTPUT_SATURATION, CYCLIC_ERROR)
 
 #: Effects and free forms by name.
 CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}

@@ -98,7 +98,7 @@ def screen_effects(
     """
     projection = Projection(base, target)
     candidates = [
-        (starts[0][0], effect, [values for _, values in starts])
+        (min(remaining for remaining, *_ in starts), effect, starts)
         for effect, starts in zip(
             run.effects, run.parallel_map(StartFinder(base, target, projection), run.effects), strict=True
         )
@@ -117,12 +117,9 @@ def screen_effects(
         ]
     tasks, added = list[CalibrationTask](), list[Effect]()
     for _, effect, starts in candidates:
-        simulations = list_orders(base, effect)
-        for simulation in simulations:
-            points = [transfer_parameters(values, simulations[0], simulation) for values in starts]
-            if larger is not None:
-                points.append(_start_from(larger, simulation, effect, points[0]))
-            tasks.append((simulation, points))
+        for _, simulation, points in starts:
+            further = [] if larger is None else [_start_from(larger, simulation, effect, points[0])]
+            tasks.append((simulation, [*points, *further]))
             added.append(effect)
     penalties = [bic_penalty(effect, base) for effect in added]
     fits = calibrate_best(tasks, penalties, target, run.parallel_map)
@@ -182,7 +179,9 @@ def simulate_starting_points(
     ndarray, shape (points, samples)
         Changes of the output of ``base``.
     """
-    given = get_starting_points(effect, simulation, fill_gaps(target.y - base.output))
+    given = get_starting_points(
+        effect, _measure_in_front(base, simulation, effect), fill_gaps(target.y - base.output)
+    )
     points = np.tile(transfer_parameters(base.values, base.simulation, simulation), (len(given), 1))
     if not given:
         return points, np.empty((0, base.output.size))
@@ -190,6 +189,20 @@ def simulate_starting_points(
     responses = simulation.simulate_batch(points) - base.output
     is_finite = np.isfinite(responses).all(axis=1)
     return points[is_finite], responses[is_finite]
+
+
+def _measure_in_front(
+    base: CalibrationResult, simulation: ExtendedSimulator, effect: Effect
+) -> ExtendedSimulator:
+    """Return an extended simulation whose measured output is that in front of the maps that act after it."""
+    place, context = simulation.effects.index(effect), simulation.context
+    behind = [each for each in simulation.effects[place + 1 :] if each.site == Site.OUTPUT]
+    if effect.site != Site.OUTPUT or not behind or context.measured is None:
+        return simulation
+    others = tuple(each for each in base.simulation.effects if each not in behind)
+    front = replace(base.simulation, effects=others)
+    output = front.simulate(transfer_parameters(base.values, base.simulation, front))
+    return replace(simulation, context=replace(context, measured=context.measured - base.output + output))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,7 +222,18 @@ class StartFinder:
     target: Target
     projection: Projection
 
-    def __call__(self, effect: Effect) -> list[tuple[float, Signal]]:
+    def __call__(self, effect: Effect) -> list[tuple[float, ExtendedSimulator, list[Signal]]]:
+        """Return starting points in each place where an effect may act.
+
+        Returns
+        -------
+        list of (float, ExtendedSimulator, list of ndarray)
+            Remaining sum of squares of the best point, the extended simulation, and values, the best first.
+        """
+        found = [(each, self._find(effect, each)) for each in list_orders(self.base, effect)]
+        return [(starts[0][0], each, [values for _, values in starts]) for each, starts in found if starts]
+
+    def _find(self, effect: Effect, simulation: ExtendedSimulator) -> list[tuple[float, Signal]]:
         """Return starting points, each with its strength scaled if that explains more.
 
         The starting points of a free form are combined to the one that explains most.
@@ -219,7 +243,7 @@ class StartFinder:
         list of (float, ndarray)
             Remaining sum of squares and parameter values, the smallest sum first.
         """
-        base, projection, simulation = self.base, self.projection, extend(self.base, effect)
+        base, projection = self.base, self.projection
         part = simulation.get_slice(effect)
         points, changes = simulate_starting_points(base, simulation, effect, self.target)
         responses = [projection(change) for change in changes]

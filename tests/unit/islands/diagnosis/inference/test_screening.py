@@ -14,6 +14,7 @@ from islands.progress import ignore_progress
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.linear import LinearSimulator
+from islands.simulators.python_function import PythonFunctionSimulator
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded, wave
 
@@ -62,3 +63,23 @@ def test_a_map_of_an_actuator_is_added_before_or_behind_another_one(names: tuple
     assert tuple(each.name for each in found[0].fit.simulation.effects) == names
     added = found[0].fit.simulation.with_effects((*found[0].fit.simulation.effects, CATALOGUE["offset"]))
     assert tuple(each.name for each in added.effects) == (*names, "offset")
+
+
+def test_a_cyclic_error_is_found_in_front_of_a_jump_that_shifts_its_phase() -> None:
+    """Over the position behind the jump, the halves of the record cancel, since they are in antiphase."""
+    u, period, amplitude, noise = wave(1200), 0.1, 0.01, 0.003
+    y = u + amplitude * np.sin(2 * np.pi * u / period)
+    y[600:] += 0.5 * period
+    record = recorded(u, y + noise * np.random.default_rng(5).standard_normal(u.size))
+    core = PythonFunctionSimulator(lambda u, _dt, gain=1.0: gain * u, "theirs.py:repeat")
+    effects = tuple(CATALOGUE[name] for name in ("jump", "cyclic-error"))
+    alone = ExtendedSimulator(core, effects[:1], make_context(record, core, u.size))
+    target = Target(record.y, np.ones(u.size, dtype=bool), None, {}, fitted=u.size)
+    start = alone.nominal
+    start[alone.get_slice(effects[0])] = 0.5 * period, 600 * record.dt
+    (found,) = screen_effects(calibrate(alone, target, start), target, DiagnosisRun(effects[1:]))
+    assert found.fit.simulation.effects == effects[::-1]
+    cosine, sine, frequency = found.fit.values[found.fit.simulation.get_slice(found.effect)]
+    assert frequency == pytest.approx(1.0 / period, rel=2e-3)
+    assert np.hypot(cosine, sine) == pytest.approx(amplitude, rel=0.1)
+    assert found.fit.mean_square == pytest.approx(noise**2, rel=0.15)

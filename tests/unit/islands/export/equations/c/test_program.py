@@ -213,7 +213,12 @@ def test_effects_of_channels_read_their_columns(folder):
 @needs_compiler
 @pytest.mark.parametrize(
     "names",
-    [("backlash", "dead-zone"), ("rate-limit", "input-saturation"), ("output-saturation", "linear-drift")],
+    [
+        ("backlash", "dead-zone"),
+        ("rate-limit", "input-saturation"),
+        ("output-saturation", "linear-drift"),
+        ("cyclic-error", "linear-drift"),
+    ],
 )
 def test_maps_act_in_the_order_of_the_simulation(names, folder):
     known = [effects_of("second-order")[each] for each in names]
