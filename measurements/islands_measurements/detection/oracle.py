@@ -1,13 +1,14 @@
 """Oracle: a fit that knows the names of the injected faults. It bounds the achievable improvement."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import select_effects
 from islands.diagnosis.calibration.target import Target
+from islands.diagnosis.inference.hypothesis import Hypothesis, remove_each
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.diagnosis.result import Diagnosis
 from islands.effects import model_form
@@ -21,10 +22,27 @@ _STARTS = 3
 _MIN_IMPROVEMENT = 0.01
 
 
-def compute_gain_share(
-    found: Diagnosis, names: Sequence[str], tolerance: Mapping[str, float]
-) -> float | None:
-    """Return the improvement of a diagnosis on the held-out samples relative to that of the oracle.
+@dataclass(frozen=True, slots=True)
+class OracleScore:
+    """Comparison of a diagnosis with the oracle.
+
+    Attributes
+    ----------
+    gain_share : float or None
+        Improvement of the diagnosis on the held-out samples relative to that of the oracle. None if the
+        oracle improves the fit by less than 1 %, or if a fault has no effect in the catalogue.
+    least_gain : float or None
+        Least increase of the oracle's cost without one of several faults, in minus twice the log-likelihood
+        with the BIC penalty. None for a single fault, or if the oracle leaves coloured noise: then its fit
+        may be incomplete.
+    """
+
+    gain_share: float | None = None
+    least_gain: float | None = None
+
+
+def score_oracle(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str, float]) -> OracleScore:
+    """Compare a diagnosis with the oracle.
 
     Parameters
     ----------
@@ -33,11 +51,6 @@ def compute_gain_share(
         Names of the injected faults.
     tolerance : mapping
         Tolerances of the parameters, as given to the diagnosis.
-
-    Returns
-    -------
-    float or None
-        None if the oracle improves the fit by less than 1 %, or if a fault has no effect in the catalogue.
     """
     record, fitted = found.record, found.estimation_samples
     estimation_part = np.arange(record.samples) < fitted
@@ -53,7 +66,7 @@ def compute_gain_share(
     for name in names:
         variants = [effect for effect in effects if effect.name.partition(":")[0] == name]
         if not variants:
-            return None
+            return OracleScore()
         oracle = min(
             (_fit_with_effect(oracle, effect, target) for effect in variants), key=lambda fit: fit.mean_square
         )
@@ -64,7 +77,22 @@ def compute_gain_share(
             oracle.values,
         )
     after, best = _rmse(found, found.best), _rmse(found, oracle)
-    return (before - after) / (before - best) if best < (1.0 - _MIN_IMPROVEMENT) * before else None
+    has_gain = best < (1.0 - _MIN_IMPROVEMENT) * before
+    return OracleScore(
+        (before - after) / (before - best) if has_gain else None,
+        _compute_least_gain(oracle, target, len(names)) if len(names) > 1 else None,
+    )
+
+
+def _compute_least_gain(oracle: CalibrationResult, target: Target, faults: int) -> float | None:
+    """Return the least gain of one of several faults next to the others; see `OracleScore`."""
+    if oracle.noise.order:
+        return None
+    effects = tuple(each for each in oracle.simulation.effects if each.name != model_form.CORE_SHAPE)
+    if len(effects) < faults:
+        return 0.0
+    complete = Hypothesis(oracle, oracle.score, effects)
+    return min(each.cost for each in remove_each(complete, effects, target)) - complete.cost
 
 
 def _rmse(found: Diagnosis, fit: CalibrationResult) -> float:

@@ -218,13 +218,17 @@ def _score_sets(known: Sequence[TrialOutcome], goals: Targets) -> list[Proportio
     clean, pairs, triples = (
         [each for each in known if len(each.trial.effects) == count] for count in (0, 2, 3)
     )
-    return [
-        _count("false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True),
-        _count("pairs exact", pairs, lambda each: each.exact, goals.pairs),
-        _count("pairs exact or equivalent", pairs, lambda each: each.within_sets),
-        _count("triples exact", triples, lambda each: each.exact, goals.triples),
-        _count("triples exact or equivalent", triples, lambda each: each.within_sets),
+    shares = [
+        _count("false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True)
     ]
+    for name, sets, goal in (("pairs", pairs, goals.pairs), ("triples", triples, goals.triples)):
+        identifiable = [each for each in sets if each.identifiable]
+        shares += [
+            _count(f"{name} exact", sets, lambda each: each.exact, goal),
+            _count(f"{name} exact or equivalent", sets, lambda each: each.within_sets),
+            _count(f"identifiable {name} exact or equivalent", identifiable, lambda each: each.within_sets),
+        ]
+    return shares
 
 
 def _score_gains(detected: Sequence[TrialOutcome], goals: Targets) -> list[Statistic]:

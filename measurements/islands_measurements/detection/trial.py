@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 
 from islands.diagnosis.discovery.missing_terms import MISSING_TERM
+from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.procedure import diagnose
 from islands.effects import model_form
 from islands.effects.catalogue import CATALOGUE
@@ -16,7 +17,7 @@ from islands.simulators.interface import Simulator
 from islands_measurements.detection.cases import CASES, SimulatedCase
 from islands_measurements.detection.injection.measurement import FaultyRecord, inject
 from islands_measurements.detection.injection.piezo import PIEZO
-from islands_measurements.detection.oracle import compute_gain_share
+from islands_measurements.detection.oracle import OracleScore, score_oracle
 
 #: Stated tolerances of the piezo's parameters.
 TOLERANCE = PIEZO.tolerance
@@ -90,6 +91,8 @@ class TrialOutcome:
     gain_share : float or None
         Improvement of the error on the held-out samples relative to that of the oracle; None if no
         improvement is possible or the oracle was not fitted.
+    least_gain : float or None
+        Least gain of one of several faults next to the others, for the oracle; None if it is not known.
     form : bool
         Whether a model-form error was reported. For an identified model this is correct, and it is not a
         cause.
@@ -104,6 +107,7 @@ class TrialOutcome:
     candidates: tuple[str, ...]
     confidence: float
     gain_share: float | None = None
+    least_gain: float | None = None
     form: bool = False
 
     @property
@@ -141,6 +145,11 @@ class TrialOutcome:
         )
 
     @property
+    def identifiable(self) -> bool:
+        """Whether each of several faults gains enough next to the others, as far as known."""
+        return self.least_gain is None or self.least_gain > MIN_GAIN
+
+    @property
     def within_set(self) -> bool:
         """Whether the first name or an equivalent cause is an injected fault."""
         return bool(self.named) and bool({self.named[0], *self.equivalents[0]} & set(self.trial.effects))
@@ -165,6 +174,7 @@ def run_trial(trial: Trial) -> TrialOutcome:
     found = diagnose(faulty.record, simulator, simulated.tolerance, trial.seed)
     causes = [each for each in found.causes if each.name != model_form.CORE_SHAPE]
     use_oracle = trial.oracle and trial.effects
+    oracle = score_oracle(found, trial.effects, simulated.tolerance) if use_oracle else OracleScore()
     return TrialOutcome(
         trial,
         faulty.misfit,
@@ -174,7 +184,8 @@ def run_trial(trial: Trial) -> TrialOutcome:
         tuple(finding.equivalents for finding in causes),
         tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,
-        compute_gain_share(found, trial.effects, simulated.tolerance) if use_oracle else None,
+        oracle.gain_share,
+        oracle.least_gain,
         any(finding.name == model_form.CORE_SHAPE for finding in found.effects),
     )
 

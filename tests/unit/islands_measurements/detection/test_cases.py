@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
+from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.simulation.predictors import free_run
@@ -13,7 +14,7 @@ from islands.simulators.context import make_context
 from islands_measurements.detection.cases import CASES, identify_actuator
 from islands_measurements.detection.injection.measurement import inject
 from islands_measurements.detection.injection.piezo import PIEZO
-from islands_measurements.detection.oracle import compute_gain_share
+from islands_measurements.detection.oracle import score_oracle
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -52,19 +53,19 @@ def found() -> Diagnosis:
 @pytest.mark.ci
 def test_a_correct_diagnosis_improves_as_much_as_the_oracle(found: Diagnosis) -> None:
     assert [effect.name for effect in found.effects] == ["even-nonlinearity"]
-    assert compute_gain_share(found, ["even-nonlinearity"], {}) == pytest.approx(1.0, abs=0.02)
+    assert score_oracle(found, ["even-nonlinearity"], {}).gain_share == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.ci
 def test_an_empty_diagnosis_has_no_improvement(found: Diagnosis) -> None:
     empty = replace(found, best=found.base)
-    assert compute_gain_share(empty, ["even-nonlinearity"], {}) == 0.0
+    assert score_oracle(empty, ["even-nonlinearity"], {}).gain_share == 0.0
 
 
 @pytest.mark.ci
 def test_the_oracle_ratio_is_none_without_a_name_or_an_improvement(found: Diagnosis) -> None:
-    assert compute_gain_share(found, ["delay"], {}) is None
-    assert compute_gain_share(found, ["periodic-disturbance"], {}) is None
+    assert score_oracle(found, ["delay"], {}).gain_share is None
+    assert score_oracle(found, ["periodic-disturbance"], {}).gain_share is None
 
 
 @pytest.mark.ci
@@ -73,8 +74,18 @@ def test_the_oracle_fits_two_faults_in_turn() -> None:
         ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), perturbed=False
     )
     found = diagnose(faulty.record, CASES["column"].make(faulty))
-    share = compute_gain_share(found, ["offset", "even-nonlinearity"], {})
-    assert share == pytest.approx(1.0, abs=0.05)
+    score = score_oracle(found, ["offset", "even-nonlinearity"], {})
+    assert score.gain_share == pytest.approx(1.0, abs=0.05)
+    assert score.least_gain is not None
+    assert score.least_gain > 100.0
+
+
+@pytest.mark.ci
+def test_a_fault_that_is_not_in_the_record_gains_nothing_next_to_another_one(found: Diagnosis) -> None:
+    score = score_oracle(found, ["jump", "even-nonlinearity"], {})
+    assert score.least_gain is not None
+    assert score.least_gain < MIN_GAIN
+    assert score_oracle(found, ["even-nonlinearity"], {}).least_gain is None
 
 
 def test_the_piezo_case_uses_the_stated_tolerances() -> None:

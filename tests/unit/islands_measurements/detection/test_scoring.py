@@ -20,10 +20,10 @@ def outcome(
     verdict = options.pop("verdict", "named" if named else "nothing")
     sets = options.pop("equivalents", ((),) * len(named))
     confidence, gain = options.pop("confidence", 0.9), options.pop("gain_share", None)
-    form = options.pop("form", False)
+    least, form = options.pop("least_gain", None), options.pop("form", False)
     assert not options
     return TrialOutcome(
-        Trial(injected, 1), misfit, str(verdict), named, (), sets, named[:1], confidence, gain, form
+        Trial(injected, 1), misfit, str(verdict), named, (), sets, named[:1], confidence, gain, least, form
     )  # type: ignore[arg-type]
 
 
@@ -49,8 +49,8 @@ def test_every_outcome_is_counted_in_its_scores() -> None:
         outcome((), ()),
         outcome((), ("offset",)),
         outcome(("delay", "jump"), ("jump", "delay")),
-        outcome(("delay", "jump"), ("jump",)),
-        outcome(("delay", "jump"), ("jump", "sensor-lag"), equivalents=((), ("delay",))),
+        outcome(("delay", "jump"), ("jump",), least_gain=5.0),
+        outcome(("delay", "jump"), ("jump", "sensor-lag"), equivalents=((), ("delay",)), least_gain=7.0),
         outcome(("delay", "jump"), ("jump", "sensor-lag"), equivalents=(("delay",), ())),
         outcome(("ripple",), ("jump",)),
         outcome(("ripple",), (), verdict="unknown"),
@@ -67,8 +67,10 @@ def test_every_outcome_is_counted_in_its_scores() -> None:
         "false names on clean records": (1, 2),
         "pairs exact": (1, 4),
         "pairs exact or equivalent": (2, 4),
+        "identifiable pairs exact or equivalent": (2, 3),
         "triples exact": (0, 0),
         "triples exact or equivalent": (0, 0),
+        "identifiable triples exact or equivalent": (0, 0),
         "unknown causes silently misnamed": (1, 2),
         "unknown causes misnamed with a confidence above 0.9": (0, 2),
         "known cause named, next to an unknown one": (1, 1),
