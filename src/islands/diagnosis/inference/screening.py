@@ -98,11 +98,11 @@ def screen_effects(
     """
     projection = Projection(base, target)
     candidates = [
-        (min(remaining for remaining, *_ in starts), effect, starts)
-        for effect, starts in zip(
+        (min(starts[0][0] for starts in places if starts), effect, places)
+        for effect, places in zip(
             run.effects, run.parallel_map(StartFinder(base, target, projection), run.effects), strict=True
         )
-        if starts
+        if any(places)
     ]
     is_noise = target.effective_samples is None
     if base.simulation.effects and is_noise:
@@ -116,11 +116,14 @@ def screen_effects(
             or promise > max(bic_penalty(candidate[1], base), MIN_PROMISE * promises[0])
         ]
     tasks, added = list[CalibrationTask](), list[Effect]()
-    for _, effect, starts in candidates:
-        for _, simulation, points in starts:
-            further = [] if larger is None else [_start_from(larger, simulation, effect, points[0])]
-            tasks.append((simulation, [*points, *further]))
-            added.append(effect)
+    for _, effect, places in candidates:
+        for simulation, starts in zip(list_orders(base, effect), places, strict=True):
+            points = [values for _, values in starts]
+            if larger is not None:
+                points += [_start_from(larger, simulation, effect, values) for values in points[:1]]
+            if points:
+                tasks.append((simulation, points))
+                added.append(effect)
     penalties = [bic_penalty(effect, base) for effect in added]
     fits = calibrate_best(tasks, penalties, target, run.parallel_map)
     screened = choose_orders(map(ScreenedEffect, added, fits))
@@ -222,26 +225,20 @@ class StartFinder:
     target: Target
     projection: Projection
 
-    def __call__(self, effect: Effect) -> list[tuple[float, ExtendedSimulator, list[Signal]]]:
-        """Return starting points in each place where an effect may act.
+    def __call__(self, effect: Effect) -> list[list[tuple[float, Signal]]]:
+        """Return the starting points in each place where an effect may act; see `list_orders`.
 
         Returns
         -------
-        list of (float, ExtendedSimulator, list of ndarray)
-            Remaining sum of squares of the best point, the extended simulation, and values, the best first.
+        list of list of (float, ndarray)
+            Remaining sum of squares and parameter values, the smallest sum first.
         """
-        found = [(each, self._find(effect, each)) for each in list_orders(self.base, effect)]
-        return [(starts[0][0], each, [values for _, values in starts]) for each, starts in found if starts]
+        return [self._find(effect, simulation) for simulation in list_orders(self.base, effect)]
 
     def _find(self, effect: Effect, simulation: ExtendedSimulator) -> list[tuple[float, Signal]]:
         """Return starting points, each with its strength scaled if that explains more.
 
         The starting points of a free form are combined to the one that explains most.
-
-        Returns
-        -------
-        list of (float, ndarray)
-            Remaining sum of squares and parameter values, the smallest sum first.
         """
         base, projection = self.base, self.projection
         part = simulation.get_slice(effect)
@@ -318,10 +315,12 @@ def list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulat
 
 def _depends_on_order(effect: Effect, other: Effect) -> bool:
     """Return whether the response to two effects depends on the order in which they act."""
-    if effect in ACTUATOR_MAPS:
-        return other in ACTUATOR_MAPS
+    # Effects that were sent to another process do not equal those of the catalogue.
+    actuator, sensor = ({each.name for each in maps} for maps in (ACTUATOR_MAPS, SENSOR_MAPS))
+    if effect.name in actuator:
+        return other.name in actuator
     are_maps = all(each.site == Site.OUTPUT and not each.is_free for each in (effect, other))
-    return are_maps and (effect in SENSOR_MAPS or other in SENSOR_MAPS)
+    return are_maps and not sensor.isdisjoint((effect.name, other.name))
 
 
 def _sum_squares(signal: Signal) -> float:
