@@ -157,9 +157,12 @@ def _add_unweighted(
     """
     hypothesis = Hypothesis(base, base.score, ())
     for _ in range(MAX_EFFECTS):
-        if not screened or screened[0].fit.mean_square > MAX_UNWEIGHTED_RATIO * hypothesis.fit.mean_square:
+        fit = hypothesis.fit
+        probable = [each for each in screened if each is screened[0] or each.score_gain(fit) > 0.0]
+        enough = [each for each in probable if each.fit.mean_square <= MAX_UNWEIGHTED_RATIO * fit.mean_square]
+        if not enough:
             break
-        hypothesis = with_effect(hypothesis, screened[0])
+        hypothesis = with_effect(hypothesis, enough[0])
         if not hypothesis.fit.noise.order:
             break
         screened = screen_others(hypothesis, target, run)
