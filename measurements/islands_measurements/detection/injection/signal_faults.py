@@ -14,6 +14,9 @@ from islands_measurements.detection.injection.plant import Map
 
 Make = Callable[[np.random.Generator, float], Map]
 
+#: Steps within a sample of a lag that depends on its error.
+LAG_STEPS = 8
+
 
 def delay(_rng: np.random.Generator, tau: float) -> Map:
     """Delay by tau seconds."""
@@ -65,9 +68,14 @@ def clock_skew(rng: np.random.Generator, strength: float) -> Map:
 
 
 def lag(signal: Signal, tau: float, rate: float) -> Signal:
-    """Return a signal after a first-order lag that starts in equilibrium."""
-    a = np.exp(-1.0 / (rate * tau))
-    lagged: Signal = scipy.signal.lfilter([1.0 - a], [1.0, -a], signal - signal[0])
+    """Return a signal, linear between samples, after a first-order lag that starts in equilibrium.
+
+    A signal that is held would come half a sample early, which is much of a short lag.
+    """
+    steps = 1.0 / (rate * tau)
+    a = np.exp(-steps)
+    mean = (1.0 - a) / steps
+    lagged: Signal = scipy.signal.lfilter([1.0 - mean, mean - a], [1.0, -a], signal - signal[0])
     return signal[0] + lagged
 
 
@@ -241,13 +249,15 @@ def growing_lag(_rng: np.random.Generator, strength: float) -> Map:
     """Lag that grows with its error, fourfold at a tenth of the peak; the strength is the least constant."""
 
     def follow(drive: Excitation, y: Signal) -> Signal:
+        # The middles of the steps of a signal that is linear between samples.
+        middles = np.interp(np.arange(0.5, LAG_STEPS * y.size) / LAG_STEPS - 1.0, np.arange(y.size), y)
         shown, reading = [], float(y[0])
-        for target in y.tolist():
+        for target in middles.tolist():
             error = target - reading
             lag = strength * (1.0 + 30.0 * abs(error) / drive.peak_output)
-            reading += error * (1.0 - np.exp(-1.0 / (drive.rate * lag)))
+            reading += error * (1.0 - np.exp(-1.0 / (LAG_STEPS * drive.rate * lag)))
             shown.append(reading)
-        return np.array(shown)
+        return np.array(shown[LAG_STEPS - 1 :: LAG_STEPS])
 
     return follow
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy
 
-from islands_measurements.detection.injection import force_faults, measurement
+from islands_measurements.detection.injection import force_faults, measurement, signal_faults
+from islands_measurements.detection.injection.excitation import Excitation
 from islands_measurements.detection.injection.measurement import GAIN_FAULTS, FaultyRecord, inject
 from islands_measurements.detection.injection.noise import NOISES
 from islands_measurements.detection.injection.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
@@ -55,6 +56,17 @@ def test_a_clean_record_has_noise_only(system: str) -> None:
     assert found.misfit == 0.0
     assert np.std(left) == pytest.approx(found.sigma, rel=0.1)
     assert np.std(faulty_record(system).record.y - found.nominal) > 1.1 * found.sigma
+
+
+@pytest.mark.parametrize("steps", [0.2, 1.0, 20.0])
+def test_lags_are_late_by_their_time_constant_also_within_a_step(steps: float) -> None:
+    """A ramp of rate one is late by the time constant in the steady state."""
+    rate, samples = 100.0, 2000
+    tau, time = steps / rate, np.arange(samples) / rate
+    assert time[-1] - signal_faults.lag(time, tau, rate)[-1] == pytest.approx(tau, rel=1e-9)
+    drive = Excitation(time, time, time, time, rate, 1.0, 1e3)
+    shown = signal_faults.growing_lag(np.random.default_rng(0), tau)(drive, time)
+    assert time[-1] - shown[-1] == pytest.approx(tau, rel=0.15)
 
 
 def test_changes_within_tolerances_are_not_a_misfit() -> None:
