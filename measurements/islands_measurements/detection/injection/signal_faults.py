@@ -19,8 +19,14 @@ LAG_STEPS = 8
 
 
 def delay(_rng: np.random.Generator, tau: float) -> Map:
-    """Delay by tau seconds."""
-    return lambda drive, u: np.interp(drive.time - tau, drive.time, u)
+    """Delay by tau seconds.
+
+    The signal is a cubic between samples: a linear one is smoothed, as by a lag, and a spline overshoots at
+    jumps.
+    """
+    return lambda drive, u: scipy.interpolate.PchipInterpolator(drive.time, u)(
+        np.maximum(drive.time - tau, 0.0)
+    )
 
 
 def two_lags(_rng: np.random.Generator, tau: float) -> Map:
