@@ -23,8 +23,8 @@ from islands.diagnosis.inference.screening import (
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect, Signal
 
-#: Largest squared correlation of the responses of a pair. Those of a larger one differ by less than a linear
-#: response is exact.
+#: Largest squared correlation of the responses of a pair. More similar ones differ by less than the error of
+#: their linearisation.
 MAX_DEPENDENCE = 0.99
 
 
