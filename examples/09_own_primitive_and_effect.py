@@ -75,8 +75,8 @@ print(law.equation)
 # %%
 # ## A record with an unknown cause
 #
-# A stage follows a voltage with a small lag. The sensitivity of its sensor changes by 0.4 % per kelvin, and
-# the temperature is recorded as well. Noise has a standard deviation of 0.02 um.
+# A stage follows a voltage with a small lag. Its sensor is a potentiometer, whose output is proportional to
+# its supply, which is recorded as well. Noise has a standard deviation of 0.02 um.
 DT = 0.01
 
 
@@ -93,16 +93,16 @@ u = sum(
     for size, frequency, phase in ((6, 0.37, 1), (5, 1.1, 2), (4, 1.9, 3))
 )
 position = stage(u, DT, gain=1.05, tau=0.06)
-temperature = 24.0 + 3.0 * np.sin(2 * np.pi * 0.17 * time + 1.0) + 1.5 * np.sin(2 * np.pi * 0.45 * time)
-measured = position * (1.0 + 0.004 * (temperature - temperature[0])) + 0.02 * rng.standard_normal(u.size)
+supply = 5.0 + 0.06 * np.sin(2 * np.pi * 0.17 * time + 1.0) + 0.03 * np.sin(2 * np.pi * 0.45 * time)
+measured = position * supply / supply[0] + 0.02 * rng.standard_normal(u.size)
 record = islands.Dataset(
-    *(np.column_stack([u, temperature]), measured, DT, ("u_V", "T_degC"), "y_um", ("V", "degC"), "um")
+    *(np.column_stack([u, supply]), measured, DT, ("u_V", "supply_V"), "y_um", ("V", "V"), "um")
 )
 
 # %%
-# The catalogue has a drift with the temperature, but no gain that depends on it. The verdict is `unknown`:
-# the simulation is wrong, but by no effect of the catalogue. The first candidate is the nearest one,
-# here a gain that changes over time.
+# The catalogue has gains that depend on time and on temperature, but none that depends on a supply. The
+# verdict is `unknown`: the simulation is wrong, but by no effect of the catalogue. The first candidate is
+# the nearest one, here a gain that changes over time.
 simulator = islands.function_simulator(stage)
 diagnosis = islands.diagnose(record, simulator)
 print(diagnosis.verdict, [effect.name for effect in diagnosis.effects])
@@ -111,7 +111,7 @@ print([candidate.name for candidate in diagnosis.candidates[:3]])
 # %%
 # ## An effect
 #
-# This hint leads to a hypothesis, a gain that follows the temperature. An `Effect` has
+# This hint leads to a hypothesis, a gain that follows the supply. An `Effect` has
 #
 # * a site: here the output, so `form` maps the simulated output to the measured one;
 # * parameters with unit, nominal value (no effect), and the scale of a typical change;
@@ -122,26 +122,26 @@ print([candidate.name for candidate in diagnosis.candidates[:3]])
 
 
 def form(y, values, context):
-    """Multiply the output by the sensitivity at the temperature of each sample."""
-    temperature = context.channels["T_degC"]
-    return y * (1.0 + values[0] * (temperature - temperature[0]))
+    """Multiply the output by the sensitivity at the supply of each sample."""
+    supply = context.channels["supply_V"]
+    return y * (1.0 + values[0] * (supply - supply[0]))
 
 
-thermal_gain = islands.Effect(
-    name="thermal-gain",
-    summary="The sensitivity of the sensor changes with the temperature: y (1 + k (T - T(0)))",
+supply_gain = islands.Effect(
+    name="supply-gain",
+    summary="The sensitivity of the sensor changes with its supply: y (1 + k (s - s(0)))",
     family="change",
     site=islands.Site.OUTPUT,
-    parameters=lambda _context: (islands.Parameter("k", "1/K", 0.0, 0.001),),
-    starting_points=lambda _context, _residual: ((0.005,),),
+    parameters=lambda _context: (islands.Parameter("k", "1/V", 0.0, 0.05),),
+    starting_points=lambda _context, _residual: ((0.25,),),
     form=form,
-    is_applicable=lambda context: "T_degC" in context.channels,
+    is_applicable=lambda context: "supply_V" in context.channels,
     source="Doebelin, Measurement Systems, section 3",
 )
 
 # %%
 # Search for it together with the catalogue:
-better = islands.diagnose(record, simulator, effects=(*islands.EFFECTS, thermal_gain))
+better = islands.diagnose(record, simulator, effects=(*islands.EFFECTS, supply_gain))
 print(better.verdict)
 for effect in better.effects:
     for name, value in effect.parameters.items():
@@ -154,10 +154,10 @@ print(
 )
 
 # %%
-# The interval contains the true value, 0.004 per kelvin, and the error falls to that of the noise. In the
-# figure each point is the residual of a sample, over the output.
+# The interval contains the true value, the inverse of the supply at the first sample, and the error falls to
+# that of the noise. In the figure each point is the residual of a sample, over the output.
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-residuals = {"calibrated": better.base.output, "with thermal gain": better.best.output}
+residuals = {"calibrated": better.base.output, "with supply gain": better.best.output}
 for (name, output), colour in zip(residuals.items(), ("#d55e00", "#0072b2"), strict=True):
     axes.plot(output, record.y - output, ".", markersize=3, color=colour, label=name)
 axes.set(xlabel="output (um)", ylabel="residual (um)")
@@ -179,9 +179,9 @@ assert diagnosis.verdict == "unknown"
 assert not diagnosis.effects
 assert diagnosis.candidates[0].name == "input-gain-curve"
 assert better.verdict == "named"
-assert [effect.name for effect in better.effects] == ["thermal-gain"]
+assert [effect.name for effect in better.effects] == ["supply-gain"]
 low, high = better.effects[0].parameters["k"].ci95
-assert low < 0.004 < high, (low, high)
+assert low < 1.0 / supply[0] < high, (low, high)
 assert better.gain.before.rmse > 0.035
 assert 0.018 < better.gain.after.rmse < 0.022
 print(f"results in {out}")
