@@ -44,8 +44,9 @@ def _get_range(context: SimulationContext, peak: float) -> float:
 
 def _take_fitted(context: SimulationContext) -> Signal:
     """Return the measured position in the estimation part."""
-    assert context.measured is not None
-    return context.measured[: round(context.fit_end_time / context.dt)]
+    measured = context.fitted_output
+    assert measured is not None
+    return measured
 
 
 def _has_range(context: SimulationContext) -> bool:

@@ -45,7 +45,12 @@ from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_ranking import RankedTerm, rank_terms
 from islands.diagnosis.inference.finding import EQUIVALENCE_MARGIN
 from islands.diagnosis.inference.resolved_effects import may_be_zero
-from islands.diagnosis.inference.screening import bic_penalty, get_starting_points, transfer_parameters
+from islands.diagnosis.inference.screening import (
+    bic_penalty,
+    extend,
+    get_starting_points,
+    transfer_parameters,
+)
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.context import Signal
@@ -369,7 +374,7 @@ def _with_effect(found: TermSearchResult, effect: Effect, target: Target) -> Ter
     """Return the equations with one more effect, calibrated with the terms and without them."""
     fits = []
     for fit in (found.base, found.fit):
-        simulation = fit.simulation.with_effects((*fit.simulation.effects, effect))
+        simulation = extend(fit, effect)
         start = transfer_parameters(fit.values, fit.simulation, simulation)
         points = get_starting_points(effect, simulation, fill_gaps(target.y - fit.output))
         starts = np.tile(start, (len(points), 1))

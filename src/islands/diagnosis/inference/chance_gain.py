@@ -19,7 +19,7 @@ from islands.diagnosis.inference.noise_surrogates import (
     draw_surrogates,
     list_noise_models,
 )
-from islands.diagnosis.inference.screening import DEPENDENCE, simulate_starting_points
+from islands.diagnosis.inference.screening import DEPENDENCE, extend, simulate_starting_points
 from islands.effects.interface.effect import Effect, Signal
 
 #: Number of surrogates of each kind.
@@ -168,8 +168,7 @@ def _insert(signal: Signal, part: NDArray[np.bool_]) -> Signal:
 
 def _simulate_starting_points(base: CalibrationResult, effect: Effect, target: Target) -> Signal:
     """Return the responses to an effect at its starting points, shape (points, samples)."""
-    simulation = base.simulation.with_effects((*base.simulation.effects, effect))
-    return simulate_starting_points(base, simulation, effect, target)[1]
+    return simulate_starting_points(base, extend(base, effect), effect, target)[1]
 
 
 def _orthonormalise(responses: Sequence[Signal], projection: Projection) -> Signal:

@@ -14,14 +14,15 @@ from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hypothesis import Hypothesis, with_effect
 from islands.diagnosis.inference.screening import (
-    MAX_SCALING,
     bic_penalty,
     extend,
+    scale_strengths,
     screen_effects,
     simulate_starting_points,
 )
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect, Signal
+from islands.simulators.extended import ExtendedSimulator
 
 #: Largest squared correlation of the responses of a pair. More similar ones differ by less than the error of
 #: their linearisation.
@@ -52,6 +53,7 @@ class _Response:
     """Response to an effect at one of its starting points, of unit size."""
 
     effect: Effect
+    simulation: ExtendedSimulator
     start: Signal
     size: float
     unit: Signal
@@ -97,7 +99,7 @@ def rank_pairs(
             projection.score_decrease(whole - float(explained[index])),
             start.effect,
             responses[j].effect,
-            _scale(fit, start, float(weight)),
+            _scale(start, float(weight)),
         )
         if len(pairs) == count:
             break
@@ -121,21 +123,18 @@ def add_pair(
 def _list_responses(
     fit: CalibrationResult, target: Target, effect: Effect, projection: Projection
 ) -> list[_Response]:
-    points, changes = simulate_starting_points(fit, extend(fit, effect), effect, target)
+    simulation = extend(fit, effect)
+    points, changes = simulate_starting_points(fit, simulation, effect, target)
     projected = [projection(change) for change in changes]
     sizes = [float(np.linalg.norm(each)) for each in projected]
     return [
-        _Response(effect, point, size, each / size)
+        _Response(effect, simulation, point, size, each / size)
         for point, each, size in zip(points, projected, sizes, strict=True)
         if 0.0 < size < np.inf
     ]
 
 
-def _scale(fit: CalibrationResult, response: _Response, weight: float) -> Signal:
+def _scale(response: _Response, weight: float) -> Signal:
     """Return the starting point of a response with its strength scaled to a weight, if that is possible."""
-    simulation, values = extend(fit, response.effect), response.start.copy()
-    begin = simulation.get_slice(response.effect).start
-    factor = np.clip(weight / response.size, -MAX_SCALING, MAX_SCALING)
-    values[begin : begin + response.effect.linear_parameters] *= factor
-    scaled: Signal = simulation.project(values[None])[0]
-    return scaled
+    factors = np.array([weight / response.size])
+    return scale_strengths(response.simulation, response.effect, response.start[None], factors)[0]

@@ -38,6 +38,9 @@ MIN_CALIBRATED_EFFECTS = 5
 #: every effect promises more than its penalty.
 MIN_PROMISE = 0.05
 
+#: Names, since effects that were sent to another process do not equal those of the catalogue.
+_ACTUATOR_NAMES, _SENSOR_NAMES = ({each.name for each in maps} for maps in (ACTUATOR_MAPS, SENSOR_MAPS))
+
 #: Least decrease of the score by another order of maps than that of the catalogue.
 MIN_ORDER_GAIN = 6.0
 
@@ -255,19 +258,32 @@ class StartFinder:
         usable = np.flatnonzero(np.isfinite(sizes) & (sizes > 0.0))
         starts = [(_sum_squares(projection.residual - responses[index]), points[index]) for index in usable]
         if effect.linear_parameters and usable.size:
-            scaled = points[usable]
-            for values, index in zip(scaled, usable, strict=True):
-                factor = float(responses[index] @ projection.residual) / sizes[index]
-                values[part.start : part.start + effect.linear_parameters] *= np.clip(
-                    factor, -MAX_SCALING, MAX_SCALING
-                )
-            scaled = simulation.project(scaled)
+            factors = [float(responses[index] @ projection.residual) / sizes[index] for index in usable]
+            scaled = scale_strengths(simulation, effect, points[usable], np.array(factors))
             others = simulation.simulate_batch(scaled) - base.output
             starts = [
                 min(start, (_sum_squares(projection.residual - projection(other)), values), key=itemgetter(0))
                 for start, other, values in zip(starts, others, scaled, strict=True)
             ]
         return sorted((each for each in starts if np.isfinite(each[0])), key=itemgetter(0))[:MAX_STARTS]
+
+
+def scale_strengths(simulation: ExtendedSimulator, effect: Effect, points: Signal, factors: Signal) -> Signal:
+    """Return points with the strengths of an effect scaled, within `MAX_SCALING` and the bounds.
+
+    Parameters
+    ----------
+    simulation : ExtendedSimulator
+    effect : Effect
+        Without linear parameters, it has no strength to scale.
+    points : ndarray, shape (points, parameters)
+    factors : ndarray, shape (points,)
+    """
+    scaled, begin = points.copy(), simulation.get_slice(effect).start
+    scaled[:, begin : begin + effect.linear_parameters] *= np.clip(factors, -MAX_SCALING, MAX_SCALING)[
+        :, None
+    ]
+    return simulation.project(scaled)
 
 
 def _start_from(
@@ -315,12 +331,10 @@ def list_orders(base: CalibrationResult, effect: Effect) -> list[ExtendedSimulat
 
 def _depends_on_order(effect: Effect, other: Effect) -> bool:
     """Return whether the response to two effects depends on the order in which they act."""
-    # Effects that were sent to another process do not equal those of the catalogue.
-    actuator, sensor = ({each.name for each in maps} for maps in (ACTUATOR_MAPS, SENSOR_MAPS))
-    if effect.name in actuator:
-        return other.name in actuator
+    if effect.name in _ACTUATOR_NAMES:
+        return other.name in _ACTUATOR_NAMES
     are_maps = all(each.site == Site.OUTPUT and not each.is_free for each in (effect, other))
-    return are_maps and not sensor.isdisjoint((effect.name, other.name))
+    return are_maps and not _SENSOR_NAMES.isdisjoint((effect.name, other.name))
 
 
 def _sum_squares(signal: Signal) -> float:

@@ -20,7 +20,7 @@ from islands.diagnosis.calibration.preparation import (
 )
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.inference.screening import get_starting_points, transfer_parameters
+from islands.diagnosis.inference.screening import extend, get_starting_points, transfer_parameters
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
@@ -284,7 +284,7 @@ def _count_starts(fit: CalibrationResult, effect: Effect) -> int:
 
 def _respond(fit: CalibrationResult, effect: Effect, start: int) -> Signal:
     """Return the response to an effect at one of its starting points; zero if the simulation diverges."""
-    simulation = fit.simulation.with_effects((*fit.simulation.effects, effect))
+    simulation = extend(fit, effect)
     values = transfer_parameters(fit.values, fit.simulation, simulation)
     # A residual of zero: the starting points must be those of all records.
     point = get_starting_points(effect, simulation, np.zeros(fit.output.size))[start]
