@@ -60,7 +60,7 @@ class _Response:
 
 
 def rank_pairs(
-    fit: CalibrationResult, target: Target, effects: Sequence[Effect], count: int
+    fit: CalibrationResult, target: Target, effects: Sequence[Effect], count: int, count_of_effect: int
 ) -> list[EffectPair]:
     """Return the pairs of effects whose linear responses explain most of the residual of a fit together.
 
@@ -72,8 +72,9 @@ def rank_pairs(
     target : Target
     effects : sequence of Effect
         Effects that the simulation of the fit does not have.
-    count : int
-        Maximum number of pairs.
+    count, count_of_effect : int
+        Maximum number of pairs, and of those with the same effect: a jump at any time explains much of any
+        residual.
     """
     projection = Projection(fit, target)
     responses = [each for effect in effects for each in _list_responses(fit, target, effect, projection)]
@@ -90,10 +91,13 @@ def rank_pairs(
     )
     whole = float(projection.residual @ projection.residual)
     pairs: dict[tuple[int, int], EffectPair] = {}
+    uses = np.zeros(len(effects), dtype=np.intp)
     for index in np.argsort(-explained, kind="stable"):
         i, j = first[index], second[index]
-        if (owners[i], owners[j]) in pairs:
+        both = [owners[i], owners[j]]
+        if (owners[i], owners[j]) in pairs or uses[both].max() == count_of_effect:
             continue
+        uses[both] += 1
         start, weight = responses[i], (p[index] - common[index] * q[index]) / rest[index]
         pairs[owners[i], owners[j]] = EffectPair(
             projection.score_decrease(whole - float(explained[index])),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import combinations
 from operator import attrgetter
 
 import numpy as np
@@ -39,6 +40,13 @@ MAX_EFFECTS = 3
 
 #: Number of single effects from which pairs are built.
 PAIR_SEEDS = 6
+
+#: Least gain of a pair by its linear responses that is calibrated, relative to the least gain that it needs.
+#: Calibration moves the times and limits of its effects as well, and gains up to five times as much.
+MIN_LINEAR_GAIN = 0.5
+
+#: Number of pairs that are tried in place of two effects, and of those with the same effect.
+REPLACED_PAIRS, PAIRS_OF_EFFECT = 12, 4
 
 #: Maximum number of refits with the noise model of the previous fit.
 MAX_REFITS = 6
@@ -95,9 +103,11 @@ def stepwise_search(
             least = MIN_FOLLOWED_GAIN * (base.score - beam[0].cost)
             beam = [each for each in beam if base.score - each.cost >= least]
     refined, new_target = refine_by_swaps(best, target, run, max_effects)
-    if not pairs and refined.fit.noise.order:
-        return _add_pair(refined, new_target, run, max_effects)
-    return refined, new_target
+    if pairs:
+        return refined, new_target
+    if refined.fit.noise.order:
+        refined, new_target = _add_pair(refined, new_target, run, max_effects)
+    return _replace_two(refined, new_target, run, max_effects)
 
 
 def _add_pair(
@@ -108,19 +118,54 @@ def _add_pair(
     The noise model may take the response to one of them for noise, as long as the other one is missing.
     """
     min_gain = 2.0 * _get_min_further_gain(target, run.effects)
-    others = [effect for effect in run.effects if effect not in hypothesis.effects and not effect.is_tuned]
-    ranked = rank_pairs(hypothesis.fit, target, others, PAIR_SEEDS)
-    added = [add_pair(hypothesis, each, target, run) for each in ranked if each.gain > min_gain]
+    others = _list_others(hypothesis, run)
+    ranked = rank_pairs(hypothesis.fit, target, others, PAIR_SEEDS, PAIR_SEEDS)
+    followed = [each for each in ranked if each.gain > MIN_LINEAR_GAIN * min_gain]
+    added = [add_pair(hypothesis, each, target, run) for each in followed]
     pairs = sorted((each for each in added if each is not None), key=attrgetter("rank"))[:BEAM_WIDTH]
     beam, refitted = refit_with_ar_noise(pairs, target, run.parallel_map)
     if not beam or beam[0].cost > hypothesis.cost - min_gain:
         return hypothesis, target
-    if not hypothesis.effects and beam[0].fit.noise.order:
+    is_weak = not hypothesis.effects or ranked[0].gain <= min_gain
+    if is_weak and beam[0].fit.noise.order:
         # Any two effects explain a part of coloured noise.
         return hypothesis, target
     found, refitted = refine_by_swaps(beam[0], refitted, run, max_effects)
     is_better = _count_causes(found) <= max_effects and found.cost < hypothesis.cost - min_gain
     return (found, refitted) if is_better else (hypothesis, target)
+
+
+def _replace_two(
+    hypothesis: Hypothesis, target: Target, run: DiagnosisRun, max_effects: int
+) -> tuple[Hypothesis, Target]:
+    """Replace two effects by two others at once, as long as the cost decreases.
+
+    Two effects may imitate two others, so that no other effect takes the place of one of them.
+    """
+    min_gain = _get_min_further_gain(target, run.effects)
+    while len(hypothesis.effects) > 1:
+        run.progress("screening alternatives to two causes")
+        others, pairs = _list_others(hypothesis, run), []
+        for two in combinations(hypothesis.effects, 2):
+            rest = hypothesis
+            for effect in two:
+                (rest,) = remove_each(rest, [effect], target)
+            ranked = rank_pairs(rest.fit, target, others, REPLACED_PAIRS, PAIRS_OF_EFFECT)
+            pairs += [add_pair(rest, each, target, run) for each in ranked]
+        candidates = sorted((each for each in pairs if each is not None), key=attrgetter("rank"))
+        beam, refitted = refit_with_ar_noise(candidates[:BEAM_WIDTH], target, run.parallel_map)
+        if not beam or beam[0].cost > hypothesis.cost + min_gain:
+            break
+        found, refitted = refine_by_swaps(beam[0], refitted, run, max_effects)
+        if not found.cost < hypothesis.cost - SCORE_TIE:
+            break
+        hypothesis, target = found, refitted
+    return hypothesis, target
+
+
+def _list_others(hypothesis: Hypothesis, run: DiagnosisRun) -> list[Effect]:
+    """Return the effects that a hypothesis does not have and whose responses are known."""
+    return [effect for effect in run.effects if effect not in hypothesis.effects and not effect.is_tuned]
 
 
 def _extend_beam(

@@ -1,5 +1,7 @@
 """Pairs of effects that explain a residual together."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,7 @@ def get_names(pair: EffectPair) -> tuple[str, str]:
 
 def test_effects_that_oppose_each_other_are_a_pair(opposed: tuple[CalibrationResult, Target]) -> None:
     base, target = opposed
-    best, other = rank_pairs(base, target, EFFECTS, 2)
+    best, other = rank_pairs(base, target, EFFECTS, 2, 2)
     assert get_names(best) == ("linear-drift", "jump")
     assert best.gain > other.gain
     single = screen_effects(base, target, DiagnosisRun(EFFECTS))[0]
@@ -50,16 +52,27 @@ def test_effects_that_oppose_each_other_are_a_pair(opposed: tuple[CalibrationRes
 
 def test_pairs_differ_and_have_two_effects_each(opposed: tuple[CalibrationResult, Target]) -> None:
     base, target = opposed
-    pairs = rank_pairs(base, target, EFFECTS, 100)
+    pairs = rank_pairs(base, target, EFFECTS, 100, 100)
     assert len({frozenset(get_names(each)) for each in pairs}) == len(pairs) == 10
     gains = [each.gain for each in pairs]
     assert gains == sorted(gains, reverse=True)
-    assert rank_pairs(base, target, EFFECTS[:1], 100) == rank_pairs(base, target, [], 100) == []
+    assert rank_pairs(base, target, EFFECTS[:1], 100, 100) == rank_pairs(base, target, [], 100, 100) == []
+
+
+def test_pairs_share_an_effect_as_often_as_the_caller_allows(
+    opposed: tuple[CalibrationResult, Target],
+) -> None:
+    base, target = opposed
+    every = rank_pairs(base, target, EFFECTS, 100, 100)
+    for most in (1, 2):
+        names = [get_names(each) for each in rank_pairs(base, target, EFFECTS, 100, most)]
+        assert names[0] == get_names(every[0])
+        assert max(Counter(name for pair in names for name in pair).values()) == most
 
 
 def test_strengths_of_a_pair_are_calibrated_together(opposed: tuple[CalibrationResult, Target]) -> None:
     base, target = opposed
-    (pair,) = rank_pairs(base, target, EFFECTS, 1)
+    (pair,) = rank_pairs(base, target, EFFECTS, 1, 1)
     found = add_pair(Hypothesis(base, base.score, ()), pair, target, DiagnosisRun(EFFECTS))
     assert found is not None
     assert found.effects == (pair.first, pair.second)

@@ -274,6 +274,23 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
         (("outflow-law", "cross-coupling", "offset"), 6998005, "cascaded-tanks"),
         # They oppose each other, and the noise model takes what is left of both for noise.
         (("jump", "linear-drift"), 6999209, "cascaded-tanks"),
+        # The linear response to a gain step of unknown time explains a sixth of its gain next to a drift.
+        (("input-saturation", "gain-step", "thermal-drift"), 6999601, "cascaded-tanks"),
+        pytest.param(
+            ("outflow-law", "gain-step", "input-saturation"),
+            6999603,
+            "cascaded-tanks",
+            marks=pytest.mark.nightly,
+        ),
+        # A drift and an offset imitate the two others, and neither of these takes the place of one of them.
+        (("output-saturation", "state-clip", "ageing"), 6999610, "cascaded-tanks"),
+        # The cyclic error is calibrated together with two wrong effects.
+        pytest.param(
+            ("thermal-drift", "input-offset", "cyclic-error"),
+            6999611,
+            "cascaded-tanks",
+            marks=pytest.mark.nightly,
+        ),
         # By ordinary least squares, a jump is added in place of the step of the gain.
         pytest.param(
             ("state-clip", "gain-step", "linear-drift"), 6999015, "cascaded-tanks", marks=pytest.mark.nightly
@@ -294,6 +311,10 @@ def test_effect_that_the_refitted_simulation_does_not_need_is_removed() -> None:
         "two-for-one",
         "opposed",
         "opposed-alone",
+        "opposed-at-a-time",
+        "opposed-at-a-time-flow",
+        "two-for-two",
+        "two-for-two-cyclic",
         "unweighted-swap",
         "unweighted-drift",
         "unweighted",
