@@ -155,7 +155,7 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
         (finding.name, finding.place): SIMULATED if finding.is_claimed else BAND
         for finding in diagnosis.effects
     }
-    figure = blank(1.0 + 0.26 * len(shown), "Screened effects, each added alone to the calibrated simulation")
+    figure = blank(1.2 + 0.26 * len(shown), "Screened effects, each added alone to the calibrated simulation")
     axes = figure.subplots()
     places, gains = np.arange(len(shown)), [candidate.score for candidate in shown]
     colours = [colour_of.get((candidate.name, candidate.place), FRAME) for candidate in shown]
@@ -176,7 +176,7 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     axes.margins(x=0.12)
     axes.set_xlim(left=1.05 * min(0.0, *gains))
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("score (decrease of the BIC); per cent: share of the misfit above the noise floor")
+    axes.set_xlabel("score (decrease of the BIC)\nper cent: share of the misfit above the noise floor")
     handles = [
         Patch(color=colour, label=text)
         for colour, text in ((SIMULATED, "claimed"), (BAND, "in the extended simulation, not claimed"))
