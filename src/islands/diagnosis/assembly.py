@@ -18,6 +18,7 @@ from islands.diagnosis.inference.holdout import HoldoutGain, bound_gain, compute
 from islands.diagnosis.inference.residual_structure import find_residual_structure
 from islands.diagnosis.inference.screening import ScreenedEffect, screen_effects
 from islands.diagnosis.inference.strategies import SearchOutcome
+from islands.diagnosis.inference.time_functions import leave_out_contradicted_time
 from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives
 from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit, classify, explained_fraction
 from islands.diagnosis.planning.next_experiment import design_next_experiment
@@ -68,7 +69,9 @@ def extend_equations(
     it has to be smaller than without the terms. The terms have to explain as much as effects would have to.
     """
     record, fitted = found.record, found.estimation_samples
-    fit = fit_initial_states(terms.search.fit, target, fitted)
+    whole = fit_initial_states(terms.search.fit, target, fitted)
+    factors = [each.parameters[0] for each in terms.search.terms if each.term.depends_on_time]
+    fit = leave_out_contradicted_time(record, whole, target, run.rng, factors)
     holdout = slice(fitted, record.samples)
     floor = min(found.noise_floor, float(np.sqrt(fit.mean_square)))
     gain = measure_gain(record, found.base.output, fit.output, holdout, floor, run.rng)
@@ -111,6 +114,7 @@ def extend_equations(
         noise_floor=floor,
         discovery=terms.discovery,
         shape=None,
+        is_time_left_out=fit is not whole,
     )
 
 
@@ -131,9 +135,11 @@ def make_diagnosis(
     base = fit_initial_states(base, target, fitted)
     hypothesis = replace(outcome.hypothesis, fit=fit_initial_states(outcome.hypothesis.fit, target, fitted))
     holdout = slice(fitted, record.samples)
-    gain = None
+    gain, best = None, hypothesis.fit
     if verdict in (Verdict.NAMED, Verdict.REMAINDER, Verdict.FAMILY):
-        gain = _measure_confirmed_gain(replace(outcome, hypothesis=hypothesis), base, record, run.rng)
+        best = leave_out_contradicted_time(record, best, target, run.rng)
+        confirmed = replace(outcome, hypothesis=hypothesis.with_fit(best))
+        gain = _measure_confirmed_gain(confirmed, base, record, run.rng)
         if gain is None:  # There is a discrepancy, but its cause is another.
             verdict = Verdict.UNKNOWN
     findings: tuple[Finding, ...] = ()
@@ -173,12 +179,13 @@ def make_diagnosis(
         record,
         fitted,
         base,
-        hypothesis.fit if findings else base,
+        best if findings else base,
         floor**0.5,
         outcome.is_noise_floor_measured,
         compute_rmse((record.y - nominal)[holdout]),
         discovery=terms.discovery if terms is not None and _is_equivalent(findings) else None,
         shape=compare_shapes(replace(outcome, hypothesis=hypothesis)) if findings else None,
+        is_time_left_out=bool(findings) and best is not hypothesis.fit,
     )
 
 

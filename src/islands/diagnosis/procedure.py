@@ -48,6 +48,7 @@ from islands.diagnosis.inference.strategies import (
     search_with_ar_noise,
     search_with_model_error,
 )
+from islands.diagnosis.inference.time_functions import with_held_out_output
 from islands.diagnosis.inference.timing_alternatives import add_timing_alternatives, find_timing_simulator
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
@@ -243,6 +244,8 @@ def _find_causes(
         return found
     # An extension that diverges beyond its record is not offered.
     best, trial = refine_extension(record, base, found.best, target)
+    if found.is_time_left_out:
+        best = with_held_out_output(best, found.best, target.fitted)
     exchange = exchange_parts(record, found.base, best, target, found.noise_floor, run.rng)
     return replace(found, best=best, trial=trial, exchange=exchange)
 

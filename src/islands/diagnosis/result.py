@@ -125,6 +125,9 @@ class Diagnosis:
         The extended simulation fitted to the hold-out recordings; None if there are none.
     values : tuple of CalibratedValue
         Parameters of the simulation, without initial states; empty after a gross error.
+    is_time_left_out : bool
+        Whether the output of ``best`` has no functions of time in recordings that are held out, since these
+        contradict them.
     left_out : tuple of str
         Steps that a stopped diagnosis has left out; empty for a complete one.
     """
@@ -149,6 +152,7 @@ class Diagnosis:
     trial: ExtensionTrial | None = None
     exchange: ExchangedParts | None = None
     values: tuple[CalibratedValue, ...] = ()
+    is_time_left_out: bool = False
     left_out: tuple[str, ...] = ()
 
     @property

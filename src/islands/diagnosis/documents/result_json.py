@@ -62,6 +62,7 @@ def diagnosis_document(
         "proposal": None if proposal is None else asdict(proposal),
         "estimation_samples": diagnosis.estimation_samples,
         "held_out_part": diagnosis.held_out_part,
+        "is_time_left_out": diagnosis.is_time_left_out,
         "output_std": _measure_output(diagnosis),
         "as_given_rmse": diagnosis.nominal_rmse,
         "calibrated_rmse": _compute_calibrated_rmse(diagnosis),

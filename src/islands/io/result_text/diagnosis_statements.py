@@ -823,12 +823,27 @@ def _describe_exchange(facts: DiagnosisFacts) -> str:
         for each in different or values
     )
     if different:
-        return (
-            f"{text} Both parts have different values: {listed}. The system differs between them, or the "
-            "cause is another one."
+        times = [each["name"] for each in facts.causes if each.get("depends_on_time")]
+        of_time = [each for each in different if each["name"].split()[0] in times]
+        reason = (
+            "They belong to functions of the time, and are those of one recording."
+            if len(of_time) == len(different)
+            else "The system differs between them, or the cause is another one."
         )
+        return f"{text} Both parts have different values: {listed}. {reason}"
     compared = f" ({listed})" if listed else ""
     return f"{text} Both parts have the same values{compared}, within 10 % or four standard deviations."
+
+
+def _describe_time_dependence(facts: DiagnosisFacts) -> str:
+    text = f"{' and '.join(facts.time_dependent)}: a function of the time of this record"
+    if not facts.document.get("is_time_left_out"):
+        return f"{text}, which the extended simulation repeats on another one."
+    held_out = facts.held_out_part
+    return (
+        f"{text}. {held_out[0].upper()}{held_out[1:]} contradicts it, and is simulated without it here: its "
+        "time is another one. The extended simulation repeats it on another record."
+    )
 
 
 def name_reference(document: Document) -> str:
@@ -1084,10 +1099,7 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
     Statement(
         "time-dependent",
         lambda facts: facts.gain is not None and facts.time_dependent,
-        lambda facts: (
-            f"{' and '.join(facts.time_dependent)}: a function of the time of this record, which the "
-            "extended simulation repeats on another one."
-        ),
+        _describe_time_dependence,
     ),
     Statement(
         "one-record",

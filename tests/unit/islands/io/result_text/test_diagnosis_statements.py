@@ -266,13 +266,20 @@ def test_values_of_both_parts_are_compared():
     assert "Both parts have the same values (delay tau = 0.03 and 0.031 s), within 10 %" in said
     exchange["values"] = [value, {**value, "name": "jump", "agrees": False}]
     said = text("named", effects=[CAUSE], gain=GAIN, exchange=exchange)
-    assert "Both parts have different values: jump = 0.03 and 0.031 s." in said
+    assert "Both parts have different values: jump = 0.03 and 0.031 s. The system differs" in said
+    jump = {**CAUSE, "name": "jump", "depends_on_time": True}
+    said = text("named", effects=[CAUSE, jump], gain=GAIN, exchange=exchange)
+    assert "0.031 s. They belong to functions of the time, and are those of one recording." in said
 
 
 def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
     cause = {**CAUSE, "name": "gain-step", "depends_on_time": True}
-    assert "gain-step: a function of the time of this record" in text("named", effects=[cause], gain=GAIN)
+    said = text("named", effects=[cause], gain=GAIN)
+    assert "gain-step: a function of the time of this record, which the extended simulation repeats" in said
     assert "function of the time" not in text("named", effects=[CAUSE], gain=GAIN)
+    facts = {"held_out_part": "the validation recording", "is_time_left_out": True}
+    said = text("named", effects=[cause], gain=GAIN, **facts)
+    assert "The validation recording contradicts it, and is simulated without it here" in said
 
 
 def test_limits_of_the_input_have_its_unit():
