@@ -105,7 +105,15 @@ EFFECTS: tuple[Effect, ...] = (
 )
 
 #: Maps of an actuator whose response depends on their order.
-ACTUATOR_MAPS = (DEAD_ZONE, INPUT_SATURATION, RATE_LIMIT, QUANTISED_INPUT, BACKLASH, STICTION)
+ACTUATOR_MAPS = (
+    DEAD_ZONE,
+    INPUT_SATURATION,
+    RATE_LIMIT,
+    QUANTISED_INPUT,
+    BACKLASH,
+    STICTION,
+    TEMPERATURE_GAIN,
+)
 
 #: Maps of a sensor whose response depends on their order with the other maps of the output.
 SENSOR_MAPS = (SENSOR_HYSTERESIS, ABSOLUTE_VALUE_SENSOR, UNSIGNED_SENSOR, OUTPUT_SATURATION, CYCLIC_ERROR)

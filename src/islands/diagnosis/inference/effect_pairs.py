@@ -93,6 +93,8 @@ def rank_pairs(
     pairs: dict[tuple[int, int], EffectPair] = {}
     uses = np.zeros(len(effects), dtype=np.intp)
     for index in np.argsort(-explained, kind="stable"):
+        if not explained[index] > 0.0:
+            break
         i, j = first[index], second[index]
         both = [owners[i], owners[j]]
         if (owners[i], owners[j]) in pairs or uses[both].max() == count_of_effect:

@@ -24,7 +24,7 @@ def test_an_effect_outside_of_the_catalogue_has_no_plain_name() -> None:
 
 
 def test_known_effects_keep_their_order_where_another_one_acts() -> None:
-    dead_zone, saturation, _, quantiser, backlash, _ = ACTUATOR_MAPS
+    dead_zone, saturation, _, quantiser, backlash, *_ = ACTUATOR_MAPS
     known = (backlash, dead_zone)
     assert catalogue_order((dead_zone, backlash)) == (dead_zone, backlash)
     assert catalogue_order((dead_zone, backlash), known) == known

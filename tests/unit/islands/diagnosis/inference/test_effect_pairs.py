@@ -1,6 +1,7 @@
 """Pairs of effects that explain a residual together."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,6 +58,12 @@ def test_pairs_differ_and_have_two_effects_each(opposed: tuple[CalibrationResult
     gains = [each.gain for each in pairs]
     assert gains == sorted(gains, reverse=True)
     assert rank_pairs(base, target, EFFECTS[:1], 100, 100) == rank_pairs(base, target, [], 100, 100) == []
+
+
+def test_effects_with_the_same_response_are_no_pair(opposed: tuple[CalibrationResult, Target]) -> None:
+    base, target = opposed
+    twin = replace(CATALOGUE["linear-drift"], name="twin")
+    assert rank_pairs(base, target, [CATALOGUE["linear-drift"], twin], 100, 100) == []
 
 
 def test_pairs_share_an_effect_as_often_as_the_caller_allows(
