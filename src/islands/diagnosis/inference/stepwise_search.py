@@ -42,7 +42,7 @@ MAX_EFFECTS = 3
 PAIR_SEEDS = 6
 
 #: Least gain of a pair by its linear responses that is calibrated, relative to the least gain that it needs.
-#: Calibration moves the times and limits of its effects as well, and gains up to five times as much.
+#: Calibration moves the times and limits of its effects as well, and gained up to six times as much.
 MIN_LINEAR_GAIN = 0.5
 
 #: Number of pairs that are tried in place of two effects, and of those with the same effect.

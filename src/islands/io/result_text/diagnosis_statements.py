@@ -823,8 +823,12 @@ def _describe_exchange(facts: DiagnosisFacts) -> str:
         for each in different or values
     )
     if different:
-        times = [each["name"] for each in facts.causes if each.get("depends_on_time")]
-        of_time = [each for each in different if each["name"].split()[0] in times]
+        causes = [each for each in facts.causes if each.get("depends_on_time")]
+        # The values of an effect have its name, those of a term are parameters of the equations.
+        names = {
+            name for each in causes for name in (each["parameters"] if each.get("term") else [each["name"]])
+        }
+        of_time = [each for each in different if each["name"].split()[0] in names]
         reason = (
             "They belong to functions of the time, and are those of one recording."
             if len(of_time) == len(different)
@@ -839,10 +843,9 @@ def _describe_time_dependence(facts: DiagnosisFacts) -> str:
     text = f"{' and '.join(facts.time_dependent)}: a function of the time of this record"
     if not facts.document.get("is_time_left_out"):
         return f"{text}, which the extended simulation repeats on another one."
-    held_out = facts.held_out_part
     return (
-        f"{text}. {held_out[0].upper()}{held_out[1:]} contradicts it, and is simulated without it here: its "
-        "time is another one. The extended simulation repeats it on another record."
+        f"{text}. It contradicts {facts.held_out_part}, where the simulation leaves it out. The extended "
+        "simulation repeats it on another record."
     )
 
 

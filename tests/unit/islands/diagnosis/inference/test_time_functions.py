@@ -117,5 +117,5 @@ def test_causes_with_another_time_in_validation_data_are_named(
     assert found.gain is not None
     assert found.gain.ci95[0] > 0.0
     text = " ".join(describe_details(diagnosis_document(found)))
-    assert "The validation recording contradicts it" in text
+    assert "It contradicts the validation recording" in text
     assert "They belong to functions of the time, and are those of one recording." in text

@@ -270,6 +270,12 @@ def test_values_of_both_parts_are_compared():
     jump = {**CAUSE, "name": "jump", "depends_on_time": True}
     said = text("named", effects=[CAUSE, jump], gain=GAIN, exchange=exchange)
     assert "0.031 s. They belong to functions of the time, and are those of one recording." in said
+    term = {**CAUSE, "name": "missing-term", "term": "a1*(t*u) in dx/dt", "depends_on_time": True}
+    term["parameters"] = {"a1": _value(0.03, "1/s")}
+    exchange["values"] = [{**value, "name": "a1", "agrees": False}]
+    assert "They belong to functions of the time" in text(
+        "discovered", effects=[term], gain=GAIN, exchange=exchange
+    )
 
 
 def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
@@ -279,7 +285,7 @@ def test_a_cause_that_depends_on_time_is_said_to_be_that_of_the_record():
     assert "function of the time" not in text("named", effects=[CAUSE], gain=GAIN)
     facts = {"held_out_part": "the validation recording", "is_time_left_out": True}
     said = text("named", effects=[cause], gain=GAIN, **facts)
-    assert "The validation recording contradicts it, and is simulated without it here" in said
+    assert "It contradicts the validation recording, where the simulation leaves it out." in said
 
 
 def test_limits_of_the_input_have_its_unit():
