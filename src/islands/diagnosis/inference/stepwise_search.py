@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import combinations
 from operator import attrgetter
 
 import numpy as np
@@ -121,9 +120,8 @@ def _add_pair(
     others = _list_others(hypothesis, run)
     ranked = rank_pairs(hypothesis.fit, target, others, PAIR_SEEDS, PAIR_SEEDS)
     followed = [each for each in ranked if each.gain > MIN_LINEAR_GAIN * min_gain]
-    added = [add_pair(hypothesis, each, target, run) for each in followed]
-    pairs = sorted((each for each in added if each is not None), key=attrgetter("rank"))[:BEAM_WIDTH]
-    beam, refitted = refit_with_ar_noise(pairs, target, run.parallel_map)
+    pairs = [add_pair(hypothesis, each, target, run) for each in followed]
+    beam, refitted = _refit_pairs(pairs, target, run)
     if not beam or beam[0].cost > hypothesis.cost - min_gain:
         return hypothesis, target
     is_weak = not hypothesis.effects or ranked[0].gain <= min_gain
@@ -145,15 +143,13 @@ def _replace_two(
     min_gain = _get_min_further_gain(target, run.effects)
     while len(hypothesis.effects) > 1:
         run.progress("screening alternatives to two causes")
-        others, pairs = _list_others(hypothesis, run), []
-        for two in combinations(hypothesis.effects, 2):
-            rest = hypothesis
-            for effect in two:
-                (rest,) = remove_each(rest, [effect], target)
-            ranked = rank_pairs(rest.fit, target, others, REPLACED_PAIRS, PAIRS_OF_EFFECT)
-            pairs += [add_pair(rest, each, target, run) for each in ranked]
-        candidates = sorted((each for each in pairs if each is not None), key=attrgetter("rank"))
-        beam, refitted = refit_with_ar_noise(candidates[:BEAM_WIDTH], target, run.parallel_map)
+        effects, others, pairs = hypothesis.effects, _list_others(hypothesis, run), []
+        reduced = remove_each(hypothesis, effects[:-1], target, run.parallel_map)
+        for place, without in enumerate(reduced, start=1):
+            for rest in remove_each(without, effects[place:], target, run.parallel_map):
+                ranked = rank_pairs(rest.fit, target, others, REPLACED_PAIRS, PAIRS_OF_EFFECT)
+                pairs += [add_pair(rest, each, target, run) for each in ranked]
+        beam, refitted = _refit_pairs(pairs, target, run)
         if not beam or beam[0].cost > hypothesis.cost + min_gain:
             break
         found, refitted = refine_by_swaps(beam[0], refitted, run, max_effects)
@@ -163,9 +159,17 @@ def _replace_two(
     return hypothesis, target
 
 
+def _refit_pairs(
+    pairs: Iterable[Hypothesis | None], target: Target, run: DiagnosisRun
+) -> tuple[list[Hypothesis], Target]:
+    """Refit the best hypotheses to which a pair was added, with their noise model."""
+    found = sorted((each for each in pairs if each is not None), key=attrgetter("rank"))
+    return refit_with_ar_noise(found[:BEAM_WIDTH], target, run.parallel_map)
+
+
 def _list_others(hypothesis: Hypothesis, run: DiagnosisRun) -> list[Effect]:
     """Return the effects that a hypothesis does not have and whose responses are known."""
-    return [effect for effect in run.effects if effect not in hypothesis.effects and not effect.is_tuned]
+    return [each for each in run.without_effects(hypothesis.effects).effects if not each.is_tuned]
 
 
 def _extend_beam(

@@ -410,9 +410,14 @@ class DiagnosisFacts:
         return found
 
     @property
+    def functions_of_time(self) -> list[Document]:
+        """The causes that are functions of the time."""
+        return [each for each in self.causes if each.get("depends_on_time")]
+
+    @property
     def time_dependent(self) -> list[str]:
         """Names of the causes that are functions of the time, or their terms."""
-        found = [each for each in self.causes if each.get("depends_on_time")]
+        found = self.functions_of_time
         return list(dict.fromkeys(each.get("term") or self.label_effect(each) for each in found))
 
     @property
@@ -823,10 +828,11 @@ def _describe_exchange(facts: DiagnosisFacts) -> str:
         for each in different or values
     )
     if different:
-        causes = [each for each in facts.causes if each.get("depends_on_time")]
         # The values of an effect have its name, those of a term are parameters of the equations.
         names = {
-            name for each in causes for name in (each["parameters"] if each.get("term") else [each["name"]])
+            name
+            for each in facts.functions_of_time
+            for name in (each["parameters"] if each.get("term") else [each["name"]])
         }
         of_time = [each for each in different if each["name"].split()[0] in names]
         reason = (
