@@ -1,8 +1,10 @@
-"""Progress callbacks of long computations, and requests to stop them."""
+"""Progress callbacks of long computations, requests to stop them, and their optional steps."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
+from pathlib import Path
+from traceback import extract_tb
 from typing import Protocol, TypeVar
 
 from islands.errors import IslandsError, check_callables
@@ -252,11 +254,55 @@ class StoppedError(IslandsError):
         self.step = step
 
 
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why an optional step has no value.
+
+    Attributes
+    ----------
+    reason : str
+        See `explain_failure`.
+    """
+
+    reason: str
+
+
+def attempt(compute: Callable[[], R]) -> R | Failure:
+    """Return what an optional step computes, or why it fails.
+
+    A step that comes after the answer, such as a figure of it, must not take the answer away.
+
+    Parameters
+    ----------
+    compute : callable
+
+    Raises
+    ------
+    StoppedError
+        A stop was requested within the step.
+    """
+    try:
+        return compute()
+    except StoppedError:
+        raise
+    except Exception as error:
+        return Failure(explain_failure(error))
+
+
+def explain_failure(error: Exception) -> str:
+    """Return the message of a deliberate error; class, message and place of any other one."""
+    if isinstance(error, IslandsError):
+        return str(error)
+    *_, place = extract_tb(error.__traceback__)
+    text = ": ".join(filter(None, (type(error).__name__, str(error))))
+    return f"{text} ({Path(place.filename).name}, line {place.lineno})"
+
+
 class Steps:
     """Steps of a long computation, which a stop request ends between two of them.
 
-    A computation calls this object at the start of every step without which it has no result, and `skip` at
-    the start of every other step.
+    A computation calls this object at the start of every step without which it has no result. Every other
+    step is optional: it is computed by `attempt`, or begins with `skip`.
 
     Parameters
     ----------
@@ -267,8 +313,10 @@ class Steps:
 
     def __init__(self, progress: ProgressCallback = ignore_progress, stop: Stop = never_stop) -> None:
         check_callables(progress=progress, stop=stop)
-        self.report, self.stop = progress, stop
+        self._progress, self._stop = progress, stop
+        self._raised: BaseException | None = None
         self._left_out: dict[str, None] = {}
+        self._not_computed: dict[str, str] = {}
 
     def __call__(self, message: str, fraction: float | None = None, /) -> None:
         """Report a step that the result needs.
@@ -281,10 +329,50 @@ class Steps:
         self.check(message)
         self.report(message, fraction)
 
+    def report(self, message: str, fraction: float | None = None, /) -> None:
+        """Report progress, whether a stop is requested or not."""
+        self.call(self._progress, message, fraction)
+
+    def stop(self) -> bool:
+        """Return whether a stop is requested."""
+        return self.call(self._stop)
+
+    def share_stop(self, parts: int) -> Stop:
+        """Return the stop of the first of several parts, which share a limit of time equally."""
+        return self._stop.share(parts) if isinstance(self._stop, TimeLimit) else self.stop
+
+    def call(self, callback: Callable[..., R], *arguments: object) -> R:
+        """Call a function of the caller, whose exceptions end the computation, also in an optional step."""
+        try:
+            return callback(*arguments)
+        except BaseException as error:
+            self._raised = error
+            raise
+
     def check(self, step: str) -> None:
         """Raise `StoppedError` if a stop is requested within a step that the result needs."""
         if self.stop():
             raise StoppedError(step)
+
+    def attempt(self, step: str, compute: Callable[[], R]) -> R | None:
+        """Return what an optional step computes; None if it is left out, or fails.
+
+        The name of the step is recorded in `left_out` or, with the reason, in `not_computed`.
+        """
+        if self.skip(step):
+            return None
+        self._raised = None
+        try:
+            found = attempt(compute)
+        except StoppedError:
+            self.leave_out(step)
+            return None
+        if isinstance(found, Failure):
+            if self._raised is not None:
+                raise self._raised
+            self._not_computed[step] = found.reason
+            return None
+        return found
 
     def skip(self, step: str) -> bool:
         """Return whether a step must be left out because a stop is requested, and record its name."""
@@ -297,7 +385,17 @@ class Steps:
         """Record a step that is left out."""
         self._left_out[step] = None
 
+    def add(self, left_out: Iterable[str], not_computed: Mapping[str, str], part: str) -> None:
+        """Record the steps that a part of the computation lacks, with the name of the part."""
+        self._left_out |= {f"{part}: {step}": None for step in left_out}
+        self._not_computed |= {f"{part}: {step}": reason for step, reason in not_computed.items()}
+
     @property
     def left_out(self) -> tuple[str, ...]:
         """Names of the steps that were left out, each once, in their order."""
         return tuple(self._left_out)
+
+    @property
+    def not_computed(self) -> dict[str, str]:
+        """Optional steps that failed, each with the reason, in their order."""
+        return dict(self._not_computed)

@@ -1,6 +1,8 @@
 """Output folder of a command: the check before the work and the message after it."""
 
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +11,7 @@ from islands.cli.console import output
 from islands.errors import SettingsError
 
 if TYPE_CHECKING:
+    from islands.evolution.search_result import SearchResult
     from islands.facade.coupled.result import CoupledResult
     from islands.facade.results.identification import Result
 
@@ -38,8 +41,16 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 
 
+def keep_models(folder: Path) -> Callable[["SearchResult"], None]:
+    """Return a callback that writes the models of a search to a folder before the steps after the search."""
+    # The help of a command does not need it.
+    from islands.io.result_folder import write_interim_result  # noqa: PLC0415
+
+    return partial(write_interim_result, folder=folder)
+
+
 def show_result(result: "Result | CoupledResult", folder: Path) -> None:
-    """Print the summary and the files of a result."""
-    output.print(str(result), markup=False)
+    """Print the summary and the files of a saved result."""
+    output.print((folder / "summary.txt").read_text(encoding="utf-8"), markup=False)
     files = COUPLED_FILES if isinstance(result, islands.CoupledResult) else RESULT_FILES
     output.print(f"{folder}/: {files}", markup=False)

@@ -1,6 +1,6 @@
 """Result of a search: ranked models and statistics."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -65,6 +65,8 @@ class SearchStatistics:
         complete search that is not an evolution.
     left_out : tuple of str
         Steps that a request to stop has left out.
+    not_computed : mapping
+        Optional steps that failed, each with the reason.
     certificates : mapping
         Certificate of the candidate library by number of terms; empty if none was computed.
     """
@@ -80,6 +82,7 @@ class SearchStatistics:
     caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     ended_by: str | None = None
     left_out: tuple[str, ...] = ()
+    not_computed: Mapping[str, str] = field(default_factory=dict)
     certificates: Mapping[int, Certificate] = field(default_factory=dict)
 
     @property
@@ -161,6 +164,14 @@ class SearchResult:
         return self.models[self.recommendation.rank - 1]
 
 
+#: Receives a search result before its optional steps.
+ResultCallback = Callable[[SearchResult], object]
+
+
+def ignore_result(_found: SearchResult, /) -> None:
+    """Ignore a result."""
+
+
 def with_linear_comparison(
     found: SearchResult, delays: Sequence[int], shooting: int, steps: Steps
 ) -> SearchResult:
@@ -176,9 +187,10 @@ def with_linear_comparison(
     steps : Steps
         The comparison is an optional step.
     """
-    if is_linear(found.recommended.model) or steps.skip(COMPARISON):
+    if is_linear(found.recommended.model):
         return found
-    return replace(found, linear=fit_linear_comparison(found.split, delays, shooting))
+    compare = partial(fit_linear_comparison, found.split, delays, shooting)
+    return replace(found, linear=steps.attempt(COMPARISON, compare))
 
 
 def with_bands(
@@ -190,26 +202,47 @@ def with_bands(
 ) -> SearchResult:
     """Return a search result with the ensemble of the candidates and with calibrated bands of its models.
 
-    Once a stop is requested, the result has neither. It is marked as stopped if any step was left out.
+    Without them once a stop is requested, or if they fail. The result states the steps that it lacks.
     """
     steps.report(BANDS, 1.0)
     skip = partial(steps.skip, BANDS)
-    ensemble = None
-    if not skip():
+
+    def compute() -> SearchResult:
         recommended = found.recommended.model
         ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, skip, recommended)
-    if skip() or ensemble is None:
-        return mark_stopped(found, steps)
-    calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
-    models = tuple(replace(entry, bands=bands) for entry, bands in zip(found.models, calibrated, strict=True))
-    return mark_stopped(replace(found, models=models, ensemble=ensemble), steps)
+        if skip() or ensemble is None:
+            return found
+        calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
+        models = zip(found.models, calibrated, strict=True)
+        banded = tuple(replace(entry, bands=bands) for entry, bands in models)
+        return replace(found, models=banded, ensemble=ensemble)
+
+    return state_steps(steps.attempt(BANDS, compute) or found, steps)
 
 
-def mark_stopped(found: SearchResult, steps: Steps) -> SearchResult:
-    """Return a search result with the steps that were left out; the same result if there are none."""
-    if not steps.left_out:
-        return found
-    return replace(found, search=replace(found.search, ended_by="stopped", left_out=steps.left_out))
+def state_steps(found: SearchResult, steps: Steps) -> SearchResult:
+    """Return a search result with the steps that were left out, and those that failed."""
+    search = found.search
+    if steps.left_out:
+        search = replace(search, ended_by="stopped", left_out=steps.left_out)
+    if steps.not_computed:
+        search = replace(search, not_computed={**search.not_computed, **steps.not_computed})
+    return found if search is found.search else replace(found, search=search)
+
+
+def without_optional_steps(found: SearchResult, reason: str) -> SearchResult:
+    """Return a search result whose models are not checked, to be stored before the steps after the search.
+
+    Parameters
+    ----------
+    found : SearchResult
+    reason : str
+        Why the other steps have no values yet.
+    """
+    models = tuple(replace(entry, checks=entry.checks.without(reason)) for entry in found.models)
+    steps = dict.fromkeys((COMPARISON, BANDS), reason)
+    search = replace(found.search, not_computed={**found.search.not_computed, **steps})
+    return replace(found, search=search, models=models)
 
 
 def with_average(found: SearchResult, average: int) -> SearchResult:

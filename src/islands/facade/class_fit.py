@@ -10,8 +10,10 @@ from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.refinement import refine
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_result import (
+    ResultCallback,
     SearchResult,
     SearchStatistics,
+    ignore_result,
     rank_models,
     with_bands,
     with_linear_comparison,
@@ -46,6 +48,7 @@ def fit_class(
     constraints: str,
     seed: int,
     steps: Steps,
+    on_models: ResultCallback = ignore_result,
 ) -> SearchResult:
     """Fit the models of a class.
 
@@ -67,6 +70,8 @@ def fit_class(
     seed : int
         Stored in the result, and seed of its prediction bands.
     steps : Steps
+    on_models : callable
+        Called with the ranked models, before the optional steps.
 
     Raises
     ------
@@ -85,6 +90,7 @@ def fit_class(
 
         method = {"method": "fit"}
         latent = search_latent(record, split, searched, seed, steps, method, on_epoch=report)
+        on_models(latent)
         return complete_latent(latent, steps)
     found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
     models = [model for _, model in found[:1]]
@@ -99,6 +105,7 @@ def fit_class(
     counts = {"ok": len(models)}
     search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
     result = SearchResult(record, split, seed, settings, search, rank_models(assessed))
+    on_models(result)
     validated: list[ValidatedModel[DynamicModel]] = [
         ValidatedModel(model, _CRITERION, free_run(model, split.validation).mean_squared_error)
         for model in models

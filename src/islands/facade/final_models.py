@@ -1,6 +1,6 @@
 """Final models of a search: structures are screened on the validation data, then refined and assessed."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from math import inf, isfinite
@@ -95,8 +95,9 @@ def select_final_models(
             break
         for candidate in _order_candidates(entries, settings, split.estimation):
             model = candidate.model
-            if model.standard_errors is None and not steps.skip("standard errors"):
-                model = _with_standard_errors(candidate, settings, split.estimation)
+            if model.standard_errors is None:
+                compute = partial(_with_standard_errors, candidate, settings, split.estimation)
+                model = steps.attempt("standard errors", compute) or model
             assessment = assess(
                 *(model, split, settings.shooting, settings.maximum_lag, settings.constraints),
                 candidate.criterion,
@@ -193,13 +194,10 @@ def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Can
     """Return the linear models of the free run, if the settings refine parameters."""
     library = make_trial_library(settings)
     is_other = settings.select == "fitness" or settings.estimator not in ("", "free-run")
-    if (
-        not (settings.library and library.has_simulations and settings.refine)
-        or is_other
-        or steps.skip(_REFINEMENT)
-    ):
+    if is_other or not (settings.library and library.has_simulations and settings.refine):
         return []
-    fitted = library.fit_simulations(split.estimation, settings.max_terms)
+    fit = partial(library.fit_simulations, split.estimation, settings.max_terms)
+    fitted = steps.attempt(_REFINEMENT, fit) or []
     return _without_diverged(
         each
         for found in fitted
@@ -283,20 +281,37 @@ def _estimate_models(
         for each in found
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
-    keep = list[Candidate] if settings.select == "fitness" else _without_diverged
-    if settings.estimator and not steps.skip(f"estimator {settings.estimator}"):
-        return keep(_estimate_with_choice(fitted, settings, split))
+    keep = _choose_filter(settings)
+    if settings.estimator:
+        name = f"estimator {settings.estimator}"
+        chosen = steps.attempt(name, partial(_estimate_with_choice, fitted, settings, split))
+        if chosen is not None:
+            return keep(chosen)
     estimated = [each.model for each in fitted]
     validated = keep(_validate(estimated, LEAST_SQUARES, split.validation, settings.maximum_lag))
-    if settings.refine and not steps.skip(_REFINEMENT):
-        interval = FITNESSES[settings.fitness](settings.shooting)
-        refined = keep(_refine(estimated, interval, settings, split, steps))
-        validated += refined
-        best = [each.model for each in refined[:_MOST_PROMISING]]
-        lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
-        for length in lengths:
-            validated += keep(_refine(best, length, settings, split, steps))
+    if settings.refine:
+        refine_all = partial(_refine_over_intervals, estimated, settings, split, steps)
+        validated += keep(steps.attempt(_REFINEMENT, refine_all) or [])
     return validated
+
+
+def _choose_filter(settings: Settings) -> Callable[[Iterable[Candidate]], list[Candidate]]:
+    """Return which of the validated models are kept: all of them if the fitness selects."""
+    return list[Candidate] if settings.select == "fitness" else _without_diverged
+
+
+def _refine_over_intervals(
+    models: Sequence[DynamicModel], settings: Settings, split: Split, steps: Steps
+) -> list[Candidate]:
+    """Refine models over the shooting interval of the fitness, and the best of them over others."""
+    keep = _choose_filter(settings)
+    interval = FITNESSES[settings.fitness](settings.shooting)
+    refined = keep(_refine(models, interval, settings, split, steps))
+    best = [each.model for each in refined[:_MOST_PROMISING]]
+    lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
+    for length in lengths:
+        refined += _refine(best, length, settings, split, steps)
+    return refined
 
 
 def _estimate_with_choice(fitted: list[FittedStructure], settings: Settings, split: Split) -> list[Candidate]:

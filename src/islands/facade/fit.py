@@ -10,6 +10,7 @@ from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data, warn_of_extrapolation
 from islands.errors import SettingsError, check_seed, name_option
+from islands.evolution.search_result import ResultCallback, SearchResult, ignore_result
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
@@ -187,6 +188,7 @@ def fit_record(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
+    on_models: ResultCallback = ignore_result,
     **changes: Unpack[FitChanges],
 ) -> Result:
     """Fit models to a record as `fit` does, for a caller that states an extrapolation itself.
@@ -197,6 +199,8 @@ def fit_record(
     validation : Dataset or float
     model, structure, library, degree, lags, delays, constraints, seed, progress, stop
         As for `fit`.
+    on_models : callable
+        Called with the ranked models, before the optional steps.
     **changes
         Settings that differ from those of `FitSettings`.
 
@@ -222,14 +226,20 @@ def fit_record(
                 "leave them out"
             )
         stated = "none" if constraints is None else constraints
-        found = fit_class(record, split, model, structure, stated, seed, Steps(progress, stop))
-        found = replace(found, settings={**found.settings, "refit": settings.refit, "validation": held_out})
+        described = {"refit": settings.refit, "validation": held_out}
+
+        def keep(found: SearchResult) -> None:
+            on_models(replace(found, settings={**found.settings, **described}))
+
+        found = fit_class(record, split, model, structure, stated, seed, Steps(progress, stop), keep)
+        found = replace(found, settings={**found.settings, **described})
         return Result.from_search(refit_models(found, validation, Steps(progress, stop)))
     try:
-        found = fit_chosen_library(
+        fit = fit_chosen_library(
             record, split, library, degree, lags, constraints, delays, settings, seed, progress, stop
-        )
+        ).with_settings(validation=held_out)
+        on_models(fit.incomplete)
+        found = fit.complete()
     except StoppedChoiceError as stopped:
-        found = stopped.found
-    found = replace(found, settings={**found.settings, "validation": held_out})
+        found = replace(stopped.found, settings={**stopped.found.settings, "validation": held_out})
     return Result.from_search(refit_models(found, validation, Steps(progress, stop)))

@@ -28,7 +28,7 @@ from islands.validation.recommendation import ROUNDING
 _FREE_RUN = refinement_criterion(None)
 
 #: Name of the step.
-_REFINEMENT = "estimation by the error of the free run"
+REFINEMENT = "estimation by the error of the free run"
 
 #: Largest error on the validation data, relative to the least, of a model that is refined.
 _CLOSE = 2.0
@@ -70,7 +70,7 @@ def refine_models(
     record = found.split.estimation
 
     def refine_one(model: DynamicModel) -> Assessment | None:
-        if steps.skip(_REFINEMENT):
+        if steps.skip(REFINEMENT):
             return None
         refined = refine(model, record, _FREE_RUN.interval, constraints, warm_up, _STEPS)
         if isinstance(refined, EvaluationOutcome):
@@ -85,9 +85,9 @@ def refine_models(
                 yield entry
 
     least = min(each.validation_error for each in found.models)
-    if least <= ROUNDING * found.split.validation.output_range or steps.skip(_REFINEMENT):
+    if least <= ROUNDING * found.split.validation.output_range:
         return found, []
-    steps.report(_REFINEMENT, None)
+    steps.report(REFINEMENT, None)
     limit = _CLOSE * least
     starts = [
         each.model

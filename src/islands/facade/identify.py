@@ -25,8 +25,10 @@ from islands.evolution.individual import require_genes
 from islands.evolution.presets import AUTO, resolve_kind, resolve_settings, with_tuples
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.search_result import (
+    ResultCallback,
     SearchResult,
     SearchStatistics,
+    ignore_result,
     with_average,
     with_bands,
     with_linear_comparison,
@@ -179,6 +181,7 @@ def identify_record(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
+    on_models: ResultCallback = ignore_result,
     **changes: Unpack[SettingChanges],
 ) -> Result:
     """Identify a model of a record as `identify` does, for a caller that states an extrapolation itself.
@@ -189,6 +192,8 @@ def identify_record(
     validation : Dataset or float
     preset, seed, progress, on_epoch, stop, start, engine, **changes
         As for `identify`.
+    on_models : callable
+        Called with the ranked models, before the optional steps.
 
     Raises
     ------
@@ -216,6 +221,7 @@ def identify_record(
             engine=engine,
             on_epoch=on_epoch or ignore_epoch,
         )
+        on_models(found)
         return Result.from_search(refit_models(complete_latent(found, steps), validation, steps))
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
@@ -250,6 +256,7 @@ def identify_record(
     described = {**_describe_preset(preset), **_describe(settings), "validation": held_out}
     statistics = _make_statistics(state, hall_of_fame, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
+    on_models(with_average(found, count))
     found = with_linear_comparison(found, scaled.library_delays, scaled.shooting, steps)
     banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
     return Result.from_search(refit_models(with_average(banded, count), validation, steps))

@@ -126,11 +126,10 @@ def search_latent(
 
 def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
     """Return the result of a search with standard errors, a linear model for comparison and bands."""
-    if not steps.skip(_ERRORS):
-        data = found.split.estimation
-        add = partial(_add_errors, record=data, constraints=str(found.settings["constraints"]))
-        models = map_over_record(add, found.models, data.samples)
-        found = replace(found, models=tuple(models))
+    data = found.split.estimation
+    add = partial(_add_errors, record=data, constraints=str(found.settings["constraints"]))
+    models = steps.attempt(_ERRORS, lambda: tuple(map_over_record(add, found.models, data.samples)))
+    found = found if models is None else replace(found, models=models)
     found = with_linear_comparison(found, (), found.shooting_interval, steps)
     validated = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
     warm_up = max(entry.model.maximum_lag for entry in found.models)

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
 from typing import TypedDict
@@ -21,7 +20,11 @@ from islands.estimation.forward_selection import (
     select_pool,
 )
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
+from islands.estimation.structure_selection.certificate import (
+    Certificate,
+    SubsetSearch,
+    combine_certificates,
+)
 from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
     OPERATING_POINT,
@@ -37,7 +40,7 @@ from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
     keep_best_of_sizes,
-    mark_stopped,
+    state_steps,
     with_average,
     with_bands,
     with_linear_comparison,
@@ -45,7 +48,7 @@ from islands.evolution.search_result import (
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.facade.final_models import screen
-from islands.facade.free_run_refinement import refine_models
+from islands.facade.free_run_refinement import REFINEMENT, refine_models
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
@@ -67,6 +70,9 @@ CERTIFICATES = "bounds of the errors of all models"
 
 #: Estimators to which linear models of the free run are added: others state the noise.
 _SIMULATING = "least-squares", "free-run"
+
+#: Name of the step that adds linear models of the free run.
+_SIMULATIONS = "linear models of the free run"
 
 #: Name of the step that fits a library again.
 _REFIT = "fit of better subsets"
@@ -154,7 +160,12 @@ class LibraryFit:
     @property
     def incomplete(self) -> SearchResult:
         """Result without certificates and prediction bands."""
-        return with_average(mark_stopped(self.found, self.steps), self.average)
+        return with_average(state_steps(self.found, self.steps), self.average)
+
+    def with_settings(self, **further: object) -> "LibraryFit":
+        """Return the fit with further settings in its result."""
+        settings = {**self.found.settings, **further}
+        return replace(self, found=replace(self.found, settings=settings))
 
     def complete(self) -> SearchResult:
         """Return the result with certificates and prediction bands.
@@ -162,29 +173,33 @@ class LibraryFit:
         The searches for the certificates seldom find a better subset than the exchanges of the fit: in 3 of
         890 searches on 36 records. The library is then fitted again from these subsets.
         """
-        settings = self.found.settings
-        skip = partial(self.steps.skip, CERTIFICATES)
-        tables = [each.certify(settings["certificate"], skip) for each in self.searches]
+        settings, steps = self.found.settings, self.steps
+        tables = steps.attempt(CERTIFICATES, self._certify) or []
         subsets = [tuple(each.structure for each in table) for table in tables]
-        known = [each[: len(some)] for each, some in zip(self.subsets, subsets, strict=True)]
-        fit = self if subsets == known else self._fit_again(subsets)
+        known = [each[: len(some)] for each, some in zip(self.subsets, subsets, strict=False)]
+        again = None if subsets == known else steps.attempt(_REFIT, partial(self._fit_again, subsets))
+        fit = again or self
         certificates = {each.terms: each for each in (reduce(combine_certificates, tables) if tables else ())}
-        found = replace(fit.found, search=replace(fit.found.search, certificates=certificates))
+        found = state_steps(fit.found, fit.steps)
+        search = replace(found.search, certificates=certificates)
+        found = replace(found, search=search, settings=settings)
         delays = [delay // fit.average for delay in settings["delays"]]
         shooting = count_means(settings["shooting"], fit.average)
-        found = with_linear_comparison(found, delays, shooting, fit.steps)
-        banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, fit.steps)
+        found = with_linear_comparison(found, delays, shooting, steps)
+        banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, steps)
         return with_average(banded, fit.average)
 
+    def _certify(self) -> list[tuple[Certificate, ...]]:
+        """Return the certificates of every search."""
+        skip = partial(self.steps.skip, CERTIFICATES)
+        return [each.certify(self.found.settings["certificate"], skip) for each in self.searches]
+
     def _fit_again(self, subsets: Sequence[Subsets]) -> "LibraryFit":
-        """Return the fit of other subsets; this fit if a stop is requested before its end."""
-        if not self.steps.skip(_REFIT):
-            with suppress(StoppedError):
-                fit = self.refit(subsets)
-                if not fit.steps.left_out:
-                    return fit
-            self.steps.skip(_REFIT)
-        return self
+        """Return the fit of other subsets, unless a stop is requested before its end."""
+        fit = self.refit(subsets)
+        if fit.steps.left_out:
+            raise StoppedError(_REFIT)
+        return fit
 
 
 def fit_library(
@@ -262,7 +277,8 @@ def fit_library(
     }
     result = SearchResult(record, split, seed, described, search, keep_best_of_sizes(models))
     if not settings.estimator:
-        result, refined = refine_models(result, interval, warm_up, library.constraints, steps)
+        refine_all = partial(refine_models, result, interval, warm_up, library.constraints, steps)
+        result, refined = steps.attempt(REFINEMENT, refine_all) or (result, [])
         models += refined
     estimates = [_as_candidate(entry) for entry in models]
 
@@ -342,13 +358,15 @@ def _fit_simulations(
     """
     if not library.has_simulations or settings.selecting_estimator not in _SIMULATING:
         return []
-    steps.report("linear models of the free run", None)
-    if steps.skip("linear models of the free run"):
-        return []
-    return [
-        assess(found.model, split, swaps.shooting, warm_up, library.constraints, found.criterion)
-        for found in library.fit_simulations(split.estimation, settings.max_terms)
-    ]
+
+    def fit() -> list[Assessment]:
+        return [
+            assess(found.model, split, swaps.shooting, warm_up, library.constraints, found.criterion)
+            for found in library.fit_simulations(split.estimation, settings.max_terms)
+        ]
+
+    steps.report(_SIMULATIONS, None)
+    return steps.attempt(_SIMULATIONS, fit) or []
 
 
 def _describe_outcomes(outcomes: Mapping[str, int]) -> str:

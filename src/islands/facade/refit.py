@@ -21,7 +21,7 @@ from islands.estimation.latent_refit import refit_latent
 from islands.estimation.output_error import refit_output_error
 from islands.estimation.quantity_errors import with_quantity_errors
 from islands.estimation.refinement import RefinedModel, refine
-from islands.evolution.search_result import SearchResult, mark_stopped
+from islands.evolution.search_result import SearchResult, state_steps
 from islands.models.latent import LatentModel
 from islands.models.narx import Model, require_narx
 from islands.models.protocol import DynamicModel
@@ -68,14 +68,21 @@ def refit_models(found: SearchResult, validation: Dataset | float, steps: Steps)
     if found.settings.get("refit", "none") != "all":
         return found
     steps.report(_REFIT, None)
-    whole = average_samples(join_data(found.record, validation), found.average)
     constraints = str(found.settings["constraints"])
+    for each in found.search.left_out:
+        steps.leave_out(each)
+    whole = steps.attempt(_REFIT, lambda: average_samples(join_data(found.record, validation), found.average))
+    if whole is None:
+        return state_steps(found, steps)
 
     def refit_one(entry: Assessment) -> Assessment:
-        if entry.criterion is None or steps.skip(_REFIT):
+        if entry.criterion is None:
             return entry
+        return steps.attempt(_REFIT, partial(estimate_again, entry, entry.criterion)) or entry
+
+    def estimate_again(entry: Assessment, criterion: Criterion) -> Assessment:
         data = match_record(entry.model, whole)
-        estimated = _estimate(entry, entry.criterion, data, constraints, steps)
+        estimated = _estimate(entry, criterion, data, constraints, steps)
         if isinstance(estimated, str):
             changed, reason = entry.model, estimated
         elif isinstance(estimated, LatentModel):
@@ -93,10 +100,8 @@ def refit_models(found: SearchResult, validation: Dataset | float, steps: Steps)
             return with_refit(entry, changed, data.samples, _UNSOUND, found.split, constraints)
         return made
 
-    for each in found.search.left_out:
-        steps.leave_out(each)
     models = tuple(map_over_record(refit_one, found.models, whole.samples))
-    return mark_stopped(replace(found, models=models), steps)
+    return state_steps(replace(found, models=models), steps)
 
 
 def join_data(record: Dataset, validation: Dataset | float) -> Dataset:

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from math import isfinite
 from operator import attrgetter
 from pathlib import Path
@@ -15,9 +16,10 @@ from islands.data.dataset import Dataset
 from islands.data.flat_extremes import find_limits
 from islands.data.split import measure_input_ranges
 from islands.estimation.estimator_table import Criterion
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import SearchResult, state_steps, without_optional_steps
 from islands.inspection.noise import measure_output_noise
 from islands.io.certificates import certificates_document
+from islands.io.checkpoints.writing import replace_file
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import model_json, terms_document, write_model
 from islands.io.result_text.summary_text import method_text, summary
@@ -29,6 +31,7 @@ from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
+from islands.progress import Steps
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
@@ -51,6 +54,8 @@ def result_document(found: SearchResult) -> dict[str, Any]:
     """Return a result as JSON values; NaN and infinity become null."""
     # The checks of a model are made when they are first read.
     list(map_over_record(attrgetter("final_physics", "residual_tests"), found.models, found.record.samples))
+    steps = Steps()
+    data = steps.attempt("facts about the data", partial(_data_document, found)) or {}
     search, recommendation = found.search, found.recommendation
     document = {
         "schema": SCHEMA,
@@ -80,7 +85,8 @@ def result_document(found: SearchResult) -> dict[str, Any]:
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },
         },
-        "data": _data_document(found),
+        "not_computed": _list_not_computed(state_steps(found, steps)),
+        "data": data,
         "loop": found.has_loop,
         "recommended": asdict(recommendation),
         "models": [
@@ -92,6 +98,26 @@ def result_document(found: SearchResult) -> dict[str, Any]:
     }
     described: dict[str, Any] = finite(document)
     return described
+
+
+def _list_not_computed(found: SearchResult) -> list[dict[str, str]]:
+    """Return the optional steps that failed, and the checks of models that did, each with the reason."""
+    steps = dict(found.search.not_computed)
+    failures = {
+        "physics checks": [entry.final_physics.not_computed for entry in found.models],
+        "residual tests": [entry.residual_structure.not_computed for entry in found.models],
+    }
+    for name, reasons in failures.items():
+        for reason in dict.fromkeys(filter(None, reasons)):
+            ranks = [str(rank) for rank, each in enumerate(reasons, start=1) if each == reason]
+            models = "" if len(ranks) == len(reasons) else f" of model {', '.join(ranks)}"
+            steps[name + models] = reason
+    return list_failures(steps)
+
+
+def list_failures(not_computed: Mapping[str, str]) -> list[dict[str, str]]:
+    """Return the steps that failed, each with the reason, as JSON values."""
+    return [{"step": step, "reason": reason} for step, reason in not_computed.items()]
 
 
 def record_document(record: Dataset) -> dict[str, Any]:
@@ -231,6 +257,7 @@ def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
         "hold_drift_percent": physics.hold_drift_percent,
         "holds": [asdict(entry) for entry in physics.holds],
         "excursions": [asdict(entry) for entry in physics.excursions],
+        "not_computed": physics.not_computed or None,
         "extremes": [{**asdict(entry), "plausible": entry.plausible} for entry in physics.extremes],
     }
 
@@ -267,24 +294,40 @@ def residual_structure_document(structure: ResidualStructure) -> dict[str, Any]:
             "free_run": structure.free_run_share,
         },
         "predictable_percent": structure.percent,
+        "not_computed": structure.not_computed or None,
     }
 
 
 def write_result(found: SearchResult, folder: Path) -> None:
     """Write ``models/NN.json``, ``summary.txt``, ``method.txt`` and, last, ``result.json``.
 
-    Remove the model files of an earlier result in the same folder.
+    Remove the model files of an earlier result in the same folder. A text that fails is an optional step.
     """
     models = folder / "models"
     models.mkdir(parents=True, exist_ok=True)
-    for path in models.glob("[0-9][0-9]*.json"):
-        path.unlink()
     for rank, entry in enumerate(found.models, start=1):
         write_model(entry.final_model, models / f"{rank:02d}.json")
-    document = result_document(found)
-    (folder / "summary.txt").write_text(summary(document, found.recommended.final_model), encoding="utf-8")
-    (folder / "method.txt").write_text(method_text(found), encoding="utf-8")
-    (folder / "result.json").write_text(_write_json(document), encoding="utf-8")
+    for path in models.glob("[0-9][0-9]*.json"):
+        if int(path.stem) > len(found.models):
+            path.unlink()
+    steps = Steps()
+    document, best = result_document(found), found.recommended.final_model
+    texts = {
+        "summary.txt": partial(summary, document, best),
+        "method.txt": partial(method_text, found),
+    }
+    for name, write in texts.items():
+        text = steps.attempt(name, write)
+        if text is None:
+            text = f"{best.equation().line}\n\nNot computed: {name}: {steps.not_computed[name]}.\n"
+        (folder / name).write_text(text, encoding="utf-8")
+    document["not_computed"] += list_failures(steps.not_computed)
+    replace_file([_write_json(document).encode()], folder / "result.json")
+
+
+def write_interim_result(found: SearchResult, folder: Path) -> None:
+    """Write a result before its optional steps, so that the end of the process loses none of its models."""
+    write_result(without_optional_steps(found, "the command ended before this step"), folder)
 
 
 def finite(value: Any) -> Any:

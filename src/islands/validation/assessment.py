@@ -1,9 +1,10 @@
 """Assessment of a model: errors, residual tests, physics checks and prediction bands."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isnan, nan
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,17 @@ from islands.estimation.estimator_table import Criterion
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.models.latent import LatentModel
 from islands.models.protocol import DynamicModel
+from islands.progress import Failure, attempt
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
-from islands.validation.physics import PhysicsChecks, check_physics
-from islands.validation.predictable_residual import ResidualStructure, measure_structure
+from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
+from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
 from islands.validation.prediction_bands import PredictionBands
 from islands.validation.residual_tests import ResidualTests, residual_tests
+
+R = TypeVar("R")
 
 #: Parts of a split, as named in a result.
 PARTS = ("estimation", "validation")
@@ -42,26 +46,40 @@ _MIN_RESIDUALS = 3
 class Checks:
     """Checks of a model that take longer than its errors: each is made when it is first read.
 
+    A check that fails has a value that states the reason, so that the model and its errors remain.
+
     Parameters
     ----------
     model : DynamicModel
     split : Split
     warm_up : int or None
         Number of samples before the first prediction. None is the model's largest lag.
+    missing : str
+        Why the checks are not made; empty if they are.
     """
 
-    def __init__(self, model: DynamicModel, split: Split, warm_up: int | None) -> None:
-        self._model, self._split, self._warm_up = model, split, warm_up
+    def __init__(self, model: DynamicModel, split: Split, warm_up: int | None, missing: str = "") -> None:
+        self._model, self._split, self._warm_up, self._missing = model, split, warm_up, missing
+
+    def without(self, reason: str) -> "Checks":
+        """Return checks that are not made, for a reason."""
+        return Checks(self._model, self._split, self._warm_up, reason)
 
     @cached_property
     def physics(self) -> PhysicsChecks:
         """Physics checks on the estimation data."""
-        return check_physics(self._model, self._split.estimation)
+        found = self._attempt(lambda: check_physics(self._model, self._split.estimation))
+        return missing_physics(found.reason) if isinstance(found, Failure) else found
 
     @cached_property
     def residual(self) -> tuple[ResidualTests, ResidualStructure]:
         """Tests of the residuals on the validation data; see `assess_residual`."""
-        return assess_residual(self._model, self._split.validation, self._warm_up)
+        data = self._split.validation
+        found = self._attempt(lambda: assess_residual(self._model, data, self._warm_up))
+        return _missing_tests(found.reason) if isinstance(found, Failure) else found
+
+    def _attempt(self, compute: Callable[[], R]) -> R | Failure:
+        return Failure(self._missing) if self._missing else attempt(compute)
 
     @cached_property
     def has_estimated_start(self) -> bool:
@@ -375,6 +393,10 @@ def _find_longest_recording(record: Dataset, warm_up: int) -> Dataset:
             "give a longer recording"
         )
     return record[begin:end]
+
+
+def _missing_tests(reason: str) -> tuple[ResidualTests, ResidualStructure]:
+    return ResidualTests((), whiteness_p=nan, ljung_box=nan, passed=False), missing_structure(reason)
 
 
 def _mark_failed(tests: ResidualTests, reason: str) -> ResidualTests:

@@ -7,6 +7,7 @@ constant output at constant input, at every level and on both branches (Property
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
@@ -159,6 +160,8 @@ class PhysicsChecks:
     excursions : tuple of ExcursionTest
     extremes : tuple of ExtremeTest
         Holds at the recorded extremes and at 1.2 of them.
+    not_computed : str
+        Why there are no checks; empty if there are. A model without checks has not failed any.
     """
 
     clusters: tuple[ClusterSum, ...]
@@ -166,6 +169,7 @@ class PhysicsChecks:
     holds: tuple[HoldTest, ...]
     excursions: tuple[ExcursionTest, ...]
     extremes: tuple[ExtremeTest, ...] = ()
+    not_computed: str = ""
 
     @property
     def property_1(self) -> bool:
@@ -175,15 +179,21 @@ class PhysicsChecks:
         holds: the output of y(k) = y(k-8) is constant in a hold if its last eight values were equal.
         """
         return (
-            all(entry.met for entry in self.clusters)
+            not self.not_computed
+            and all(entry.met for entry in self.clusters)
             and self.convergent
             and all(entry.bounded and entry.constant for entry in self.holds)
         )
 
     @property
     def hold_drift_percent(self) -> float:
-        """Largest drift of all holds, in per cent of the record's output range."""
-        return max(entry.drift_percent for entry in self.holds)
+        """Largest drift of all holds, in per cent of the record's output range; NaN if there are none."""
+        return max((entry.drift_percent for entry in self.holds), default=nan)
+
+
+def missing_physics(reason: str) -> PhysicsChecks:
+    """Return the checks of a model that were not computed."""
+    return PhysicsChecks((), True, (), (), not_computed=reason)
 
 
 def check_physics(model: DynamicModel, record: Dataset) -> PhysicsChecks:

@@ -15,6 +15,9 @@ from islands.estimation.least_squares import least_squares
 #: Verdicts: the residual is unpredictable, predictable but small, predictable and large.
 ADEQUATE, MINOR, INADEQUATE = VERDICTS = ("adequate", "minor", "inadequate")
 
+#: In place of a verdict if the residuals were not tested.
+NOT_COMPUTED = "not computed"
+
 #: Largest predictable share of a residual that counts as unpredictable; `measure_structure` says why.
 LARGEST_SHARE = 0.1
 
@@ -44,13 +47,21 @@ class ResidualStructure:
         RMS of the predictable part of the free-run residual, in per cent of the output range. NaN after a
         divergence.
     verdict : str
-        An entry of `VERDICTS`.
+        An entry of `VERDICTS`, or `NOT_COMPUTED`.
+    not_computed : str
+        Why the residuals were not tested; empty if they were.
     """
 
     one_step_share: float
     free_run_share: float
     percent: float
     verdict: str
+    not_computed: str = ""
+
+
+def missing_structure(reason: str = "") -> ResidualStructure:
+    """Return the structure of residuals that were not tested."""
+    return ResidualStructure(math.nan, math.nan, math.nan, NOT_COMPUTED, reason)
 
 
 def measure_structure(

@@ -116,13 +116,11 @@ def recommend(
     ]
     kept = _pass_over(equal, assessments, LARGEST_ESTIMATION_RATIO)
     chosen = min(kept, key=lambda at: (sizes[at], at))
-    return Recommendation(
-        chosen + 1,
-        (
-            _describe_choice(chosen, best, len(equal), len(kept), assessments, unit) + _describe_luck(lucky),
-            _describe_physics(bool(sound), hysteresis, assessments[chosen].final_physics),
-        ),
+    reasons = (
+        _describe_choice(chosen, best, len(equal), len(kept), assessments, unit) + _describe_luck(lucky),
+        _describe_physics(bool(sound), hysteresis, assessments[chosen].final_physics),
     )
+    return Recommendation(chosen + 1, tuple(filter(None, reasons)))
 
 
 def recommend_fittest(
@@ -150,7 +148,8 @@ def recommend_fittest(
     entry = assessments[chosen]
     if not is_sound(entry.physics, hysteresis):
         return Recommendation(chosen + 1, (reason,))
-    return Recommendation(chosen + 1, (reason, _describe_physics(True, hysteresis, entry.final_physics)))
+    checks = _describe_physics(True, hysteresis, entry.final_physics)
+    return Recommendation(chosen + 1, tuple(filter(None, (reason, checks))))
 
 
 def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
@@ -278,7 +277,12 @@ def _describe_luck(lucky: bool) -> str:
 
 
 def _describe_physics(sound: bool, hysteresis: bool, physics: PhysicsChecks) -> str:
-    """State the levels at which the model is bounded, or those of the checks that no model passes."""
+    """State the levels at which the model is bounded, or those of the checks that no model passes.
+
+    Empty if the model was not checked.
+    """
+    if physics.not_computed:
+        return ""
     beyond = [abs(each.level) for each in physics.extremes if not each.plausible]
     held = max(
         (abs(each.level) for each in physics.extremes if abs(each.level) < min(beyond, default=inf)),

@@ -1,7 +1,8 @@
 """``islands demo``: identification of the paper's case 1, compared with the paper's Table 1."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
@@ -12,7 +13,7 @@ from rich.table import Table
 import islands
 from islands.cli.console import output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
-from islands.cli.output_folder import RESULT_FILES, check_folder
+from islands.cli.output_folder import RESULT_FILES, check_folder, keep_models
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import stop_requests
@@ -22,7 +23,7 @@ from islands.facade.identify import identify_record
 from islands.figures.names import ALL_FIGURES
 from islands.io.records import write_record
 from islands.models.protocol import DynamicModel
-from islands.progress import Steps, StoppedError
+from islands.progress import Steps
 from islands.reproduction.published import estimate_again
 from islands.reproduction.searches import read_document, search_island
 from islands.simulation.predictors import free_run
@@ -85,6 +86,7 @@ def demo(
                 islands=ISLANDS,
                 progress=searching,
                 on_epoch=searching.show_epoch,
+                on_models=keep_models(out),
                 stop=stop,
                 engine=engine,
             )
@@ -95,9 +97,10 @@ def demo(
             show("figures", None)
             drawing = Steps(stop=stop)
             result.save(out, drawing, ALL_FIGURES)
-            models = dict[str, DynamicModel]()
-            with suppress(StoppedError):
-                models = _make_paper_models(records, Steps(show, stop))
+            compared = Steps(show, stop)
+            models = compared.attempt(_COMPARISON, partial(_make_paper_models, records, compared)) or {}
+        for step, reason in (drawing.not_computed | compared.not_computed).items():
+            output.print(f"Not computed: {step}: {reason}.", markup=False)
         output.print(f"{out}/: {RESULT_FILES}", markup=False)
         stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
 

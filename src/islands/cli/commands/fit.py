@@ -9,7 +9,7 @@ import typer
 
 import islands
 from islands.cli import options
-from islands.cli.output_folder import check_folder, show_result
+from islands.cli.output_folder import check_folder, keep_models, show_result
 from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.record_options import with_reading_options
@@ -165,7 +165,7 @@ def fit(
             fit_all = partial(fit_coupled_data, split_coupled(record, held), **coupled_options(given))
             result = search_outputs(fit_all, out, stop, drawn)
         else:
-            result = fit_record(data, held_out, **given)
+            result = fit_record(data, held_out, on_models=keep_models(out), **given)
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
         drawing = Steps(stop=stop)

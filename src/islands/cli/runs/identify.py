@@ -12,7 +12,7 @@ from typing import Any
 import islands
 from islands.cli.console import errors, output, print_message
 from islands.cli.engines import check_engine, default_engine, has_ray, serial_notice, start_engine
-from islands.cli.output_folder import show_result
+from islands.cli.output_folder import keep_models, show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
@@ -176,7 +176,7 @@ def _search(
 ) -> islands.Result | islands.CoupledResult:
     """Search one or several outputs."""
     if isinstance(data, islands.Dataset):
-        return identify_record(data, held_out, **arguments, **changes)
+        return identify_record(data, held_out, on_models=keep_models(folder), **arguments, **changes)
     parts = split_coupled(data, held_out)
     search = partial(identify_coupled_data, parts, **arguments, **coupled_options(changes))
     return search_outputs(search, folder, arguments["stop"], figures, partial(_explain_continuation, folder))

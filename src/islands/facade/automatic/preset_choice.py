@@ -11,10 +11,9 @@ from islands.errors import ModelError, RecordError, SettingsError, check_texts, 
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_latent, with_tuples
-from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
-from islands.facade.library_fit import FitSettings, fit_library
+from islands.facade.library_fit import FitSettings, LibraryFit, fit_library
 from islands.facade.trials.library import make_trial_library, take_library
 from islands.models.candidate_library import LIBRARIES
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
@@ -86,7 +85,7 @@ def fit_chosen_library(
     seed: int,
     progress: ProgressCallback,
     stop: Stop,
-) -> SearchResult:
+) -> LibraryFit:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
 
     Values that are None are chosen, or have the default of the library.
@@ -103,10 +102,9 @@ def fit_chosen_library(
     if library != AUTO:
         # The message about another name lists auto, too.
         lookup(dict.fromkeys((AUTO, *LIBRARIES)), library, "library")
-        return fit_one(take_library(library, degree, lags, constraints, delays or ())).complete()
+        return fit_one(take_library(library, degree, lags, constraints, delays or ()))
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
     choice, fits = choose_kind(split.estimation, libraries, delays, fit_one, Steps(progress, stop))
     chosen = fits.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
-    found = chosen.complete()
-    return replace(found, settings={**found.settings, "choice": choice.to_document()})
+    return chosen.with_settings(choice=choice.to_document())

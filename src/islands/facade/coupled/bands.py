@@ -31,7 +31,7 @@ def make_bands(
     seed: int,
     steps: Steps,
 ) -> tuple[PredictionBands, ...]:
-    """Return the prediction bands of every output; none if the model diverges or a stop is requested.
+    """Return the prediction bands of every output; none if the model diverges, or the step is missing.
 
     The ensemble has the structure of the model, and those in which one equation is another of its output. The
     parameters of its members are from a block bootstrap of the error of the common free run.
@@ -53,18 +53,20 @@ def make_bands(
     steps : Steps
         The bands are an optional step.
     """
-    if steps.skip(_BANDS):
-        return ()
-    steps.report(_BANDS, 1.0)
     skip = partial(steps.skip, _BANDS)
-    candidates = [
-        ValidatedModel(each, _CRITERION, _validate(each, data, warm_up))
-        for each in _list_rivals(model, ranked, ranks)
-    ]
-    ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip, model)
-    if ensemble is None or skip():
-        return ()
-    return calibrate_output_bands(model, ensemble, data, warm_up)
+
+    def compute() -> tuple[PredictionBands, ...]:
+        steps.report(_BANDS, 1.0)
+        candidates = [
+            ValidatedModel(each, _CRITERION, _validate(each, data, warm_up))
+            for each in _list_rivals(model, ranked, ranks)
+        ]
+        ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip, model)
+        if ensemble is None or skip():
+            return ()
+        return calibrate_output_bands(model, ensemble, data, warm_up)
+
+    return steps.attempt(_BANDS, compute) or ()
 
 
 def _list_rivals(

@@ -47,7 +47,6 @@ from islands.progress import (
     Steps,
     Stop,
     StoppedError,
-    TimeLimit,
     ignore_progress,
     never_stop,
 )
@@ -391,13 +390,14 @@ def _search_outputs(
     """
     results: list[Result] = []
     for name, split in zip(names, splits, strict=True):
-        show, stop = partial(_report, steps.report, name), steps.stop
-        if isinstance(stop, TimeLimit):
-            stop = stop.share(len(names) - len(results))
+        show, stop = partial(_report, steps.report, name), steps.share_stop(len(names) - len(results))
         try:
-            results.append(find(split.estimation, split.validation, progress=show, stop=stop, **options))
+            found = find(split.estimation, split.validation, progress=show, stop=stop, **options)
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
+        search = found.search_result.search
+        steps.add(search.left_out, search.not_computed, name)
+        results.append(found)
     return results
 
 
@@ -440,15 +440,13 @@ def _couple(
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
     refined = None
     constraints = str(results[0].search_result.settings["constraints"])
-    if refine_together and choice.error < inf and not steps.skip(_REFINEMENT):
+    if refine_together and choice.error < inf:
         steps.report(_REFINEMENT, 0.0)
         skip = partial(steps.skip, _REFINEMENT)
         shooting = results[0].search_result.shooting_interval
-        refined = _refine(model, data, shooting, warm_up, constraints, choice.error, skip)
+        refine_all = partial(_refine, model, data, shooting, warm_up, constraints, choice.error, skip)
+        refined = steps.attempt(_REFINEMENT, refine_all)
     bands = make_bands(refined or model, ranked, choice.ranks, data, constraints, warm_up, seed, steps)
-    left_out = [
-        f"{name}: {step}" for name, found in zip(names, results, strict=True) for step in found.left_out
-    ]
     return CoupledResult(
         refined or model,
         warm_up,
@@ -457,7 +455,8 @@ def _couple(
         choice.ranks,
         refined is not None,
         data,
-        (*left_out, *steps.left_out),
+        steps.left_out,
+        steps.not_computed,
     )
 
 

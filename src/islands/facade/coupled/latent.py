@@ -29,7 +29,7 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], steps: St
     results : sequence of Result
         Result of every output, from the inputs alone.
     steps : Steps
-        Their steps that a stop has left out are those of the result.
+        Steps that the result lacks, also those of the searches.
     """
     best = [result.best for result in results]
     if any(each.model.input_names != data.estimation.input_names for each in best):
@@ -37,7 +37,6 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], steps: St
         data = CoupledSplit(data.estimation.map(advance_all_inputs), data.validation.map(advance_all_inputs))
     inputs = data.estimation.input_names
     bands = [_name_inputs_of_bands(each.prediction_bands, inputs) for each in best if each.prediction_bands]
-    names = data.estimation.output_names
     return CoupledResult(
         CoupledLatentModel(tuple(_name_inputs(each.model, inputs) for each in best)),
         max(each.warm_up for each in best),
@@ -46,14 +45,8 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], steps: St
         tuple(result.recommendation.rank for result in results),
         False,
         data,
-        (
-            *(
-                f"{name}: {step}"
-                for name, found in zip(names, results, strict=True)
-                for step in found.left_out
-            ),
-            *steps.left_out,
-        ),
+        steps.left_out,
+        steps.not_computed,
     )
 
 

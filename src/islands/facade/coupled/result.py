@@ -3,7 +3,8 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -20,6 +21,7 @@ from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
 from islands.figures.names import FREE_RUN, OVERVIEW
 from islands.inspection.noise import measure_output_noise
+from islands.io.checkpoints.writing import replace_file
 from islands.io.ensembles import (
     bands_document,
     bands_from_document,
@@ -29,6 +31,7 @@ from islands.io.ensembles import (
 from islands.io.models import model_json
 from islands.io.result_folder import (
     finite,
+    list_failures,
     record_document,
     residual_structure_document,
     terms_in_result,
@@ -42,7 +45,11 @@ from islands.reports.origin import REPORT_FILE
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics, metrics
-from islands.validation.predictable_residual import ResidualStructure, measure_structure
+from islands.validation.predictable_residual import (
+    ResidualStructure,
+    measure_structure,
+    missing_structure,
+)
 from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
 
 if TYPE_CHECKING:
@@ -215,6 +222,8 @@ class CoupledResult(FittedCoupledModel):
         Estimation data and validation data with the sampling time of the model.
     left_out : tuple of str
         Steps that a request to stop has left out; empty for a complete result.
+    not_computed : mapping
+        Optional steps that failed, each with the reason.
     wall_s : float or None
         Duration of all searches in seconds; None if they were not timed.
     """
@@ -224,6 +233,7 @@ class CoupledResult(FittedCoupledModel):
     refined: bool
     split: CoupledSplit
     left_out: tuple[str, ...] = ()
+    not_computed: Mapping[str, str] = field(default_factory=dict)
     wall_s: float | None = None
 
     def with_wall_time(self, seconds: float) -> "CoupledResult":
@@ -276,16 +286,24 @@ class CoupledResult(FittedCoupledModel):
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / REPORT_FILE).unlink(missing_ok=True)
-        for directory, name, result in zip(
-            list_folders(self.model.output_names), self.model.output_names, self.results, strict=True
-        ):
-            result.save(folder / "outputs" / directory, steps, figures)
-            if FREE_RUN in figures and not steps.skip("figures"):
-                self._draw_figure(name, folder / "figures" / f"free-run-{directory}.svg")
+        folders = list_folders(self.model.output_names)
+        for directory, name, result in zip(folders, self.model.output_names, self.results, strict=True):
+            own = Steps(stop=steps.stop)
+            result.save(folder / "outputs" / directory, own, figures)
+            steps.add(own.left_out, own.not_computed, name)
+        self._write(folder)
+        if FREE_RUN in figures:
+            for directory, name in zip(folders, self.model.output_names, strict=True):
+                path = folder / "figures" / f"free-run-{directory}.svg"
+                steps.attempt(f"figure {path.stem}", partial(self._draw_figure, name, path))
+        if steps.not_computed:
+            replace(self, not_computed={**self.not_computed, **steps.not_computed})._write(folder)
+        return folder
+
+    def _write(self, folder: Path) -> None:
         (folder / "model.json").write_text(model_json(self.model), encoding="utf-8")
         (folder / "summary.txt").write_text(f"{self}\n", encoding="utf-8")
-        (folder / "result.json").write_text(f"{json.dumps(self.document(), indent=2)}\n", encoding="utf-8")
-        return folder
+        replace_file([f"{json.dumps(self.document(), indent=2)}\n".encode()], folder / "result.json")
 
     def _draw_figure(self, output: str, path: Path) -> None:
         from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
@@ -295,7 +313,12 @@ class CoupledResult(FittedCoupledModel):
 
     def document(self) -> dict[str, Any]:
         """Return the content of ``result.json`` as JSON values."""
-        metrics = self.metrics
+        metrics, names, steps = self.metrics, self.model.output_names, Steps()
+        residuals = [
+            steps.attempt(f"residual tests of {name}", partial(self._measure_residual, place))
+            for place, name in enumerate(names)
+        ]
+        not_computed = {**self.not_computed, **steps.not_computed}
         document = {
             "schema": COUPLED_RESULT_SCHEMA,
             "dt": self.model.dt,
@@ -306,6 +329,7 @@ class CoupledResult(FittedCoupledModel):
             "seed": self.results[0].search_result.seed,
             "settings": dict(self.results[0].settings),
             "left_out": list(self.left_out),
+            "not_computed": list_failures(not_computed),
             "equation": self.equation,
             "signals": coupled_signals(self.model),
             "outputs": [
@@ -319,13 +343,13 @@ class CoupledResult(FittedCoupledModel):
                         "noise": measure_output_noise(self.split.estimation.records[place]),
                         "output_range": self.split.validation.records[place].output_range,
                     },
-                    "residual": residual_structure_document(self._measure_residual(place)),
+                    "residual": residual_structure_document(residuals[place] or missing_structure()),
                     "metrics": {
                         part: {mode: asdict(each) for mode, each in by_mode.items()}
                         for part, by_mode in metrics[name].items()
                     },
                 }
-                for place, name in enumerate(self.model.output_names)
+                for place, name in enumerate(names)
             ],
             "inputs": {
                 "estimation": measure_input_ranges(self.split.estimation.records[0]),

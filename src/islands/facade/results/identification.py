@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError, SettingsError, check_type
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import SearchResult, state_steps
 from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
@@ -210,24 +210,26 @@ class Result:
         ----------
         folder : str or Path
         steps : Steps, optional
-            The figures are optional steps, which a stop request leaves out.
+            The figures are optional steps, which a stop request leaves out, and whose failures the texts and
+            ``result.json`` state.
         figures : sequence of str
             Names from ``islands.figures.names.ALL_FIGURES``. A figure that the result does not have, such as
             the loop of a record without one, is left out. Figures and a report of an earlier result are
             removed.
         """
-        folder = Path(folder)
+        folder, steps, found = Path(folder), steps or Steps(), self.search_result
         folder.mkdir(parents=True, exist_ok=True)
         (folder / REPORT_FILE).unlink(missing_ok=True)
-        self._draw_figures(folder / "figures", figures, steps or Steps())
-        write_result(self.search_result, folder)
+        for path in (folder / "figures").glob("*.svg"):
+            path.unlink()  # of an earlier result
+        write_result(found, folder)
+        if figures:  # matplotlib takes half a second to load
+            steps.attempt("figures", partial(self._draw_figures, folder / "figures", figures, steps))
+        if steps.not_computed:
+            write_result(state_steps(found, steps), folder)
         return folder
 
     def _draw_figures(self, folder: Path, names: Sequence[str], steps: Steps) -> None:
-        for path in folder.glob("*.svg"):
-            path.unlink()  # of an earlier result
-        if not names or steps.skip("figures"):  # before matplotlib is loaded, which takes half a second
-            return
         from islands.figures.model_responses import draw_responses  # noqa: PLC0415
         from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
@@ -238,13 +240,21 @@ class Result:
         }
         for name in search_figures(self.search_result):
             drawn[name] = partial(SEARCH_FIGURES[name], self.search_result)
-        for name, draw in drawn.items():
-            if name in names and not steps.skip(f"figure {name}"):
-                save(draw(), folder / f"{name}.svg")
-        if set(names).intersection(RESPONSES) and not steps.skip("figures of responses"):
-            for name, figure in draw_responses(self.best.model, self.search_result.split.estimation).items():
+
+        def draw_one(name: str) -> None:
+            save(drawn[name](), folder / f"{name}.svg")
+
+        def draw_all_responses() -> None:
+            responses = draw_responses(self.best.model, self.search_result.split.estimation)
+            for name, figure in responses.items():
                 if name in names:
                     save(figure, folder / f"{name}.svg")
+
+        for name in drawn:
+            if name in names:
+                steps.attempt(f"figure {name}", partial(draw_one, name))
+        if set(names).intersection(RESPONSES):
+            steps.attempt("figures of responses", draw_all_responses)
 
     def __str__(self) -> str:
         if (document := self._describable_document()) is None:

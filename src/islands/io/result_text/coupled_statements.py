@@ -19,6 +19,7 @@ from islands.io.result_text.statements import (
     describe_excess,
     describe_few_errors,
     describe_insignificant,
+    describe_not_computed,
     describe_unexplained_error,
     describe_wide_band,
     list_insignificant,
@@ -110,6 +111,7 @@ def describe_coupled(document: Document) -> list[str]:
         f"Good for: {'; '.join(good) or 'no use that the checks confirm'}.",
         f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
         f"Next: {'; '.join(write_statements(NEXT_STEPS, facts))}.",
+        *describe_not_computed(document),
     ]
 
 

@@ -6,7 +6,7 @@ them, so that a run, its folder, the REST service, the report and a notebook sta
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import floor, inf
 from typing import Any, Final, Generic, Protocol, TypeVar
 
@@ -16,7 +16,8 @@ from islands.errors import name_option
 from islands.estimation.estimator_table import SIGNIFICANT
 from islands.io.result_text.dry_friction import DryFriction, find_dry_friction
 from islands.models.equations import name_columns
-from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
+from islands.progress import Failure, attempt
+from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, NOT_COMPUTED
 from islands.validation.prediction_bands import LEVEL
 
 #: Smallest R2 of a simulation that counts as good.
@@ -204,7 +205,7 @@ class RunFacts:
     @property
     def has_structure(self) -> bool:
         """Whether the residual of the free run has a predictable part, or the free run diverges."""
-        return self.verdict not in (ADEQUATE, None)
+        return self.verdict not in (ADEQUATE, NOT_COMPUTED, None)
 
     @property
     def has_visible_structure(self) -> bool:
@@ -498,8 +499,8 @@ class Statement(Generic[F_contra]):
 
 
 def find_statements(statements: Iterable[Statement[F]], facts: F) -> list[Statement[F]]:
-    """Return the statements that hold."""
-    return [each for each in statements if each.holds(facts)]
+    """Return the statements that hold, and those of which that is unknown because their predicate fails."""
+    return [each for each in statements if attempt(partial(each.holds, facts))]
 
 
 def write_amount(value: float, unit: str) -> str:
@@ -587,12 +588,29 @@ def describe_findings(document: Document) -> list[str]:
         f"Good for: {'; '.join(good) or 'no use that the checks confirm'}.",
         f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
         f"Next: {'; '.join(write_statements(NEXT_STEPS, facts))}.",
+        *describe_not_computed(document),
     ]
 
 
+def describe_not_computed(document: Document) -> list[str]:
+    """State each optional step that failed, with the reason; a result of an earlier version has none."""
+    return [f"Not computed: {each['step']}: {each['reason']}." for each in document.get("not_computed", ())]
+
+
 def write_statements(statements: Iterable[Statement[F]], facts: F) -> list[str]:
-    """Return the texts of the statements that hold."""
-    return [each.write(facts) for each in find_statements(statements, facts)]
+    """Return the texts of the statements that hold; the text of one that fails says so."""
+    texts = []
+    for each in statements:
+        text = attempt(partial(_write_statement, each, facts))
+        if isinstance(text, Failure):
+            texts.append(f"(not computed: {each.name}: {text.reason})")
+        elif text is not None:
+            texts.append(text)
+    return texts
+
+
+def _write_statement(statement: Statement[F], facts: F) -> str | None:
+    return statement.write(facts) if statement.holds(facts) else None
 
 
 def _describe_rate(facts: ResultFacts) -> str:

@@ -56,7 +56,7 @@ def with_best(findings, **changes):
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
     assert list(result) == [
-        *("schema", "record", "preprocessing", "seed", "settings", "search", "data", "loop"),
+        *("schema", "record", "preprocessing", "seed", "settings", "search", "not_computed", "data", "loop"),
         *("recommended", "models", "ensemble", "linear"),
     ]
     assert result["schema"] == "islands.result/1"

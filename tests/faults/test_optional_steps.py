@@ -1,0 +1,204 @@
+"""A step after the answer never takes the answer away: each of them fails here, one at a time."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import islands
+import islands.facade.library_fit
+import islands.facade.results.identification
+import islands.io.result_folder
+from islands.estimation.structure_selection.certificate import SubsetSearch
+from islands.evolution import search_result
+from islands.facade import final_models, refit
+from islands.facade.coupled import bands as coupled_bands
+from islands.facade.coupled import identification
+from islands.facade.coupled.identification import fit_coupled
+from islands.facade.coupled.result import CoupledResult
+from islands.facade.fit import fit_record
+from islands.facade.results.identification import Result
+from islands.facade.trials.library import TrialLibrary
+from islands.figures import model_responses, registry
+from islands.figures.names import ALL_FIGURES
+from islands.io.result_folder import write_interim_result
+from islands.io.result_text import statements
+from islands.progress import Failure, Steps, StoppedError, attempt, never_stop
+from islands.validation import assessment
+
+
+class InjectedError(ArithmeticError):
+    """The failure of the tests."""
+
+
+def fail(*_arguments, **_options):
+    raise InjectedError("the step fails")
+
+
+def make_record(samples=240):
+    """Return a record of a plant whose linear model differs from the recommended one."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.uniform(-1.0, 1.0, samples // 4), 4)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.8 * y[k - 1] + 0.5 * u[k - 1] + 0.4 * u[k - 1] ** 2
+    return islands.Dataset(u=u, y=y + 0.01 * rng.standard_normal(samples), dt=0.1)
+
+
+def fit(record, **options):
+    return islands.fit(record, library="polynomial", degree=2, lags=1, max_terms=4, **options)
+
+
+#: Step as named in the result, the object that computes it, and its attribute.
+STEPS = {
+    "linear model for comparison": (search_result, "fit_linear_comparison"),
+    "prediction bands": (search_result, "calibrate_bands"),
+    "bounds of the errors of all models": (SubsetSearch, "certify"),
+    "estimation by the error of the free run": (islands.facade.library_fit, "refine_models"),
+    "linear models of the free run": (TrialLibrary, "fit_simulations"),
+    "estimation of the parameters on all data": (refit, "_estimate"),
+    "residual tests": (assessment, "assess_residual"),
+    "physics checks": (assessment, "check_physics"),
+    "facts about the data": (islands.io.result_folder, "measure_output_noise"),
+    "summary.txt": (islands.io.result_folder, "summary"),
+    "method.txt": (islands.io.result_folder, "method_text"),
+    "figures": (registry, "search_figures"),
+    "figures of responses": (model_responses, "draw_responses"),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_a_step_that_fails_leaves_a_line_and_the_models(step, monkeypatch, tmp_path):
+    monkeypatch.setattr(*STEPS[step], fail)
+    result = fit(make_record(), refit="all")
+    folder = result.save(tmp_path / "result", figures=ALL_FIGURES)
+    document = json.loads((folder / "result.json").read_text())
+    reasons = {each["step"]: each["reason"] for each in document["not_computed"]}
+    assert reasons[step].startswith("InjectedError: the step fails (test_optional_steps.py, line")
+    assert f"Not computed: {step}: InjectedError" in " ".join(
+        (folder / "summary.txt").read_text().split()
+    ) or (step == "method.txt" and "Not computed" in (folder / "method.txt").read_text())
+    loaded = islands.load(folder)
+    assert loaded.best.metrics["validation"]["free_run"].r2 > 0.99
+    assert not np.isnan(loaded.simulate(make_record()).y[10:]).any()
+
+
+@pytest.mark.parametrize("name", ["free-run", "residuals", "front", "record"])
+def test_a_figure_that_fails_leaves_the_others(name, monkeypatch, tmp_path):
+    table = "SEARCH_FIGURES" if name in registry.SEARCH_FIGURES else "FIGURES"
+    monkeypatch.setattr(registry, table, {**getattr(registry, table), name: fail})
+    folder = fit(make_record()).save(tmp_path / "result", figures=ALL_FIGURES)
+    drawn = {path.stem for path in (folder / "figures").glob("*.svg")}
+    assert name not in drawn
+    assert {"free-run", "residuals", "front", "record"} - {name} <= drawn
+    assert f"Not computed: figure {name}: InjectedError" in (folder / "summary.txt").read_text()
+
+
+@pytest.mark.parametrize("place", ["holds", "write"])
+def test_a_sentence_that_fails_leaves_the_others(place, monkeypatch):
+    result = fit(make_record())
+    complete = str(result)
+    broken = statements.Statement("broken", *((fail, str) if place == "holds" else (lambda _: True, fail)))
+    monkeypatch.setattr(statements, "MEASURES", (broken, *statements.MEASURES))
+    lines = str(result).splitlines()
+    added = [line for line in lines if line not in complete.splitlines()]
+    assert "(not computed: broken: InjectedError" in added[0]
+    assert [line for line in lines if line not in added] == complete.splitlines()
+
+
+def test_a_model_whose_checks_fail_claims_nothing_about_them(monkeypatch):
+    monkeypatch.setattr(assessment, "check_physics", fail)
+    monkeypatch.setattr(assessment, "assess_residual", fail)
+    text = str(fit(make_record()))
+    assert "bounded at" not in text
+    assert "no structure is left" not in text
+    assert "is predictable" not in text
+
+
+def test_the_models_are_stored_before_the_optional_steps(monkeypatch, tmp_path):
+    class EndOfProcess(BaseException):
+        """The process ends, as by a lack of memory."""
+
+    def end(*_arguments):
+        raise EndOfProcess
+
+    monkeypatch.setattr(search_result, "fit_linear_comparison", end)
+    record, folder = make_record(), tmp_path / "result"
+    with pytest.raises(EndOfProcess):
+        fit_record(
+            *(record, 0.25),
+            library="polynomial",
+            degree=2,
+            lags=1,
+            on_models=lambda found: write_interim_result(found, folder),
+        )
+    loaded = islands.load(folder)
+    assert loaded.best.metrics["validation"]["free_run"].r2 > 0.99
+    assert "Not computed: prediction bands: the command ended before this step." in str(loaded)
+    assert not np.isnan(loaded.simulate(record).y[10:]).any()
+
+
+@pytest.mark.parametrize("step", ["standard errors", "refinement of parameters"])
+def test_a_final_step_of_an_evolution_may_fail(step, monkeypatch):
+    steps = {"standard errors": "_with_standard_errors", "refinement of parameters": "_refine"}
+    monkeypatch.setattr(final_models, steps[step], fail)
+    result = islands.identify(make_record(), preset="narx", islands=1, generations=1, population=20)
+    assert isinstance(result, Result)
+    assert step in result.search_result.search.not_computed
+
+
+def test_an_error_of_the_caller_ends_the_computation():
+    def stop():
+        if asked.append(1) or len(asked) > 1:
+            raise InjectedError("the caller ends the job")
+        return False
+
+    asked = []
+    steps = Steps(stop=stop)
+    with pytest.raises(InjectedError):
+        steps.attempt("step", steps.stop)
+    assert not steps.not_computed
+
+
+def test_a_stop_within_an_optional_step_leaves_it_out():
+    def compute():
+        raise StoppedError("step")
+
+    steps = Steps(stop=never_stop)
+    assert steps.attempt("step", compute) is None
+    assert steps.left_out == ("step",)
+    assert not steps.not_computed
+
+
+def test_the_reason_of_a_deliberate_error_is_its_message():
+    def refuse():
+        raise islands.RecordError("give a longer record")
+
+    assert attempt(refuse) == Failure("give a longer record")
+
+
+#: Optional steps of a result of two outputs.
+COUPLED_STEPS = {
+    "prediction bands": (coupled_bands, "make_ensemble"),
+    "refinement of all equations": (identification, "_refine"),
+    "residual tests of y": (CoupledResult, "_measure_residual"),
+    "figure free-run-1-y": (CoupledResult, "_draw_figure"),
+    "y: linear model for comparison": (search_result, "fit_linear_comparison"),
+}
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("step", COUPLED_STEPS)
+def test_a_step_of_several_outputs_that_fails_leaves_a_line_and_the_model(step, monkeypatch, tmp_path):
+    record = make_record()
+    frame = {"u": record.u[:, 0], "y": record.y, "z": 1.0 + 2.0 * record.y + record.u[:, 0] ** 3}
+    monkeypatch.setattr(*COUPLED_STEPS[step], fail)
+    result = fit_coupled(
+        pd.DataFrame(frame), inputs="u", outputs=("y", "z"), dt=0.1, degree=2, lags=1, max_terms=4
+    )
+    folder = result.save(tmp_path / "result")
+    document = json.loads((folder / "result.json").read_text())
+    assert step in {each["step"] for each in document["not_computed"]}
+    assert f"Not computed: {step}: InjectedError" in " ".join((folder / "summary.txt").read_text().split())
+    assert islands.load(folder).equation == result.equation
