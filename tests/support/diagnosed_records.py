@@ -17,6 +17,7 @@ from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
 from islands.facade.explain_residual import FORMULA
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.progress import Steps
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 
@@ -166,7 +167,9 @@ def _diagnose_until(phase: str) -> DiagnosisResult:
         diagnose(record, simulator, progress=stop, interim=interim)
     found = interim.make_diagnosis()
     assert found is not None
-    return DiagnosisResult.from_diagnosis(found, left_out=(FORMULA,))
+    steps = Steps()
+    steps.leave_out(FORMULA)
+    return DiagnosisResult.from_diagnosis(found).with_steps(steps)
 
 
 def _diagnose_with_formula() -> DiagnosisResult:

@@ -26,6 +26,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect
 from islands.parallel import ParallelMap, intercepted_map
+from islands.progress import explain_failure
 
 #: Steps of a diagnosis after the calibration of the simulation, in their order.
 STEPS = (
@@ -153,6 +154,14 @@ class InterimFindings:
         fit = base if target.has_feedback else found.best
         found = complete_findings(found, fit, target, record_findings, noise_level, rng)
         return replace(found, left_out=tuple(left_out))
+
+    def fail(self, error: Exception, seed: int = 0) -> Diagnosis | None:
+        """Make the result so far of a diagnosis with a step that fails; see `make_diagnosis`."""
+        found = self.make_diagnosis(seed)
+        if found is None:
+            return None
+        steps = ", ".join(found.left_out)
+        return replace(found, left_out=(), not_computed={steps: explain_failure(error)})
 
 
 class _ScreeningFits:

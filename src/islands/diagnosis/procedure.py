@@ -63,7 +63,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect
-from islands.errors import RecordError
+from islands.errors import IslandsError, RecordError
 from islands.parallel import ParallelMap
 from islands.progress import Phase, PhasedProgress, ProgressCallback, ignore_progress
 from islands.simulators.context import make_context
@@ -182,10 +182,17 @@ def diagnose(
         list_late_effects(each, base) if target.has_feedback else each
         for each in (select_effects(simulator, context, prior_std, catalogue, free) for free in (False, True))
     )
-    found = _find_causes(record, base, target, run.with_effects(effects), forms, interim, seed)
-    return interim.complete(
-        complete_findings(found, held or found.best, target, record_findings, noise_level, run.rng)
-    )
+    try:
+        found = _find_causes(record, base, target, run.with_effects(effects), forms, interim, seed)
+        found = complete_findings(found, held or found.best, target, record_findings, noise_level, run.rng)
+    except IslandsError:
+        raise  # of the caller
+    except Exception as error:
+        failed = interim.fail(error, seed)
+        if failed is None:
+            raise
+        found = failed
+    return interim.complete(found)
 
 
 def _find_causes(

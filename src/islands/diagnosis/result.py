@@ -130,6 +130,8 @@ class Diagnosis:
         contradict them.
     left_out : tuple of str
         Steps that a stopped diagnosis has left out; empty for a complete one.
+    not_computed : mapping
+        Steps that failed, each with the reason. The findings are those of the steps before them.
     """
 
     verdict: Verdict
@@ -154,6 +156,7 @@ class Diagnosis:
     values: tuple[CalibratedValue, ...] = ()
     is_time_left_out: bool = False
     left_out: tuple[str, ...] = ()
+    not_computed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def causes(self) -> tuple[Finding, ...]:

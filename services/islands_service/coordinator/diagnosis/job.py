@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from time import sleep
 from typing import TypeVar
 
@@ -11,8 +12,9 @@ from islands.export.closed_form import find_closed_form
 from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.io.result_text.diagnosis_statements import describe_headline
+from islands.models.narx import Model
 from islands.parallel import ParallelMap
-from islands.progress import report_part
+from islands.progress import Steps, report_part
 from islands.reports.origin import Origin
 from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator
@@ -89,36 +91,48 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         run.check()
         return False
 
+    steps = Steps(report, stop)
     try:
         diagnosed = diagnose(
             *(record, simulator, spec.tolerance, spec.seed, report_part(report, 0.0, BEFORE_FORMULA), fits),
             interim=interim,
             noise_level=spec.noise_level,
         )
-        report(FORMULA, BEFORE_FORMULA)
-        start = state.begin_search(diagnosed)
-        formula = explain_residual(diagnosed, spec.seed, on_epoch=report.count_epochs, stop=stop, start=start)
+        steps(FORMULA, BEFORE_FORMULA)
+        count = partial(steps.call, report.count_epochs)
+        begin = partial(state.begin_search, diagnosed)
+        search = partial(explain_residual, diagnosed, spec.seed, on_epoch=count, stop=steps.stop)
+        formula = steps.attempt(FORMULA, lambda: search(start=begin()))
         left_out.remove(FORMULA)
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
-        report("writing the report", BEFORE_REPORT)
+        steps("writing the report", BEFORE_REPORT)
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
         origin = Origin.from_seconds(names, run.job.created, run.job.owner, run.job.id)
-        artefacts[REPORT] = _keep(found.write_report(origin), run.blobs, run.check)
+        made = {REPORT: steps.attempt(REPORT, partial(found.write_report, origin))}
         left_out.remove(REPORT)
-        for name, data in _list_artefacts(found).items():
-            artefacts[name] = _keep(data, run.blobs, run.check)
+        made |= _make_artefacts(found, steps)
+        for name, data in made.items():
+            if data is not None:
+                artefacts[name] = _keep(data, run.blobs, run.check)
         ended = JobState.SUCCEEDED
     except JobCancelled:
         so_far = interim.make_diagnosis(spec.seed)
         if so_far is None:
             raise
-        found = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent, left_out=left_out)
+        found = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent)
+        steps = Steps()
+        for each in left_out:
+            steps.leave_out(each)
         ended = JobState.CANCELLED
-        for name, data in _list_artefacts(found).items():
-            if name not in artefacts:
+        for name, data in _make_artefacts(found, steps).items():
+            if data is not None and name not in artefacts:
                 artefacts[name] = run.blobs.write(data)
-    summary = _make_summary(found, simulator.name, state.note)
-    return JobOutcome(ended, found.document, summary=summary, artefacts=artefacts)
+    model, last = None, Steps()
+    if found.gain is not None:
+        model = last.attempt("equation", lambda: find_closed_form(found.extension.spec))
+    complete = found.with_steps(steps).with_steps(last)
+    summary = _make_summary(complete, simulator.name, model, state.note)
+    return JobOutcome(ended, complete.document, summary=summary, artefacts=artefacts)
 
 
 def _map_on_ray(run: JobRun) -> ParallelMap:
@@ -147,18 +161,19 @@ def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
             return blob
 
 
-def _list_artefacts(found: DiagnosisResult) -> dict[str, bytes]:
+def _make_artefacts(found: DiagnosisResult, steps: Steps) -> dict[str, bytes | None]:
     """Return the artefacts besides the report: the outputs, and what the diagnosis has of the others."""
-    texts = {EXTENDED: found.extended_document, NEXT_EXPERIMENT: found.next_input}
-    return {
-        OUTPUTS: write_outputs(found.record.y, found.simulated_outputs),
-        **{name: text.encode() for name, text in texts.items() if text is not None},
-    }
+    outputs = partial(write_outputs, found.record.y, found.simulated_outputs)
+    texts = {EXTENDED: "extended_document", NEXT_EXPERIMENT: "next_input"}
+    made = {name: steps.attempt(name, partial(getattr, found, text)) for name, text in texts.items()}
+    written = {name: None if text is None else text.encode() for name, text in made.items()}
+    return {OUTPUTS: steps.attempt(OUTPUTS, outputs), **written}
 
 
-def _make_summary(found: DiagnosisResult, simulation: str, note: str) -> dict[str, object]:
+def _make_summary(
+    found: DiagnosisResult, simulation: str, model: Model | None, note: str
+) -> dict[str, object]:
     words = found.summary
-    model = None if found.gain is None else find_closed_form(found.extension.spec)
     return {
         "simulation": simulation,
         "verdict": str(found.verdict),

@@ -1,7 +1,6 @@
 """``islands diagnose``: errors of a simulation on a record, their causes, and the gain of a correction."""
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -51,7 +50,7 @@ from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, DiagnosisR
 from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.result_text.text_layout import wrap
 from islands.processes.pool import process_pool
-from islands.progress import Steps, StoppedError, report_part
+from islands.progress import Steps, report_part
 from islands.reports.origin import REPORT_FILE
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
@@ -152,6 +151,7 @@ def diagnose(
                 found.save(out, ", ".join(path.name for path in records), steps, parallel, day)
             if steps.left_out:
                 write_fits(out, fits)
+        found = replace(found, not_computed={**found.not_computed, **steps.not_computed})
     for paragraph in found.summary.splitlines():
         output.print("\n".join(wrap(paragraph, "    ")), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
@@ -224,10 +224,10 @@ def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps, show: Display) 
         fraction, left = progress.measure(state, settings, perf_counter())
         show(FORMULA, fraction, seconds_left=left)
 
-    with suppress(StoppedError):
-        stop = partial(steps.skip, FORMULA)
-        return explain_residual(diagnosis, seed, on_epoch=count_epochs, stop=stop)
-    return None
+    stop = partial(steps.skip, FORMULA)
+    return steps.attempt(
+        FORMULA, partial(explain_residual, diagnosis, seed, on_epoch=count_epochs, stop=stop)
+    )
 
 
 def _run_self_test(
@@ -239,20 +239,16 @@ def _run_self_test(
     steps: Steps,
 ) -> SelfTest | None:
     """Run the self-test, as an optional step, with a separate progress bar."""
-    if steps.skip(SELF_TEST):
-        return None
-    steps.report(SELF_TEST, 0.0)
-
-    def check() -> None:
-        if steps.skip(SELF_TEST):
-            raise StoppedError(SELF_TEST)
 
     def update(message: str, fraction: float | None = None, /) -> None:
         steps.report(f"{SELF_TEST}, {message}", fraction)
 
-    with suppress(StoppedError), process_pool(workers, check=check) as parallel:
-        return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
-    return None
+    def run() -> SelfTest:
+        steps.report(SELF_TEST, 0.0)
+        with process_pool(workers, check=partial(steps.check, SELF_TEST)) as parallel:
+            return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
+
+    return steps.attempt(SELF_TEST, run)
 
 
 def _read_record(

@@ -21,7 +21,7 @@ from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.diagnosis.result import CalibratedValue, Candidate, Diagnosis
 from islands.diagnosis.surrogates import STRENGTHS
 from islands.effects.catalogue import find_entry, get_title
-from islands.io.result_folder import record_document
+from islands.io.result_folder import list_failures, record_document
 
 #: Plain name of a missing term.
 TERM_TITLE = "missing term"
@@ -80,6 +80,7 @@ def diagnosis_document(
         "exchange": None if diagnosis.exchange is None else _describe_exchange(diagnosis.exchange),
         "record_findings": [each.as_document() for each in diagnosis.record_findings],
         "left_out": list(diagnosis.left_out),
+        "not_computed": list_failures(diagnosis.not_computed),
         "wall_s": wall_s,
     }
 

@@ -1,8 +1,9 @@
 """`DiagnosisResult`: sentences, files, figures and extended simulation of a diagnosis."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
+from islands.io.checkpoints.writing import replace_file
 from islands.io.records.writer import input_csv
 from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands.parallel import ParallelMap
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
     from islands.io.data_frames import RecordLike
 
-#: Document of a folder, which is written last.
+#: Document of a folder.
 DIAGNOSIS_FILE = "discrepancy.json"
 
 
@@ -59,12 +61,18 @@ class DiagnosisResult(Diagnosis):
         formula: ResidualFormula | None = None,
         tested: SelfTest | None = None,
         wall_s: float | None = None,
-        left_out: Sequence[str] = (),
     ) -> "DiagnosisResult":
-        """Return the result of a diagnosis; ``left_out`` are steps after it that were left out."""
+        """Return the result of a diagnosis."""
         values = {each.name: getattr(found, each.name) for each in fields(Diagnosis)}
-        values["left_out"] = (*found.left_out, *left_out)
         return cls(**values, formula=formula, tested=tested, wall_s=wall_s)
+
+    def with_steps(self, steps: Steps) -> "DiagnosisResult":
+        """Return a copy that states the steps after the diagnosis that were left out, or failed."""
+        return replace(
+            self,
+            left_out=(*self.left_out, *steps.left_out),
+            not_computed={**self.not_computed, **steps.not_computed},
+        )
 
     @property
     def summary(self) -> str:
@@ -110,7 +118,7 @@ class DiagnosisResult(Diagnosis):
         parallel_map: ParallelMap = map,
         day: date | None = None,
     ) -> Path:
-        """Write ``report.html``, simulation and input that were found, and, last, ``discrepancy.json``.
+        """Write ``discrepancy.json``, ``report.html``, and the simulation and the input that were found.
 
         ``extended.json`` is written if an effect was added, and ``next-experiment.csv`` if an input separates
         causes that the record does not tell apart.
@@ -122,8 +130,8 @@ class DiagnosisResult(Diagnosis):
         name : str
             Name of the record in the report.
         steps : Steps, optional
-            The report is an optional step, which a stop request leaves out. The document names all steps
-            that were left out.
+            All files but the document are optional steps; a stop request leaves the report out. The document
+            names the steps that were left out, and those that failed.
         parallel_map : ParallelMap
             Draws the figures of the report, which does not depend on it.
         day : date, optional
@@ -133,15 +141,23 @@ class DiagnosisResult(Diagnosis):
         folder.mkdir(parents=True, exist_ok=True)
         for file in (EXTENDED_FILE, NEXT_EXPERIMENT_FILE, DIAGNOSIS_FILE, REPORT_FILE):
             (folder / file).unlink(missing_ok=True)
-        if not steps.skip(REPORT_FILE):
-            (folder / REPORT_FILE).write_bytes(self.write_report(Origin(name, day), parallel_map))
-        if (extended := self.extended_document) is not None:
-            (folder / EXTENDED_FILE).write_text(extended, encoding="utf-8")
-        if (next_input := self.next_input) is not None:
-            (folder / NEXT_EXPERIMENT_FILE).write_text(next_input, encoding="utf-8")
-        complete = replace(self, left_out=(*self.left_out, *steps.left_out))
-        (folder / DIAGNOSIS_FILE).write_text(as_json(complete.document), encoding="utf-8")
+        self._write_document(folder)
+        brief = Steps()  # a stop request does not leave these out
+        texts = {EXTENDED_FILE: "extended_document", NEXT_EXPERIMENT_FILE: "next_input"}
+        for file, attribute in texts.items():
+            text = brief.attempt(file, partial(getattr, self, attribute))
+            if text is not None:
+                (folder / file).write_text(text, encoding="utf-8")
+        report = steps.attempt(REPORT_FILE, partial(self.write_report, Origin(name, day), parallel_map))
+        if report is not None:
+            (folder / REPORT_FILE).write_bytes(report)
+        complete = self.with_steps(steps).with_steps(brief)
+        if complete.left_out or complete.not_computed:
+            complete._write_document(folder)
         return folder
+
+    def _write_document(self, folder: Path) -> None:
+        replace_file([as_json(self.document).encode()], folder / DIAGNOSIS_FILE)
 
     def plot(self, kind: str = "over-time") -> "Figure":
         """Draw a figure of the report.

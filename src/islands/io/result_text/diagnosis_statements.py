@@ -13,7 +13,14 @@ from math import ceil, floor, log10, sqrt
 from typing import Final
 
 from islands.data.channel_names import TEMPERATURES
-from islands.io.result_text.statements import Document, Statement, round_ratio, write_amount, write_statements
+from islands.io.result_text.statements import (
+    Document,
+    Statement,
+    describe_not_computed,
+    round_ratio,
+    write_amount,
+    write_statements,
+)
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
 _WHOLE, _MOST = 0.9, 0.5
@@ -1178,6 +1185,11 @@ DETAILS: Final[tuple[Statement[DiagnosisFacts], ...]] = (
         ),
     ),
     Statement("left-out", lambda facts: facts.document.get("left_out"), _describe_left_out),
+    Statement(
+        "not-computed",
+        lambda facts: facts.document.get("not_computed"),
+        lambda facts: " ".join(describe_not_computed(facts.document)),
+    ),
     Statement("false-alarms", lambda facts: facts.document.get("false_alarm_rate"), _describe_alarms),
     Statement("detection-limits", lambda facts: facts.document.get("detection_limits"), _describe_limits),
 )

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from islands.diagnosis import procedure
 from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.inference.verdict import Verdict
@@ -13,6 +14,7 @@ from islands.diagnosis.interim_findings import (
     ALTERNATIVES,
     COMBINATIONS,
     EVIDENCE,
+    EXTENSION,
     FREE_FORMS,
     GROSS_ERRORS,
     MISSING_TERMS,
@@ -23,6 +25,7 @@ from islands.diagnosis.interim_findings import (
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
+from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave
@@ -103,3 +106,41 @@ def test_document_and_summary_state_what_was_left_out(stopped: list[Diagnosis]) 
         words = DiagnosisResult.from_diagnosis(each).summary
         assert all(step in words for step in each.left_out)
         assert ("was stopped, without" in words) == bool(each.left_out)
+
+
+@pytest.mark.parametrize(
+    ("function", "step"),
+    [
+        ("screen_effects", SCREENING),
+        ("search_with_ar_noise", COMBINATIONS),
+        ("assess_evidence", EVIDENCE),
+        ("compare_with_free_forms", FREE_FORMS),
+        ("find_missing_terms", MISSING_TERMS),
+        # The alternatives that the search has found are stated.
+        ("add_timing_alternatives", EXTENSION),
+        ("refine_extension", EXTENSION),
+    ],
+)
+def test_a_step_that_fails_leaves_the_findings_before_it(
+    function: str, step: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_arguments: object, **_options: object) -> None:
+        raise ZeroDivisionError("the step fails")
+
+    monkeypatch.setattr(noise_floor, "RANDOM_FEATURES", 20)
+    monkeypatch.setattr(procedure, function, fail)
+    found = diagnose(RECORD, RecordedOutput("theirs", U), catalogue=EFFECTS)
+    ((steps, reason),) = found.not_computed.items()
+    assert steps.startswith(step)
+    assert reason.startswith("ZeroDivisionError: the step fails")
+    assert not found.left_out
+    text = DiagnosisResult.from_diagnosis(found).summary
+    assert f"Not computed: {steps}: {reason}." in text
+
+
+def test_an_error_of_the_caller_ends_a_diagnosis() -> None:
+    def refuse(_message: str, _fraction: float | None = None, /) -> None:
+        raise SettingsError("the job has ended")
+
+    with pytest.raises(SettingsError, match="the job has ended"):
+        diagnose(RECORD, RecordedOutput("theirs", U), progress=refuse, catalogue=EFFECTS)

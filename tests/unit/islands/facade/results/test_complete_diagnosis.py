@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 import islands
 from islands.diagnosis.inference.verdict import Verdict
 from islands.io.records import write_record
+from islands.progress import Steps
 from support.command_line import succeed
 
 pytestmark = pytest.mark.ci
@@ -133,6 +134,33 @@ def test_properties_of_the_noise_are_no_claimed_causes(found):
 
 
 def test_a_formula_and_steps_that_were_left_out_are_in_every_text(found):
-    complete = islands.DiagnosisResult.from_diagnosis(found, left_out=("a formula",))
+    steps = Steps()
+    steps.leave_out("a formula")
+    complete = found.with_steps(steps)
     assert "was stopped, without: a formula" in complete.summary
     assert complete.document["left_out"] == ["a formula"]
+
+
+@pytest.mark.parametrize(
+    ("attribute", "file"),
+    [
+        ("write_report", "report.html"),
+        ("extended_document", "extended.json"),
+        ("next_input", "next-experiment.csv"),
+    ],
+)
+def test_a_file_that_fails_leaves_the_diagnosis(attribute, file, found, tmp_path, monkeypatch):
+    def fail(*_arguments):
+        raise ZeroDivisionError("the step fails")
+
+    failing = fail if attribute == "write_report" else property(fail)
+    monkeypatch.setattr(islands.DiagnosisResult, attribute, failing)
+    folder = found.save(tmp_path / "saved")
+    assert not (folder / file).exists()
+    document = json.loads((folder / "discrepancy.json").read_text())
+    ((step, reason),) = [each.values() for each in document["not_computed"]]
+    assert step == file
+    assert reason.startswith("ZeroDivisionError: the step fails")
+    loaded = islands.load(folder)
+    assert f"Not computed: {file}: {reason}." in loaded.summary
+    assert loaded.document["effects"] == found.document["effects"]
