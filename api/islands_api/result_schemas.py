@@ -20,6 +20,9 @@ class IdentificationResult(ResponseModel):
     seed: int
     settings: dict[str, Any] = Field(description="What determines the result besides the record.")
     search: dict[str, Any] = Field(description="Statistics of the search.")
+    not_computed: tuple[dict[str, str], ...] = Field(
+        default=(), description="Steps that failed, each with its step and the reason."
+    )
     recommended: dict[str, Any] | None = Field(
         default=None, description="Rank of the recommended model, and the reasons."
     )
@@ -40,6 +43,9 @@ class CoupledIdentificationResult(ResponseModel):
     seed: int
     settings: dict[str, Any] = Field(description="What determines the result besides the record.")
     equation: str = Field(description="One line for each output.")
+    not_computed: tuple[dict[str, str], ...] = Field(
+        default=(), description="Steps that failed, each with its step and the reason."
+    )
     outputs: tuple[dict[str, Any], ...] = Field(description="Name, unit, errors and bands of each output.")
     models: tuple[ModelView, ...] = Field(description="The model of all outputs.")
     ensemble: list[dict[str, Any]] | None = Field(
@@ -97,6 +103,9 @@ class DiscrepancyResult(ResponseModel):
     )
     record_findings: tuple[dict[str, Any], ...] = Field(default=(), description="Findings about the record.")
     left_out: tuple[str, ...] = Field(default=(), description="Steps that a cancelled diagnosis left out.")
+    not_computed: tuple[dict[str, str], ...] = Field(
+        default=(), description="Steps that failed, each with its step and the reason."
+    )
 
 
 class MonitoredRecordResult(ResponseModel):

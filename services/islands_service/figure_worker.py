@@ -10,9 +10,10 @@ import json
 import resource
 import sys
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from errno import EAGAIN, EINVAL, EIO, ENODATA, ENOSPC, EROFS
+from functools import partial
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -29,13 +30,14 @@ from islands.facade.coupled.result import read_fitted_model
 from islands.figures.drawn_numbers import tabulate_lines
 from islands.figures.free_run import draw_free_run
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
-from islands.figures.style import save
+from islands.figures.style import save, write_text_figure
 from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import any_model_from_json, model_from_json, read_validated_model
 from islands.io.result_folder import result_document
 from islands.io.result_models import read_criterion, read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
+from islands.progress import Failure, attempt
 from islands.reports.comparison import ComparedModel, comparison_report
 from islands.reports.coupled import coupled_report
 from islands.reports.identification import identification_report
@@ -260,10 +262,10 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStat
 
 def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     """Render the figures and the report of a search; return them by artefact name."""
-    made = _save_all({name: SEARCH_FIGURES[name](found) for name in search_figures(found)})
+    made = _save_all({name: partial(SEARCH_FIGURES[name], found) for name in search_figures(found)})
     entry = found.recommended
     names = model_figures(found, entry.model)
-    model = _save_all({name: FIGURES[name](entry, found.split) for name in names})
+    model = _save_all({name: partial(FIGURES[name], entry, found.split) for name in names})
     equation = entry.model.equation().mathml
     report = identification_report(_origin(job), result_document(found), equation, {**model, **made})
     return {**made, REPORT: report}
@@ -277,7 +279,7 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
     names = model_figures(found, entry.model)
-    drawn = {f"{rank}/{name}": FIGURES[name](entry, found.split) for name in names}
+    drawn = {f"{rank}/{name}": partial(FIGURES[name], entry, found.split) for name in names}
     return _save_all(drawn) | write_free_run(entry, found.split.validation, rank)
 
 
@@ -315,7 +317,7 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     made, figures = write_free_runs(data, run, bands), dict[str, bytes]()
     for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
         name = f"1/free-run-{number}"
-        made |= _save_all({name: draw_free_run(each, y, band=band)})
+        made |= _save_all({name: partial(draw_free_run, each, y, band=band)})
         figures[each.output_name] = made[f"{name}.svg"]
     words = str((job.summary or {}).get("words", "")).splitlines()
     sentences = [*words[:1], *words[2:]]  # the second one is the equations
@@ -324,14 +326,25 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     return made
 
 
-def _save_all(figures: Mapping[str, Figure]) -> dict[str, bytes]:
-    """Return every figure as SVG and as a table of its lines, by artefact name."""
+def _save_all(figures: Mapping[str, Callable[[], Figure]]) -> dict[str, bytes]:
+    """Return every figure as SVG and as a table of its lines, by artefact name.
+
+    A figure that fails states the reason, so that the others and the report remain.
+    """
     made = dict[str, bytes]()
-    for name, figure in figures.items():
-        stream = io.BytesIO()
-        save(figure, stream)
-        made |= {f"{name}.svg": stream.getvalue(), f"{name}.csv": tabulate_lines(figure).encode()}
+    for name, draw in figures.items():
+        found = attempt(partial(_save, draw))
+        if isinstance(found, Failure):
+            text = f"Not computed: {found.reason}."
+            found = write_text_figure(text), f"# {text}\n"
+        made |= {f"{name}.svg": found[0], f"{name}.csv": found[1].encode()}
     return made
+
+
+def _save(draw: Callable[[], Figure]) -> tuple[bytes, str]:
+    stream, figure = io.BytesIO(), draw()
+    save(figure, stream)
+    return stream.getvalue(), tabulate_lines(figure)
 
 
 if __name__ == "__main__":

@@ -12,10 +12,10 @@ from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.io.result_text.coupled_statements import describe_coupled
 from islands.io.result_text.statements import describe
+from islands.progress import explain_failure
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import JobOutcome, JobState
-from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
 
@@ -83,13 +83,14 @@ def keep_free_runs(outcome: JobOutcome, write: Callable[[], dict[str, bytes]], r
     """Return an outcome with the free run that a client shows first, unless the job was cancelled.
 
     Without it, for example because the disk is full, the first request for it makes it in another process.
+    It comes after the result, which it must not take away.
     """
     if outcome.state != JobState.SUCCEEDED:
         return outcome
     try:
         return replace(outcome, artefacts={name: run.blobs.write(data) for name, data in write().items()})
-    except StoreError as error:
-        log.warning("free run not stored", job=run.job.id, reason=str(error))
+    except Exception as error:
+        log.warning("free run not stored", job=run.job.id, reason=explain_failure(error))
         return outcome
 
 

@@ -167,6 +167,17 @@ def save(figure: Figure, path: str | Path | IO[bytes]) -> None:
         figure.set_canvas(canvas)
 
 
+def write_text_figure(text: str) -> bytes:
+    """Return an SVG with a text in place of a figure that cannot be drawn."""
+    lines = fill(text, _TITLE_CHARACTERS).splitlines()
+    height = 20 * (len(lines) + 1)
+    rows = "".join(f'<text x="10" y="{20 * at}">{escape(line)}</text>' for at, line in enumerate(lines, 1))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 {height}" font-family="sans-serif" '
+        f'font-size="14"><rect width="100%" height="100%" fill="white"/>{rows}</svg>\n'
+    ).encode()
+
+
 def set_log_scale(axes: Axes) -> None:
     """Set a logarithmic axis of errors, upwards, with plain numbers."""
     axes.set_yscale("log")

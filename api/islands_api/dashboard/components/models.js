@@ -57,6 +57,7 @@ function makeResidualVerdict({ verdict, passed }) {
 
 function makeHysteresisCells(physics) {
   const drift = physics.hold_drift_percent;
+  if (physics.not_computed) return ["not computed", "not computed"];
   return [
     drift === null ? el("span", { class: "no" }, "diverged") : makeExactValue(drift, formatNumber),
     makeVerdict(physics.property_1, "holds", "fails"),
@@ -119,8 +120,13 @@ const formatTarget = (target) => (typeof target === "number" ? `, target ${forma
 
 const formatShare = (share) => (typeof share === "number" ? formatPercent(100 * share) : "diverged");
 
-const listPredictable = ({ predictable_share: shares, predictable_percent: percent }) =>
-  shares
+const listFailures = (physics, residuals) =>
+  [["Physics checks", physics], ["Residual tests", residuals]]
+    .filter(([, checks]) => checks.not_computed)
+    .map(([name, checks]) => [name, `not computed: ${checks.not_computed}`]);
+
+const listPredictable = ({ predictable_share: shares, predictable_percent: percent, not_computed: reason }) =>
+  shares && !reason
     ? [
       ["Predictable residual, one step ahead", formatShare(shares.one_step_ahead)],
       ["Predictable residual, free run", formatShare(shares.free_run)],
@@ -202,6 +208,7 @@ function makeDetail(job, model, hysteresis, signal) {
       ),
     ),
     makeFacts([
+      ...listFailures(physics, model.residual_tests),
       ...listPredictable(model.residual_tests),
       ...(hysteresis ? physics.clusters.map(listClusterSum) : []),
       ...physics.excursions.map(listExcursion),
