@@ -210,7 +210,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
             assessment = with_refit(assessment, model, refit["samples"], discarded, split, constraints)
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(replace(assessment, bands=bands))
-    search = _search(document["search"], store.results.history(job.id))
+    search = _search(document, store.results.history(job.id))
     # The comparison is part of the report on all models only.
     linear = _read_linear_comparison(document, split, shooting) if rank is None else None
     return SearchResult(
@@ -245,7 +245,8 @@ def _read_records(
     return read_record_and_validation(spec, datasets, blobs)
 
 
-def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:
+def _search(result: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:
+    document = result["search"]
     return SearchStatistics(
         document["evaluations"],
         document["outcomes"],
@@ -257,6 +258,8 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStat
         history_from_document(history),
         {},
         document["ended_by"],
+        # Results of earlier versions have none.
+        not_computed={each["step"]: each["reason"] for each in result.get("not_computed", ())},
     )
 
 

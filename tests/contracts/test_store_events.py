@@ -35,8 +35,8 @@ def test_every_change_of_a_job_is_an_event_with_its_version(store):
     lease = claimed(store)
     store.leases.finish(lease, FAILED)
     store.jobs.resume(ALICE, job.id)
-    for _ in range(ATTEMPTS):
-        lease = claimed(store, EXPIRED)
+    last = [claimed(store, EXPIRED).is_last for _ in range(ATTEMPTS)]
+    assert last == [*[False] * (ATTEMPTS - 1), True]
     assert store.leases.claim("another", LONG) is None
     store.jobs.resume(ALICE, job.id)
     store.jobs.cancel(ALICE, job.id)

@@ -13,7 +13,13 @@ from islands.data.dataset import Dataset
 from islands.data.split import describe_search_extrapolation
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import (
+    COMPARISON,
+    ResultCallback,
+    SearchResult,
+    ignore_result,
+    without_optional_steps,
+)
 from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
@@ -60,7 +66,8 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     """Run an identification job from its last checkpoint.
 
     A job that is cancelled ends between two steps, with the models found so far. If its owner stops the
-    search, the epochs end, and all other steps follow.
+    search, the epochs end, and all other steps follow. The last attempt ends with the models of the search,
+    since a step after it may have ended the process in the attempts before.
 
     Raises
     ------
@@ -91,7 +98,10 @@ def run_identification_job(run: JobRun) -> JobOutcome:
             coupled = _identify_outputs(record, validation, spec, start, engine, reporter, stop)
             outcome = _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
             return keep_free_runs(outcome, partial(write_coupled, coupled), run)
-        found = _identify(record, validation, spec, start, engine, reporter, stop)
+        on_models = _end_last_attempt if run.lease.is_last else ignore_result
+        found = _identify(record, validation, spec, start, engine, reporter, stop, on_models)
+    except ModelsFoundError as reached:
+        found = Result.from_search(reached.found).with_wall_time(reporter.spent).search_result
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
     outcome = _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
@@ -114,6 +124,23 @@ def _end_job(
         "best models so far; the operator can raise the limit"
     )
     return make("; ".join(filter(None, [note, limit])), RUN_TIME)
+
+
+class ModelsFoundError(StoppedError):
+    """The last attempt of a job has found its models, before the optional steps.
+
+    Attributes
+    ----------
+    found : SearchResult
+    """
+
+    def __init__(self, found: SearchResult) -> None:
+        super().__init__(COMPARISON)
+        self.found = without_optional_steps(found, "the attempts before the last one ended without a result")
+
+
+def _end_last_attempt(found: SearchResult) -> None:
+    raise ModelsFoundError(found)
 
 
 class SearchStop:
@@ -151,6 +178,7 @@ def _identify(
     engine: Engine,
     reporter: "ProgressReporter",
     stop: SearchStop,
+    on_models: ResultCallback,
 ) -> SearchResult:
     if spec.model != NARX:
         fitted = fit_record(
@@ -162,6 +190,7 @@ def _identify(
             constraints=spec.changes.get("constraints"),
             progress=reporter.report_stage,
             stop=stop,
+            on_models=on_models,
         )
         return fitted.with_wall_time(reporter.spent).search_result
     preset: str | Choice = spec.preset
@@ -178,6 +207,7 @@ def _identify(
         record,
         validation,
         preset=preset,
+        on_models=on_models,
         **_list_arguments(spec, start, engine, reporter, stop),
     )
     reporter.flush()

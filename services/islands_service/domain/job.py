@@ -293,10 +293,13 @@ class Lease:
         The job at the time of the claim.
     epoch : int
         Fencing token, raised by every claim: writes with an older epoch are rejected.
+    is_last : bool
+        Whether the job is given up if this attempt ends without progress, as the attempts before it.
     """
 
     job: Job
     epoch: int
+    is_last: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,7 @@ def _lease_job(connection: Connection, job: str, coordinator: str, seconds: floa
         started=func.coalesce(jobs.c.started, now()),
     )
     append_event(connection, row, "running", json.dumps({"attempt": row.attempt}))
-    return Lease(job_from_row(row), row.lease_epoch)
+    return Lease(job_from_row(row), row.lease_epoch, is_last=row.stalled >= ATTEMPTS)
 
 
 def _give_up(connection: Connection, job: Any) -> None:

@@ -2,18 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.automatic.kind_choice import Choice, measure_share
 from islands.facade.automatic.kind_trials import percent
 from islands.facade.latent_identification import search_latent
 from islands.facade.library_fit import LibraryFit
-from islands.progress import Steps, StoppedError
+from islands.progress import Steps
 from islands.validation.assessment import Assessment, average_errors
 from islands.validation.predictable_residual import ADEQUATE
 
@@ -60,10 +60,11 @@ def compare_latent(
     # The steps of the trial are part of the choice, and not steps of the search that follows.
     trial = Steps(lambda message, _=None: steps.report(f"{_TRIAL}, {message}", None), steps.stop)
     steps.report(_TRIAL, None)
-    try:
-        latent = search_latent(record, split, settings, 0, trial, {}).recommended
-    except (SettingsError, StoppedError):
-        return choice
+    found = trial.attempt(_TRIAL, partial(search_latent, record, split, settings, 0, trial, {}))
+    if found is None:
+        failed = [f"Latent models were not compared: {reason}." for reason in trial.not_computed.values()]
+        return replace(choice, reasons=(*choice.reasons, *failed))
+    latent = found.recommended
     if steps.stop() or not latent.outcomes["validation"]["free_run"]:
         return choice
     # Models of means and of samples are compared in means of equal length.

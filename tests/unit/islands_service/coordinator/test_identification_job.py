@@ -79,6 +79,26 @@ def test_job_finds_the_models_of_a_single_process(
 
 
 @pytest.mark.ci
+def test_last_attempt_ends_with_the_models_of_the_search(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found
+) -> None:
+    lease = claim(store)
+    outcome = run_job(replace(lease, is_last=True), store, blobs)
+    assert outcome.state == JobState.SUCCEEDED
+    found = get_models(outcome)
+    assert [each["equation"] for each in found] == [each["equation"] for each in undisturbed[0]]
+    assert [each["metrics"] for each in found] == [each["metrics"] for each in undisturbed[0]]
+    store.leases.finish(lease, outcome)
+    ended = store.jobs.get(ALICE, job.id)
+    assert ended.summary is not None
+    words = ended.summary["words"].splitlines()
+    assert words[-1].startswith("Not computed: ")
+    assert words[-1].endswith("the attempts before the last one ended without a result.")
+    drawn = read_search_result(ended, store, blobs, None)
+    assert set(drawn.search.not_computed) >= {"linear model for comparison", "prediction bands"}
+
+
+@pytest.mark.ci
 def test_free_run_stored_with_the_result_is_that_of_the_figures(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found
 ) -> None:
