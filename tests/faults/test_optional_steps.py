@@ -24,8 +24,10 @@ from islands.figures import model_responses, registry
 from islands.figures.names import ALL_FIGURES
 from islands.io.result_folder import write_interim_result
 from islands.io.result_text import statements
-from islands.progress import Failure, Steps, StoppedError, attempt, never_stop
 from islands.validation import assessment
+
+#: The laws of `Steps` are in the unit tests.
+pytestmark = pytest.mark.ci
 
 
 class InjectedError(ArithmeticError):
@@ -72,7 +74,7 @@ STEPS = {
 def test_a_step_that_fails_leaves_a_line_and_the_models(step, monkeypatch, tmp_path):
     monkeypatch.setattr(*STEPS[step], fail)
     result = fit(make_record(), refit="all")
-    folder = result.save(tmp_path / "result", figures=ALL_FIGURES)
+    folder = result.save(tmp_path / "result", figures=ALL_FIGURES if "figure" in step else ())
     document = json.loads((folder / "result.json").read_text())
     reasons = {each["step"]: each["reason"] for each in document["not_computed"]}
     assert reasons[step].startswith("InjectedError: the step fails (test_optional_steps.py, line")
@@ -148,36 +150,6 @@ def test_a_final_step_of_an_evolution_may_fail(step, monkeypatch):
     assert step in result.search_result.search.not_computed
 
 
-def test_an_error_of_the_caller_ends_the_computation():
-    def stop():
-        if asked.append(1) or len(asked) > 1:
-            raise InjectedError("the caller ends the job")
-        return False
-
-    asked = []
-    steps = Steps(stop=stop)
-    with pytest.raises(InjectedError):
-        steps.attempt("step", steps.stop)
-    assert not steps.not_computed
-
-
-def test_a_stop_within_an_optional_step_leaves_it_out():
-    def compute():
-        raise StoppedError("step")
-
-    steps = Steps(stop=never_stop)
-    assert steps.attempt("step", compute) is None
-    assert steps.left_out == ("step",)
-    assert not steps.not_computed
-
-
-def test_the_reason_of_a_deliberate_error_is_its_message():
-    def refuse():
-        raise islands.RecordError("give a longer record")
-
-    assert attempt(refuse) == Failure("give a longer record")
-
-
 #: Optional steps of a result of two outputs.
 COUPLED_STEPS = {
     "prediction bands": (coupled_bands, "make_ensemble"),
@@ -188,7 +160,6 @@ COUPLED_STEPS = {
 }
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("step", COUPLED_STEPS)
 def test_a_step_of_several_outputs_that_fails_leaves_a_line_and_the_model(step, monkeypatch, tmp_path):
     record = make_record()

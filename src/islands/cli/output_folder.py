@@ -1,7 +1,7 @@
 """Output folder of a command: the check before the work and the message after it."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,6 +47,12 @@ def keep_models(folder: Path) -> Callable[["SearchResult"], None]:
     from islands.io.result_folder import write_interim_result  # noqa: PLC0415
 
     return partial(write_interim_result, folder=folder)
+
+
+def print_failures(not_computed: Mapping[str, str]) -> None:
+    """Print the steps that failed after the texts of a result were written, each with the reason."""
+    for step, reason in not_computed.items():
+        output.print(f"Not computed: {step}: {reason}.", markup=False)
 
 
 def show_result(result: "Result | CoupledResult", folder: Path) -> None:

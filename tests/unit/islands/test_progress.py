@@ -5,7 +5,17 @@ from itertools import pairwise
 import pytest
 
 from islands.errors import IslandsError
-from islands.progress import Phase, PhasedProgress, Steps, StoppedError, TimeLeft, TimeLimit, report_part
+from islands.progress import (
+    Failure,
+    Phase,
+    PhasedProgress,
+    Steps,
+    StoppedError,
+    TimeLeft,
+    TimeLimit,
+    attempt,
+    report_part,
+)
 
 
 def test_needed_steps_are_reported_until_a_stop_is_requested() -> None:
@@ -165,3 +175,44 @@ def test_parts_of_a_computation_share_the_time_that_is_left() -> None:
     requests.append("stop")
     assert limit()
     assert limit.share(1)()
+
+
+def test_an_error_of_the_caller_ends_the_computation() -> None:
+    asked: list[int] = []
+
+    def stop() -> bool:
+        asked.append(1)
+        if len(asked) > 1:
+            raise ZeroDivisionError("the caller ends the job")
+        return False
+
+    steps = Steps(stop=stop)
+    with pytest.raises(ZeroDivisionError):
+        steps.attempt("step", steps.stop)
+    assert not steps.not_computed
+
+
+def test_a_stop_within_an_optional_step_leaves_it_out() -> None:
+    def compute() -> None:
+        raise StoppedError("step")
+
+    steps = Steps()
+    assert steps.attempt("step", compute) is None
+    assert steps.left_out == ("step",)
+    assert not steps.not_computed
+
+
+def test_an_optional_step_that_fails_is_recorded_with_its_reason_and_place() -> None:
+    steps = Steps()
+    assert steps.attempt("ratio", lambda: 1 // 0) is None
+    assert steps.not_computed["ratio"].startswith("ZeroDivisionError: ")
+    assert "(test_progress.py, line" in steps.not_computed["ratio"]
+    assert steps.attempt("next", lambda: 7) == 7
+    assert steps.left_out == ()
+
+
+def test_the_reason_of_a_deliberate_error_is_its_message() -> None:
+    def refuse() -> None:
+        raise IslandsError("give a longer record")
+
+    assert attempt(refuse) == Failure("give a longer record")

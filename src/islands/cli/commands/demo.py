@@ -13,7 +13,7 @@ from rich.table import Table
 import islands
 from islands.cli.console import output, print_message
 from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
-from islands.cli.output_folder import RESULT_FILES, check_folder, keep_models
+from islands.cli.output_folder import RESULT_FILES, check_folder, keep_models, print_failures
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import stop_requests
@@ -99,8 +99,7 @@ def demo(
             result.save(out, drawing, ALL_FIGURES)
             compared = Steps(show, stop)
             models = compared.attempt(_COMPARISON, partial(_make_paper_models, records, compared)) or {}
-        for step, reason in (drawing.not_computed | compared.not_computed).items():
-            output.print(f"Not computed: {step}: {reason}.", markup=False)
+        print_failures({**drawing.not_computed, **compared.not_computed})
         output.print(f"{out}/: {RESULT_FILES}", markup=False)
         stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
 

@@ -12,7 +12,7 @@ from typing import Any
 import islands
 from islands.cli.console import errors, output, print_message
 from islands.cli.engines import check_engine, default_engine, has_ray, serial_notice, start_engine
-from islands.cli.output_folder import keep_models, show_result
+from islands.cli.output_folder import keep_models, print_failures, show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
@@ -162,7 +162,9 @@ def run(
             result.save(folder, drawing, run_options.figures)
         _show_run(result, run_options, folder, stop)
         if test_data is not None:
-            evaluate_test(result, test_data, folder)
+            steps = Steps()
+            steps.attempt("errors on the test data", partial(evaluate_test, result, test_data, folder))
+            print_failures(steps.not_computed)
         stop.end(folder, (*result.left_out, *drawing.left_out), _explain_continuation(folder))
 
 

@@ -125,8 +125,10 @@ def test_a_result_lists_physics_checks_and_residual_tests(findings):
     for model in loaded(findings)["models"]:
         physics, tests = model["physics"], model["residual_tests"]
         assert set(physics) == {
-            *("property_1", "clusters", "hold_drift_percent", "holds", "excursions", "extremes")
+            *("property_1", "clusters", "hold_drift_percent", "holds", "excursions", "extremes"),
+            "not_computed",
         }
+        assert physics["not_computed"] is tests["not_computed"] is None
         assert physics["property_1"] is True
         assert physics["clusters"] == [{"cluster": "y", "sum": pytest.approx(1.0), "target": 1.0}]
         assert len(physics["holds"]) == 10
@@ -134,7 +136,7 @@ def test_a_result_lists_physics_checks_and_residual_tests(findings):
         assert len(physics["excursions"]) == 4
         assert set(tests) == {
             *("passed", "whiteness_p", "ljung_box", "tests"),
-            *("verdict", "predictable_share", "predictable_percent"),
+            *("verdict", "predictable_share", "predictable_percent", "not_computed"),
         }
         assert tests["verdict"] in ("adequate", "minor", "inadequate")
         assert all(0.0 <= share <= 1.0 for share in tests["predictable_share"].values())
