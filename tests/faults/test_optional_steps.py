@@ -114,6 +114,8 @@ def test_a_model_whose_checks_fail_claims_nothing_about_them(monkeypatch):
     monkeypatch.setattr(assessment, "assess_residual", fail)
     text = str(fit(make_record()))
     assert "bounded at" not in text
+    assert "As a simulation: good" not in text
+    assert "Fails at: physics checks and residual tests: not computed." in text
     assert "no structure is left" not in text
     assert "is predictable" not in text
 

@@ -176,6 +176,8 @@ def _hold(entry: Assessment, split: Split) -> Figure:
 
 def _residuals(entry: Assessment, _split: Split) -> Figure:
     """Draw the correlation functions of the residual with their 95 % band, and its predictable part."""
+    if reason := entry.residual_structure.not_computed:
+        raise ModelError(f"the residuals are not tested ({reason})")
     return _draw_residuals(entry.residual_tests, entry.residual_structure)
 
 

@@ -460,6 +460,12 @@ class ResultFacts(RunFacts):
         return [test for test in self.physics.get("extremes", ()) if not test.get("plausible", True)]
 
     @property
+    def missing_checks(self) -> list[str]:
+        """Names of the checks that are not computed."""
+        checks = {"physics checks": self.physics, "residual tests": self.residual}
+        return [name for name, each in checks.items() if each.get("not_computed")]
+
+    @property
     def diverging(self) -> list[str]:
         """Names of the excursions at which the output diverges."""
         return [test["name"] for test in self.physics["excursions"] if not test["bounded"]]
@@ -1136,6 +1142,11 @@ FAILURES: Final[tuple[Statement[ResultFacts], ...]] = (
         "diverging-excursions",
         lambda facts: facts.diverging,
         lambda facts: f"diverges at {', '.join(facts.diverging)}",
+    ),
+    Statement(
+        "missing-checks",
+        lambda facts: facts.missing_checks,
+        lambda facts: f"{' and '.join(facts.missing_checks)}: not computed",
     ),
     Statement(
         "diverging-holds",
