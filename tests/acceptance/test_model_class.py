@@ -1,16 +1,12 @@
 """A class of models that is added by its file and one entry passes fit, files, bands, exports, diagnosis."""
 
-import ctypes
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
 
 import islands
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, SettingsError
-from islands.export import export, write_export
+from islands.export import export
 from islands.simulation.predictors import free_run
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
@@ -86,27 +82,6 @@ def test_a_model_of_deviations_reads_the_record_as_measured(record):
     exec(program, module)
     found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
     np.testing.assert_allclose(found[1:], free_run(model, record).y[1:], rtol=1e-12)
-
-
-def test_the_python_module_has_the_bits_of_the_simulation(record):
-    model, module = model_of(record), {}
-    exec(export(model, "python"), module)
-    found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
-    np.testing.assert_array_equal(found[1:], free_run(model, record).y[1:])
-
-
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
-def test_the_c_file_has_the_bits_of_the_simulation(record, tmp_path):
-    model = model_of(record)
-    write_export(model, "c", tmp_path / "model.c")
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2", "-ffp-contract=off"]
-    command = ["gcc", *flags, "-shared", "-fPIC", "model.c", "-o", "model.so", "-lm"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    rows = [record.u[:, 0].copy(), record.y.copy(), np.zeros(record.samples)]
-    pointer = ctypes.POINTER(ctypes.c_double)
-    pointers = (row.ctypes.data_as(pointer) for row in rows)
-    ctypes.CDLL(tmp_path / "model.so").simulate(*pointers, ctypes.c_size_t(record.samples))
-    np.testing.assert_array_equal(rows[1][1:], free_run(model, record).y[1:])
 
 
 def test_other_options_are_those_of_narx_models(record):

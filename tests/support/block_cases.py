@@ -1,22 +1,26 @@
-"""Models of one and of several outputs, and the signals of their blocks."""
+"""Models of every class, with a record of each, and the starts of their exported programs."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from islands.data.coupled_record import CoupledRecord
 from islands.data.dataset import Dataset
-from islands.models.block import Block
+from islands.data.preprocessing_steps import Preprocessing, PreprocessingSteps
+from islands.data.signal_map import map_coupled_signals, map_signals, match_rate
+from islands.expressions.evaluation import value
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.user_primitive import primitive
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
-from islands.models.narx import Model
-from islands.simulation.blocks import make_block_simulator
+from islands.simulation.blocks import make_simulator
 from islands.simulation.predictors import free_run
-from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.coupled_systems import PREY, TWO_MASSES, equation
 from support.gain_scheduled import TRUE, GainScheduledModel, make_record
-from support.latent_systems import make_coupled_latent_model, smooth_input
-from support.programs import CASES, model, record, record_of
+from support.latent_systems import SPRING, make_coupled_latent_model, make_model
+from support.programs import CASES, SAMPLES, model
 
 #: Chosen for their states: past inputs and outputs, several inputs, no past, an input that acts at once.
 OF_STATES = {
@@ -34,88 +38,199 @@ OF_STATES = {
     "at once": replace(model({"y(k-1)": 0.5, "u1(k-1)*u2(k-2)": 0.25}, ("a_V+1", "b_A")), dt=0.1),
 }
 
-#: Models of several outputs, and of a state that is not measured, as well.
+_TERMS = {"y(k-1)": 0.5, "max(u1(k-1), u3(k-2))": 0.1, "u2(k-1)*u4(k-1)*y(k-2)": -0.2, "1": 0.1 + 0.2}
+
+#: Three outputs, two inputs, one of which acts within the sample, and names that end comments and strings.
+THREE = CoupledModel(
+    tuple(
+        equation(_TERMS, ("u+1", '*/"""', *(other for other in ("a", "b'", "c") if other != name)), name)
+        for name in ("a", "b'", "c")
+    )
+)
+
+
+def saturate(a):
+    return a / (1.0 + abs(a))
+
+
+_OWN = primitive(
+    "own", saturate, c="return a / (1.0 + fabs(a));", matlab="r = a / (1 + abs(a));"
+)  # not in Modelica
+
+#: Two states and two inputs, which drive the output at once, also through a unit.
+_AT_ONCE = {
+    **{name: SPRING[name] for name in ("a1_1", "a1_2", "a2_1", "a2_2")},
+    "b1_1": 0.02,
+    "b2_2": 0.15,
+    "c1": 1.2,
+    "d1": 0.7,
+    "e2_1": -0.05,
+    "f1": 0.2,
+    "w1_1": 1.0,
+    "v1_2": 0.5,
+    "level": 0.3,
+}
+
+#: A state that no constant input holds, except for zero.
+_INTEGRATOR = {"a1_1": 1.0, "a1_2": 0.1, "a2_2": 0.8, "b2": 0.1, "c1": 1.0}
+
+
+def with_offsets(of, output, inputs):
+    """Return a model of deviations from the given output and inputs."""
+    steps = PreprocessingSteps(detrend="constant")
+    return replace(of, preprocessing=Preprocessing(steps, of.dt, inputs, output, 0.0))
+
+
+#: Models of every class, and with every property on which programs depend.
 OF_BLOCKS = {
     **OF_STATES,
+    "own primitive": replace(
+        model({"y(k-1)": 0.5, "own(u(k-1))": 0.25}, primitives=PRIMITIVES | {"own": _OWN}), dt=0.1
+    ),
+    "means": replace(OF_STATES["tanh"], average=2),
+    "deviations": with_offsets(OF_STATES["many parts"], 0.3, (20.0,)),
+    "deviations at once": with_offsets(OF_STATES["at once"], 0.3, (2.0, -7.0)),
     "two masses": TWO_MASSES,
     "prey": PREY,
+    "three outputs": THREE,
+    "coupled deviations": CoupledModel(
+        tuple(
+            with_offsets(each, y, (5.0, other))
+            for each, y, other in zip(TWO_MASSES.models, (0.3, 40.0), (40.0, 0.3), strict=True)
+        )
+    ),
+    "states from outputs": GainScheduledModel.of_record(make_record(), TRUE),
+    "state space": make_model(operating_inputs=(0.5,)),
+    "state space at once": make_model(
+        _AT_ONCE, input_names=("u_V+1", "v_V+1"), operating_inputs=(0.2, -0.3), memory=45
+    ),
+    "state space of deviations": with_offsets(make_model(operating_inputs=(0.1,), memory=45), 3.7, (20.0,)),
+    "integrator": make_model(_INTEGRATOR, (), operating_inputs=(0.4,)),
     "state spaces": make_coupled_latent_model(),
-    "not measured": GainScheduledModel.of_record(make_record(), TRUE),
+    "state spaces of deviations": CoupledLatentModel(
+        tuple(with_offsets(each, 3.7, (20.0,)) for each in make_coupled_latent_model().models)
+    ),
 }
 
 
 @dataclass(frozen=True)
-class BlockCase:
-    """A model and the signals of its block.
+class Run:
+    """Start and inputs of a free run, for programs of whole records and for blocks.
 
     Attributes
     ----------
-    exported : Model or CoupledModel
-    block : Block
-    past : list of float
-        Samples before the first one, in the order of the state.
+    past : list of float or None
+        Samples before the first compared one, in the order of the state of a block; None for its own.
     inputs : ndarray, shape (samples, inputs)
-    outputs : ndarray, shape (samples, outputs)
+        Inputs of a block, from the first compared sample.
+    u : ndarray, shape (given + samples, inputs)
+        Inputs of a program of whole records.
+    given : int
+        Number of samples before the first compared one in the record of such a program.
+    first : ndarray, shape (given, outputs)
+        Outputs there, which a state space does not read.
+    states : tuple of float or None
+        States of a state space at the first of them; None for those of the program.
     """
 
-    exported: Model | CoupledModel
-    block: Block
-    past: list[float]
+    past: list[float] | None
     inputs: np.ndarray
-    outputs: np.ndarray
+    u: np.ndarray
+    given: int
+    first: np.ndarray
+    states: tuple[float, ...] | None
 
 
-def block_case(name):
-    """Return a case of ``OF_BLOCKS``."""
-    exported = OF_BLOCKS[name]
-    if isinstance(exported, CoupledLatentModel):
-        return rest_case(exported)
+def record_of_class(exported):
+    """Return the inputs, shape (samples, inputs), and the outputs of a record as measured, and the record.
+
+    The inputs move from the first sample on.
+    """
+    rng = np.random.default_rng(8)
     if isinstance(exported, CoupledModel):
-        return coupled_case(exported, make_coupled_record(exported, samples=60))
-    if isinstance(exported, GainScheduledModel):
-        return state_case(exported, make_record(samples=60))
-    return model_case(exported, record(exported.inputs, dt=0.1) if name == "at once" else record_of(name))
-
-
-def rest_case(exported):
-    """Return the case of latent models of several outputs that start at rest."""
-    block, first, u = measured_block(exported), exported.maximum_lag, smooth_input(60, 3)
-    data = CoupledRecord(
-        tuple(Dataset(u, np.zeros(60), 0.01, ("u_V",), name) for name in exported.output_names)
+        parts, names = exported.models, [each.removesuffix("+1") for each in exported.input_names]
+        u = rng.uniform(-0.5, 0.5, size=(SAMPLES, len(names)))
+        y = rng.uniform(-0.5, 0.5, size=(SAMPLES, len(parts)))
+        done = [each.preprocessing for each in parts]
+        if done[0] is not None:
+            u += done[0].input_offsets[: len(names)]
+            y += [each.output_offset for each in done]
+        columns = zip(y.T, exported.output_names, strict=True)
+        return (
+            u,
+            y,
+            CoupledRecord(tuple(Dataset(u, each, exported.dt, names, name) for each, name in columns)),
+        )
+    done, samples = exported.preprocessing, SAMPLES * exported.average
+    data = match_rate(
+        exported,
+        Dataset(
+            rng.normal(size=(samples, exported.inputs)) + (0.0 if done is None else done.input_offsets),
+            rng.normal(size=samples) + (0.0 if done is None else done.output_offset),
+            exported.dt / exported.average,
+            exported.column_names,
+            exported.output_name,
+        ),
     )
-    simulated = make_block_simulator(block, data, None, first)(np.array([exported.parameters]))[0].T
-    start = np.tile(
-        [*(0.0 for _ in exported.models), *block.start_values()[block.outputs :]][: block.computed],
-        (first, 1),
-    )
-    return make_case(exported, data.u, np.concatenate([start, simulated[first:]]), simulated)
+    return data.u, data.y[:, None], data
 
 
-def model_case(exported, data):
-    """Return the case of a model and a record at its rate, as measured."""
+@cache
+def start_from_record(name):
+    """Return the run that starts as `free_run` does, and its outputs, shape (samples, outputs)."""
+    exported = OF_BLOCKS[name]
+    u, y, data = record_of_class(exported)
     simulated = free_run(exported, data)
     assert simulated.outcome
-    return make_case(exported, data.u, data.y[:, None], simulated.y[:, None])
-
-
-def state_case(exported, data):
-    """Return the case of a model with states, which are outputs of its block."""
-    block, first = measured_block(exported), exported.maximum_lag
-    simulated = make_block_simulator(block, data, None, first)(np.array([exported.parameters]))[0].T
-    start = np.array([data.y[:first], *(data.y[:first] - TRUE[-1] for _ in block.starts)]).T
-    return make_case(exported, data.u, np.concatenate([start, simulated[first:]]), simulated)
-
-
-def coupled_case(exported, data):
-    """Return the case of a model of several outputs and a record at its rate, as measured."""
-    simulated = free_run(exported, data)
-    assert simulated.outcome
-    return make_case(exported, data.records[0].u, data.y, simulated.y)
-
-
-def make_case(exported, u, y, simulated):
-    """Return the case of a simulation, of shape (samples, outputs), that starts from measured samples."""
     block, first = measured_block(exported), max(exported.maximum_lag, 1)
-    signals = [*y.T, *u.T]
+    states = []
+    if block.is_state_space:
+        mapped = map_coupled_signals if isinstance(exported, CoupledModel) else map_signals
+        states = make_simulator(exported, mapped(exported, data)[0], None, first).states[0].tolist()
+    elif block.starts:
+        states = [
+            value(each, lambda channel, _lag: y[first - 1, channel], block.parameters)
+            for each in block.starts
+        ]
+    # Equations read one past sample of a state.
+    signals = [*y.T, *(np.full(SAMPLES, state) for state in states), *u.T]
     past = [float(signals[channel][first - lag]) for channel, lag in block.samples]
-    return BlockCase(exported, block, past, np.ascontiguousarray(u[first:]), simulated[first:])
+    given = 1 if block.is_state_space else exported.maximum_lag
+    begin = first - given
+    run = Run(past, u[first:], u[begin:], given, y[begin:first], tuple(states) or None)
+    return run, simulated.y.reshape(len(u), -1)[first:]
+
+
+@cache
+def start_by_default(name):
+    """Return the run without a given start, and the outputs of the equations of the block."""
+    exported = OF_BLOCKS[name]
+    u, block = record_of_class(exported)[0], measured_block(exported)
+    given = 0 if block.is_state_space else exported.maximum_lag
+    newest = [block.levels.get(signal, 0.0) for signal in block.signals]
+    values = dict(zip(block.samples, block.start_values(), strict=True))
+    newest[: block.computed] = [values[channel, 1] for channel in range(block.computed)]
+    before = np.tile(newest[block.computed :], (given, 1))
+    first = np.tile(newest[: block.outputs], (given, 1))
+    run = Run(None, u, np.vstack([before, u]), given, first, None)
+    return run, evaluate_equations(block, newest, u)
+
+
+def evaluate_equations(block, levels, u):
+    """Return the outputs of a block that follow constant signals, shape (samples, outputs)."""
+    depth = max(block.depths)
+    history = [[level] * depth for level in levels]
+    for k, inputs in enumerate(u, start=depth):
+        for signal, sample in zip(history[block.computed :], inputs, strict=True):
+            signal.append(float(sample))
+        for place in block.order:
+            total = 0.0
+            for term in block.equations[place]:
+                found = value(
+                    term.expression,
+                    lambda channel, lag, k=k: history[channel][k - lag + block.leads[channel]],
+                    block.parameters,
+                )
+                total += block.parameters[term.weight] * found if term.weight else found
+            history[place].append(total)
+    return np.array(history[: block.outputs]).T[depth:]

@@ -1,6 +1,8 @@
 """Exported programs and blocks, run on a record or on the signals of a block."""
 
 import ctypes
+import math
+import re
 import shutil
 import subprocess
 
@@ -11,6 +13,7 @@ from fmpy.validation import validate_fmu
 
 from islands.export import export, write_export
 from islands.export.fmu.compiler import find_compiler
+from islands.models.measured_signals import measured_block
 from islands_measurements.speed.compiled_c import compile_model
 from support.equation_programs import OCTAVE_FILES
 
@@ -133,22 +136,27 @@ const char *run(double *past, size_t count, int is_double, const double *u, size
 """
 
 
-def run_s_function(case, past, folder, is_double=True):
-    """Run the compiled S-function; return its error and its output."""
+def build_s_function(exported, folder):
+    """Compile the S-function; return a function of the parameter and the inputs of a `Run`."""
     (folder / "simstruc.h").write_text(_SIMULINK)
     (folder / "simulink.c").write_text(_LOOP)
     strict = ("-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror")
+    write_export(exported, "s-function", folder / "model.c")
     flags = (*strict, "-DMATLAB_MEX_FILE", f"-I{folder}")
-    write_export(case.exported, "s-function", folder / "model.c")
     library = compile_model((folder / "model.c").read_text(), flags, folder)
     library.run.restype = ctypes.c_char_p
-    given = (past, case.inputs, np.empty(case.outputs.shape))
-    arrays = [np.ascontiguousarray(values, dtype=float) for values in given]
+    outputs = measured_block(exported).computed
 
-    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in arrays]
-    sizes = [ctypes.c_size_t(len(each)) for each in arrays]
-    error = library.run(pointers[0], sizes[0], is_double, pointers[1], sizes[1], pointers[2])
-    return error, arrays[2]
+    def simulate(run, is_double=True):
+        given = ([] if run.past is None else run.past, run.inputs, np.empty((len(run.inputs), outputs)))
+        arrays = [np.ascontiguousarray(values, dtype=float) for values in given]
+        pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in arrays]
+        sizes = [ctypes.c_size_t(len(each)) for each in arrays]
+        error = library.run(pointers[0], sizes[0], is_double, pointers[1], sizes[1], pointers[2])
+        assert error is None, error.decode()
+        return arrays[2]
+
+    return simulate
 
 
 #: The part of the base class that Simulink calls. Octave has no protected access from a base class.
@@ -162,7 +170,7 @@ function r = read(name, columns)
   file = fopen(name); r = fread(file, [columns Inf], 'double')'; fclose(file);
 end
 block = narx_system();
-block.Start = read('past', 1)';
+if exist('past', 'file'), block.Start = read('past', 1)'; end
 resetImpl(block);
 inputs = num2cell(read('inputs', {inputs}));
 y = cell(rows(inputs), {outputs});
@@ -176,52 +184,177 @@ file = fopen('outputs', 'w'); fwrite(file, cell2mat(y)', 'double'); fclose(file)
 """
 
 
-def run_matlab_system(case, folder):
-    """Run the class in Octave and return the outputs."""
-    package = folder / "+matlab"
+def build_matlab_system(exported, folder):
+    """Write the class; return a function of a `Run` that runs it in Octave."""
+    block, package = measured_block(exported), folder / "+matlab"
     package.mkdir()
     (package / "System.m").write_text(_SYSTEM)
-    write_export(case.exported, "matlab-system", folder / "narx_system.m")
+    write_export(exported, "matlab-system", folder / "narx_system.m")
     text = (folder / "narx_system.m").read_text()
     for attributes in (" (Access = protected)", " (DiscreteState)", " (Nontunable)"):
         assert attributes in text
         text = text.replace(attributes, "")
     (folder / "narx_system.m").write_text(text.replace("(Static, Access = private)", "(Static)"))
-    np.array(case.past).tofile(folder / "past")
-    case.inputs.tofile(folder / "inputs")
-    direct = " ".join(str(int(each)) for each in case.block.feedthrough)
-    script = _SYSTEM_LOOP.format(inputs=case.inputs.shape[1], outputs=case.block.computed, direct=direct)
-    octave(script, folder)
-    return np.fromfile(folder / "outputs").reshape(case.outputs.shape)
+
+    def simulate(run):
+        (folder / "past").unlink(missing_ok=True)
+        if run.past is not None:
+            np.array(run.past).tofile(folder / "past")
+        run.inputs.tofile(folder / "inputs")
+        direct = " ".join(str(int(each)) for each in block.feedthrough)
+        octave(_SYSTEM_LOOP.format(inputs=run.inputs.shape[1], outputs=block.computed, direct=direct), folder)
+        return np.fromfile(folder / "outputs").reshape(-1, block.computed)
+
+    return simulate
 
 
-def run_fmu(case, folder, kind):
-    """Simulate the FMU, which fmpy validates, and return the outputs.
+def build_fmu(kind):
+    """Return a function that builds an FMU, which fmpy validates, and returns a function of a `Run`.
 
     An input that acts at once delays the output by one sampling time: it has the past output first, and not
-    the last one.
+    the last one, which is NaN here.
     """
-    path = folder / "model.fmu"
-    write_export(case.exported, kind, path)
-    assert validate_fmu(str(path)) == []
-    columns, outputs = case.block.columns, case.block.columns[: case.block.computed]
-    inputs = columns[case.block.computed :]
-    signals = np.empty(len(case.inputs), [(column, float) for column in ("time", *inputs)])
-    signals["time"] = np.arange(len(case.inputs)) * case.block.dt
-    for column, values in zip(inputs, case.inputs.T, strict=True):
-        signals[column] = values
-    names = [f"start.{columns[channel]}[{lag}]" for channel, lag in case.block.samples]
-    found = fmpy.simulate_fmu(
-        str(path),
-        stop_time=signals["time"][-1],
-        step_size=case.block.dt,
-        output_interval=case.block.dt,
-        start_values=dict(zip(names, case.past, strict=True)),
-        input=signals,
-        output=outputs,
-    )
-    signals = np.column_stack([found[column] for column in outputs])
-    if not any(case.block.feedthrough):
-        return signals
-    np.testing.assert_array_equal(signals[0], case.past[:1])
-    return signals[1:]
+
+    def build(exported, folder):
+        write_export(exported, kind, folder / "model.fmu")
+        assert validate_fmu(str(folder / "model.fmu")) == []
+        block = measured_block(exported)
+        columns, outputs = block.columns, block.columns[: block.computed]
+
+        def simulate(run):
+            signals = np.empty(len(run.inputs), [(column, float) for column in ("time", *columns)])
+            signals["time"] = np.arange(len(run.inputs)) * block.dt
+            for column, values in zip(columns[block.computed :], run.inputs.T, strict=True):
+                signals[column] = values
+            names = [f"start.{columns[channel]}[{lag}]" for channel, lag in block.samples]
+            found = fmpy.simulate_fmu(
+                str(folder / "model.fmu"),
+                stop_time=signals["time"][-1],
+                step_size=block.dt,
+                output_interval=block.dt,
+                start_values={} if run.past is None else dict(zip(names, run.past, strict=True)),
+                input=signals[["time", *columns[block.computed :]]],
+                output=outputs,
+            )
+            y = np.column_stack([found[column] for column in outputs])
+            if not any(block.feedthrough):
+                return y
+            past = block.start_values() if run.past is None else run.past
+            newest = [block.position(signal, 1) for signal in block.signals[: block.computed]]
+            np.testing.assert_array_equal(y[0], np.array(past)[newest])
+            return np.vstack([y[1:], np.full((1, block.computed), np.nan)])
+
+        return simulate
+
+    return build
+
+
+def build_python(exported, _folder):
+    """Return a function of a `Run` that calls ``simulate`` of the module."""
+    module = {}
+    exec(export(exported, "python"), module)
+
+    def simulate(run):
+        y = module["simulate"](*run.u.T.tolist(), *_list_starts(exported, run))
+        return np.array(y).reshape(-1, len(run.u)).T[run.given :]
+
+    return simulate
+
+
+def build_c(exported, folder):
+    """Compile the file; return a function of a `Run` that calls ``simulate``."""
+    block = measured_block(exported)
+    library = compile_model(export(exported, "c"), FLAGS, folder)
+    library.simulate.restype = None
+
+    def simulate(run):
+        computed = np.full((block.computed, len(run.u)), np.nan)
+        starts = _list_starts(exported, run)
+        if block.is_state_space:
+            starts = [np.array(each) for each in starts] or [None]
+        else:
+            computed[: block.outputs, : run.given] = starts
+            starts = []
+        arrays = [*(np.ascontiguousarray(column) for column in run.u.T), *starts, *computed]
+        pointers = [None if each is None else pointer(each) for each in arrays]
+        library.simulate(*pointers, ctypes.c_size_t(len(run.u)))
+        return computed.T[run.given :, : block.outputs]
+
+    return simulate
+
+
+def build_matlab(exported, folder):
+    """Write the function; return a function of a `Run` that calls it in Octave."""
+    text = export(exported, "matlab")
+    name = re.match(r"function .* = (\w+)\(", text)[1]
+    (folder / f"{name}.m").write_text(text, encoding="ascii")
+    outputs = measured_block(exported).outputs
+
+    def simulate(run):
+        arguments = [*run.u.T, *map(np.array, _list_starts(exported, run))]
+        for place, values in enumerate(arguments):
+            values.tofile(folder / f"a{place}")
+        read = ", ".join(f"read_numbers('a{place}')" for place in range(len(arguments)))
+        results = ", ".join(f"y{place}" for place in range(outputs))
+        octave(f"{OCTAVE_FILES}\n[{results}] = {name}({read}); write_numbers('y', [{results}]);", folder)
+        return np.fromfile(folder / "y").reshape(outputs, -1).T[run.given :]
+
+    return simulate
+
+
+def build_modelica(exported, _folder):
+    """Translate the block to Python; return a function of a `Run` that evaluates its equations in order."""
+    block, text = measured_block(exported), export(exported, "modelica")
+    known = {name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tanh")}
+    for name, arguments, right in _MODELICA_FUNCTION.findall(text):
+        inputs = ", ".join(re.findall(r"input Real (\w);", arguments))
+        exec(f"def {name}({inputs}): return {_translate(right)}", known)
+    lines = text.partition(" then\n")[2].partition("  end when;")[0].split(";")
+    equations = [_translate(" ".join(each.split())) for each in lines if each.strip()]
+    starts = re.findall(r"parameter Real start_(\w+)\[(\d+)\] = fill\((\S+), \d+\)", text)
+
+    def simulate(run):
+        past = {f"past_{name}": [float(value)] * int(depth) for name, depth, value in starts}
+        for (channel, lag), value in zip(block.samples, run.past or (), strict=run.past is not None):
+            past[f"past_{block.signals[channel]}"][lag - 1] = value
+        found = []
+        for sample in run.inputs.tolist():
+            names = {**known, **{f"pre_{name}": list(values) for name, values in past.items()}, **past}
+            names.update(zip(block.signals[block.computed :], sample, strict=True))
+            for each in equations:
+                exec(each, names)
+            found.append([names[name] for name in block.signals[: block.computed]])
+        return np.array(found)
+
+    return simulate
+
+
+#: A function of a Modelica block: name, arguments, value.
+_MODELICA_FUNCTION = re.compile(r"function (\w+)\n(.*?)  algorithm\n    r := (.*?);\n", re.DOTALL)
+
+
+def _translate(text):
+    """Return an equation or an expression of Modelica, whose indices count from 1, in Python."""
+    text = re.sub(r"pre\((past_\w+)\[(\d+)\]\)", lambda leaf: f"pre_{leaf[1]}[{int(leaf[2]) - 1}]", text)
+    text = re.sub(r"\b(past_\w+)\[(\d+)\] =", lambda leaf: f"{leaf[1]}[{int(leaf[2]) - 1}] =", text)
+    return re.sub(r"(?:else)?if (.*?) then (.*?) (?=else)", r"else \2 if \1 ", text).removeprefix("else ")
+
+
+def _list_starts(exported, run):
+    """Return the further arguments of ``simulate`` of a program of whole records."""
+    if measured_block(exported).is_state_space:
+        return [] if run.states is None else [run.states]
+    return run.first.T.tolist()
+
+
+#: Formats that are run: function that builds a program, and its tool.
+BUILDERS = {
+    "python": (build_python, None),
+    "c": (build_c, needs_compiler),
+    "modelica": (build_modelica, None),
+    "matlab": (build_matlab, needs_octave),
+    "s-function": (build_s_function, needs_compiler),
+    "matlab-system": (build_matlab_system, needs_octave),
+    "fmu": (build_fmu("fmu"), needs_compiler),
+    "fmu2": (build_fmu("fmu2"), needs_compiler),
+}

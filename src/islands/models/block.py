@@ -9,8 +9,8 @@ Simulink and Modelica. Its state is the past samples that the equations read, ne
 import json
 import math
 import textwrap
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from islands.data.preprocessing_steps import Preprocessing
@@ -67,13 +67,18 @@ class Block:
         ``Lagged(channel, 1)`` of such an input is its sample k.
     parameters : mapping
         Value of each parameter by name, in the order of the model.
-    maximum_lag : int
+    warm_up : int
+        Number of samples of a record before the first one that a simulation computes, unless another one is
+        given.
     dt : float or None
         Sampling time in seconds; None for any.
     values : str
         What a sample is, see `describe_values`; empty for a sample of the record.
     texts : tuple of str
         Text of the equations: ``y1(k) = 0.9*y1(k-1) + 0.2*y2(k-1)``.
+    levels : mapping
+        Value of outputs and inputs, by name, before the first sample of a program unless others are given; 0
+        for signals that are not listed.
     """
 
     equations: tuple[tuple[BlockTerm, ...], ...]
@@ -82,10 +87,11 @@ class Block:
     starts: tuple[Expression, ...]
     leads: tuple[int, ...]
     parameters: Mapping[str, float]
-    maximum_lag: int
+    warm_up: int
     dt: float | None
     values: str
     texts: tuple[str, ...]
+    levels: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def computed(self) -> int:
@@ -161,12 +167,60 @@ class Block:
             raise ModelError(f"the parameter of {name} is {value}: an export needs finite parameters")
         return value
 
+    @cached_property
+    def maximum_lag(self) -> int:
+        """Number of samples from which a simulation starts.
+
+        They are those of the warm-up, whose outputs are measured; of a state space, those that it reads.
+        """
+        if not self.is_state_space:
+            return self.warm_up
+        return max((lag for each in self._expressions for _, lag in lags(each)), default=1)
+
+    @cached_property
+    def is_state_space(self) -> bool:
+        """Whether the states at one sample, and the inputs from there, determine all outputs.
+
+        An equation of a state reads one sample back, that of an output reads sample k, and no measured output
+        determines a state.
+        """
+        channels = {name: channel for channel, name in enumerate(self.signals)}
+        reads_states = all(
+            lag == int(place >= self.outputs) and channels[name] >= self.outputs
+            for place in range(self.computed)
+            for name, lag in self._find_samples(place)
+        )
+        return bool(self.starts) and reads_states and not any(map(lags, self.starts))
+
     def start_values(self) -> tuple[float, ...]:
-        """Return the value of each past sample of the state if all measured samples are zero."""
-        found = [0.0] * self.outputs
-        found += [value(start, lambda _channel, _lag: 0.0, self.parameters) for start in self.starts]
-        found += [0.0] * (len(self.signals) - self.computed)
-        return tuple(found[channel] for channel, _ in self.samples)
+        """Return the value of each past sample of the state of a program, unless others are given."""
+        levels = self._find_levels()
+        return tuple(levels[channel] for channel, _ in self.samples)
+
+    def first_states(self) -> tuple[float, ...]:
+        """Return the states of a state space at the first sample of a program, unless others are given.
+
+        They follow from `start_values`, so that they are those of the start, up to rounding, if it is a rest.
+        """
+        levels = self._find_levels()
+        return tuple(self._evaluate(place, levels) for place in range(self.outputs, self.computed))
+
+    def _find_levels(self) -> list[float]:
+        """Return the value of each signal before the first sample of a program."""
+        found = [self.levels.get(name, 0.0) for name in self.signals]
+        for place, start in enumerate(self.starts, start=self.outputs):
+            found[place] = value(start, lambda channel, _lag: found[channel], self.parameters)
+        if self.is_state_space:
+            found[: self.outputs] = [self._evaluate(place, found) for place in range(self.outputs)]
+        return found
+
+    def _evaluate(self, place: int, levels: Sequence[float]) -> float:
+        """Return the right side of an equation if all signals are constant, rounded as in programs."""
+        total = 0.0
+        for term in self.equations[place]:
+            found = value(term.expression, lambda channel, _lag: levels[channel], self.parameters)
+            total += self.parameters[term.weight] * found if term.weight else found
+        return float(total)
 
     @property
     def _expressions(self) -> list[Expression]:
@@ -191,10 +245,13 @@ class Block:
     @cached_property
     def samples_read(self) -> set[tuple[str, int]]:
         """Samples that the equations read: signal and lag."""
+        return {sample for place in range(self.computed) for sample in self._find_samples(place)}
+
+    def _find_samples(self, place: int) -> set[tuple[str, int]]:
+        """Return the samples that one equation reads: signal and lag."""
         return {
             (self.signals[channel], lag - self.leads[channel])
-            for equation in self.equations
-            for term in equation
+            for term in self.equations[place]
             for channel, lag in lags(term.expression)
         }
 
@@ -268,6 +325,24 @@ class Block:
         lines += ["", self.describe_signals(quote_name)]
         return "\n".join(f"{mark} {line}".rstrip() for line in lines)
 
+    def describe_start(self, mark: str) -> str:
+        """Return a comment that states where a free run starts; every line begins with ``mark``."""
+        if self.is_state_space:
+            names = self.signals[self.computed :]
+            point = ", ".join(f"{name} = {self.levels.get(name, 0.0):.6g}" for name in names)
+            text = (
+                "The free run starts from the states at sample 0, given ones or those at the operating point "
+                f"{point}, and computes every sample. `islands simulate` estimates them from the measured "
+                f"output of the first {self.warm_up} samples, prints them, and computes the next samples."
+            )
+        else:
+            samples = "sample" if self.warm_up == 1 else f"{self.warm_up} samples"
+            text = (
+                f"The free run starts from the first {samples} of the measured output, as does "
+                f"`islands simulate --warm-up {self.warm_up}` unless it states that it estimated them."
+            )
+        return textwrap.fill(text, 100, initial_indent=mark, subsequent_indent=mark)
+
     def check_names(self) -> None:
         """Check that a simulator can call the block at its sampling time.
 
@@ -314,4 +389,8 @@ def subtract_offsets(block: Block, preprocessing: Preprocessing | None) -> Block
     ]
     equations[0].append(BlockTerm(Constant(offsets[0])))
     starts = tuple(replace_leaves(start, subtract) for start in block.starts)
-    return replace(block, equations=tuple(map(tuple, equations)), starts=starts)
+    levels = {
+        name: block.levels.get(name, 0.0) + offset
+        for name, offset in zip(block.signals, offsets, strict=True)
+    }
+    return replace(block, equations=tuple(map(tuple, equations)), starts=starts, levels=levels)

@@ -158,10 +158,11 @@ class CoupledLatentModel(CoupledModel):
             starts=tuple(start for each in moved for start in each.starts),
             leads=(*self.leads[:outputs], *(0,) * states, *self.leads[outputs:]),
             parameters=parameters,
-            maximum_lag=self.maximum_lag,
+            warm_up=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
             texts=tuple(text for block in blocks for text in block.texts),
+            levels={name: level for block in blocks for name, level in block.levels.items()},
         )
 
 

@@ -203,7 +203,7 @@ class CoupledModel:
             starts=(),
             leads=self.leads,
             parameters=parameters,
-            maximum_lag=self.maximum_lag,
+            warm_up=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
             texts=tuple(texts),

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from islands.data.channel_names import parse_channel_name
 from islands.data.flat_extremes import NO_LIMITS, SensorLimits
 from islands.errors import ModelError
+from islands.models.block import Block
 from islands.models.equations import signal_names
 from islands.models.linear_system import (
     LinearSystem,
@@ -262,6 +263,12 @@ class LatentModel(ParametricModel):
     def codes(self) -> NDArray[np.int64]:
         """Codes of the units for the kernel."""
         return find_codes(self.units)
+
+    def block(self) -> Block:
+        """Return the difference equations; the inputs are those of the operating point before a start."""
+        found = super().block()
+        levels = zip(found.signals[found.computed :], self.operating_inputs, strict=True)
+        return replace(found, levels=dict(levels))
 
     def right_sides(self) -> Mapping[str, str]:
         """Return the equations of the output and of the states, with the units inside."""

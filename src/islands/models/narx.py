@@ -154,7 +154,7 @@ class Model:
             starts=(),
             leads=self.leads,
             parameters=dict(zip(names, self.theta or (nan,) * self.size, strict=True)),
-            maximum_lag=self.maximum_lag,
+            warm_up=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
             texts=(equation(self),),

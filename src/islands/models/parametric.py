@@ -166,7 +166,7 @@ class ParametricModel(ABC):
             starts=tuple(map(self._parse, self.starts)),
             leads=self.leads,
             parameters=dict(zip(self.names, self.parameters, strict=True)),
-            maximum_lag=self.maximum_lag,
+            warm_up=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
             texts=tuple(self._write_lines(sides, self.signals, self.signals)),

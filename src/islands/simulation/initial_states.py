@@ -9,9 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.data.dataset import Dataset
+from islands.data.signal_map import map_coupled_signals, map_signals
 from islands.kernels.state_estimation import find_nearest, minimise_error
 from islands.kernels.state_space import simulate_state_space
+from islands.models.coupled_latent import CoupledLatentModel
+from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
 
 #: Weight of the measurement of the initial states, relative to the variance of the output of the states.
@@ -169,6 +173,30 @@ def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tu
     return np.column_stack(columns), late
 
 
+def estimate_first_states(
+    model: LatentModel, record: Dataset, begin: int, end: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Estimate the states at the first sample of a part of a segment whose inputs are known.
+
+    Parameters
+    ----------
+    model : LatentModel
+    record : Dataset
+        Signals of the model.
+    begin, end : int
+        First sample of a segment, and sample after the last one that is used.
+
+    Returns
+    -------
+    states : ndarray, shape (states,)
+    u : ndarray, shape (rows, inputs)
+        Inputs from the sample of the states on, as of `read_inputs`.
+    """
+    u, late = read_inputs(record, model, begin, end)
+    segment = Segment(u, record.y[begin + late : end], *model.limits.range)
+    return estimate_states(model.theta, model.codes, segment, model.rest), u
+
+
 def estimate_initial_states(
     model: LatentModel, record: Dataset, start: NDArray[np.int64], warm_up: int
 ) -> NDArray[np.float64]:
@@ -193,11 +221,38 @@ def estimate_initial_states(
     theta, codes = model.theta, model.codes
     found = []
     for first in start.tolist():
-        begin = first - warm_up
-        u, late = read_inputs(record, model, begin, first)
-        segment = Segment(u, record.y[begin + late : first], *model.limits.range)
-        x = estimate_states(theta, codes, segment, model.rest)
+        x, u = estimate_first_states(model, record, first - warm_up, first)
         rows = len(u) - 1
         bounded = simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) == rows
         found.append(x if bounded else np.full(len(x), np.nan))
     return np.array(found)
+
+
+def find_first_states(
+    model: AnyModel, record: AnyRecord, warm_up: int
+) -> tuple[int, NDArray[np.float64]] | None:
+    """Return the states from which an exported program repeats a free run of the first recording.
+
+    Parameters
+    ----------
+    model : DynamicModel or CoupledModel
+    record : Dataset or CoupledRecord
+        As for `free_run`.
+    warm_up : int
+        Number of samples before the first prediction.
+
+    Returns
+    -------
+    (int, ndarray of shape (states,)) or None
+        Sample, and the states there. None for a model whose first outputs are given.
+    """
+    if isinstance(model, LatentModel) and isinstance(record, Dataset):
+        pairs = [(model, map_signals(model, record)[0])]
+    elif isinstance(model, CoupledLatentModel) and isinstance(record, CoupledRecord):
+        pairs = [*zip(model.models, map_coupled_signals(model, record)[0].records, strict=True)]
+    else:
+        return None
+    begin = next(begin for begin, end in record.bounds if end - begin > warm_up)
+    found = [estimate_first_states(*pair, begin, begin + warm_up) for pair in pairs]
+    late = warm_up - len(found[0][1])
+    return begin + late, np.concatenate([states for states, _ in found])

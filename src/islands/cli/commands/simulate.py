@@ -15,7 +15,7 @@ from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
-from islands.data.coupled_record import CoupledRecord, match_coupled
+from islands.data.coupled_record import AnyRecord, CoupledRecord, match_coupled
 from islands.data.dataset import Dataset, same_dt
 from islands.data.preprocessing import preprocess
 from islands.data.preprocessing_steps import DETREND
@@ -35,11 +35,12 @@ from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.io.records.row_range import parse_rows
 from islands.io.records.table_reading import read_table
 from islands.io.records.writer import write_coupled_simulation
-from islands.models.coupled_narx import coupled_signals
+from islands.models.coupled_narx import AnyModel, coupled_signals
 from islands.models.equations import named_signals
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_values
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
+from islands.simulation.initial_states import find_first_states
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 
@@ -191,8 +192,10 @@ def _simulate_model(
     first = found.warm_up if request.warm_up is None else request.warm_up
     band = None if request.bands is None else found.bands(data, request.bands, first)
     simulation = found.simulate(data, mode, first, request.shooting)
-    if mode == "free-run" and has_estimated_start(model, data, first):
-        output.print(ESTIMATED_START, markup=False)
+    if mode == "free-run":
+        if has_estimated_start(model, data, first):
+            output.print(ESTIMATED_START, markup=False)
+        _print_first_states(model, data, first)
     line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
     _print_metrics(data, simulation.y, line, request.out, band, bool(simulation.outcome))
 
@@ -251,6 +254,7 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
         limits = [(band.lower, band.upper) for band in bands]
         write_coupled_simulation(data, simulation.y, request.out, limits)
         output.print(f"{request.out}: {data.samples} rows", markup=False)
+    _print_first_states(model, data, first)
     output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
     for each, y in zip(data.records, simulation.y.T, strict=True):
         errors = metrics(each.y, y)
@@ -261,6 +265,16 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
         )
     for each, band in zip(data.records, bands, strict=False):
         _print_band(each, band, f"{each.output_name}: ")
+
+
+def _print_first_states(model: AnyModel, data: AnyRecord, warm_up: int) -> None:
+    """State the states from which an exported program repeats the simulation."""
+    if found := find_first_states(model, data, warm_up):
+        sample, states = found
+        listed = ", ".join(f"x{place} = {state!r}" for place, state in enumerate(states.tolist(), start=1))
+        output.print(
+            f"states at sample {sample}, estimated from the first {warm_up} samples: {listed}", markup=False
+        )
 
 
 def _simulate_system(found: SavedSimulation, request: _Request) -> None:

@@ -22,7 +22,7 @@ from islands.export.fmu.description import (
 from islands.export.languages.c import c_block
 from islands.models.block import Block
 
-#: The first flag makes results equal those of the search bit for bit.
+#: The first flag keeps the roundings of the kernels.
 _FLAGS = ("-ffp-contract=off", "-O2", "-std=c99", "-fvisibility=hidden")
 
 #: Date of all files of an FMU, so that equal models give equal files; the first that ZIP can write.

@@ -10,14 +10,15 @@ _HEAD = """\
 /*
 {heading}
  *
- * C99. If it is compiled with -ffp-contract=off and without -ffast-math, its results equal those of the
- * search bit for bit. The last bits of exp, log, sin, cos and tanh depend on the C library.
+{start}
+ *
+{exactness}
  */
 
 #include <math.h>
 #include <stddef.h>
 
-enum {{ MAXIMUM_LAG = {lag} }};
+{constant}
 
 {functions}"""
 
@@ -43,7 +44,7 @@ void simulate({inputs}, double *y, size_t samples)
 """
 
 _PREDICTOR = """\
-/* Return {output}(k) from the preceding samples. The pointers point to sample k. */
+/* Return {output}(k) from {read}. The pointers point to sample k. */
 double predict_{output}({pointers})
 {{
     double total = 0.0;
@@ -54,16 +55,22 @@ double predict_{output}({pointers})
 """
 
 _SEVERAL_SIGNALS = """\
-{predictors}/*
- * Free run: the first MAXIMUM_LAG samples of the outputs are given, the others are computed and written.
+/*
+ * Free run: {start}
  */
-void simulate({inputs}, {outputs}, size_t samples)
+void simulate({arguments}, size_t samples)
 {{
-    {starts}for (size_t k = MAXIMUM_LAG; k < samples; ++k) {{
+    {starts}for (size_t k = {first}; k < samples; ++k) {{
         {steps}
     }}
 }}
 """
+
+#: What a free run starts from.
+_FROM_OUTPUTS = "the first MAXIMUM_LAG samples of the outputs are given, the others are computed and written."
+_FROM_STATES = """\
+all samples are computed and written, from the states at sample 0, {states}. These are START
+ * if the pointer is NULL."""
 
 
 def c_source(block: Block) -> str:
@@ -78,7 +85,15 @@ def c_source(block: Block) -> str:
         The model has no finite parameters, or a user-defined primitive has no C body.
     """
     names = block.signals[: block.computed]
-    head = _HEAD.format(heading=block.heading(" *"), lag=block.maximum_lag, functions=define_functions(block))
+    head = _HEAD.format(
+        heading=block.heading(" *"),
+        start=block.describe_start(" * "),
+        exactness=textwrap.fill(
+            _describe_exactness(block), 100, initial_indent=" * ", subsequent_indent=" * "
+        ),
+        constant=_write_constant(block),
+        functions=define_functions(block),
+    )
     pointers = [f"const double *{name}" for name in block.signals]
     given, at_k = ", ".join(pointers[block.computed :]), ", ".join(f"{name} + k" for name in block.signals)
     bodies = ["\n    ".join(_list_terms(block, place)) for place in range(block.computed)]
@@ -92,24 +107,66 @@ def c_source(block: Block) -> str:
             at_k=at_k,
         )
     predictors = (
-        _PREDICTOR.format(output=name, pointers=", ".join(pointers), terms=terms)
-        for name, terms in zip(names, bodies, strict=True)
+        _PREDICTOR.format(
+            output=name,
+            pointers=", ".join(pointers),
+            terms=terms,
+            read="the states and inputs of sample k"
+            if block.is_state_space and place < block.outputs
+            else "the preceding samples",
+        )
+        for place, (name, terms) in enumerate(zip(names, bodies, strict=True))
     )
-    return head + _SEVERAL_SIGNALS.format(
-        predictors="".join(predictors),
-        inputs=given,
-        outputs=", ".join(f"double *{name}" for name in names),
+    by_state = ["const double *start"] if block.is_state_space else []
+    simulation = _SEVERAL_SIGNALS.format(
+        start=_FROM_STATES.format(states=", ".join(names[block.outputs :])) if by_state else _FROM_OUTPUTS,
+        arguments=", ".join([given, *by_state, *(f"double *{name}" for name in names)]),
         starts=_write_starts(block),
+        first="0" if by_state else "MAXIMUM_LAG",
         steps="\n        ".join(
-            f"{names[place]}[k] = predict_{names[place]}({at_k});" for place in block.order
+            f"{names[place]}[k] = {_write_first(block, place)}predict_{names[place]}({at_k});"
+            for place in block.order
         ),
     )
+    return head + "".join(predictors) + simulation
+
+
+def _describe_exactness(block: Block) -> str:
+    """State how far the results are those of the simulation in this package."""
+    # The simulation feeds back deviations, the program measured outputs.
+    adds_offsets = not block.is_state_space and any(map(block.levels.get, block.signals[: block.outputs]))
+    difference = (
+        "up to rounding, since the program adds the offsets to the outputs that it feeds back: differences "
+        "below 1e-14 of the offset were measured"
+        if adds_offsets
+        else "bit for bit"
+    )
+    return (
+        "C99. If it is compiled with -ffp-contract=off and without -ffast-math, its results equal those of "
+        f"`islands simulate` from the same start {difference}. The last bits of exp, log, sin, cos and tanh "
+        "depend on the C library."
+    )
+
+
+def _write_constant(block: Block) -> str:
+    """Return the constant of the start of a free run."""
+    if block.is_state_space:
+        return f"static const double START[] = {{{', '.join(map(repr, block.first_states()))}}};"
+    return f"enum {{ MAXIMUM_LAG = {block.maximum_lag} }};"
+
+
+def _write_first(block: Block, place: int) -> str:
+    """Return the condition and the value of a state at sample 0; empty if the equation holds there."""
+    is_given = block.is_state_space and place >= block.outputs
+    return f"k == 0 ? first[{place - block.outputs}] : " if is_given else ""
 
 
 def _write_starts(block: Block) -> str:
-    """Return the statements that write the first samples of the states; empty without states."""
+    """Return the statements that write or choose the first samples of the states; empty without states."""
     if not block.starts:
         return ""
+    if block.is_state_space:
+        return "const double *first = start == NULL ? START : start;\n    "
 
     def write_sample(signal: str, _lag: int) -> str:
         return f"{signal}[k]"

@@ -1,6 +1,7 @@
 """Export of a model as a function file for MATLAB and Octave."""
 
 import textwrap
+from collections.abc import Iterable
 
 from islands.export.languages.bodies import body, function_name
 from islands.expressions.tree import Primitive
@@ -11,6 +12,8 @@ function y = narx_model({inputs}, y0)
 % NARX_MODEL  Free run of a NARX model from its inputs and the first outputs y0.
 %
 {heading}
+%
+{note}
 %
 % Inputs are vectors of equal length, y has the size of the first input, and y0 holds the first {lag} samples
 % of y. Save this file as narx_model.m; it runs in MATLAB and Octave.
@@ -35,6 +38,8 @@ function [{outputs}] = {name}({inputs}, {starts})
 %
 {heading}
 %
+{note}
+%
 % Inputs are vectors of equal length, the outputs have the size of the first input, and {starts} hold the
 % first {lag} samples of the outputs. Save this file as {name}.m; it runs in MATLAB and Octave.
 
@@ -45,6 +50,32 @@ function [{outputs}] = {name}({inputs}, {starts})
   {allocations}
   for k = maximum_lag + 1:samples
     {steps}
+  end
+end
+{functions}"""
+
+_STATE_SPACE_FILE = """\
+function [{outputs}] = state_model({inputs}, start)
+% STATE_MODEL  Free run of a model with states from its inputs and the states at sample 0.
+%
+{heading}
+%
+{note}
+%
+% Inputs are vectors of equal length, the outputs have the size of the first input, and start holds
+% {states} at sample 0. Save this file as state_model.m; it runs in MATLAB and Octave.
+
+  if nargin < {arguments}, start = [{start}]; end
+  {conversions}
+  samples = numel({first_input});
+  {allocations}
+  for k = 1:samples
+    if k == 1
+      {first_states}
+    else
+      {next_states}
+    end
+    {observations}
   end
 end
 {functions}"""
@@ -60,10 +91,14 @@ def matlab_source(block: Block) -> str:
     ModelError
         The model has no finite parameters, or a user-defined primitive has no MATLAB body.
     """
-    outputs, inputs = block.signals[: block.outputs], block.signals[block.computed :]
+    outputs, states = block.signals[: block.outputs], block.signals[block.outputs : block.computed]
+    inputs = block.signals[block.computed :]
     starts = ["y0"] if block.computed == 1 else [f"first_{output}" for output in outputs]
+    if block.is_state_space:
+        starts = ["start"]
     shared = {
         "heading": block.heading("%"),
+        "note": block.describe_start("% "),
         "inputs": ", ".join(inputs),
         "first_input": inputs[0],
         "lag": block.maximum_lag,
@@ -74,17 +109,28 @@ def matlab_source(block: Block) -> str:
     if block.computed == 1:
         terms = block.terms(0, _write_sample, function_name)
         return _FILE.format(terms="\n    ".join(f"total = total + {term};" for term in terms), **shared)
-    steps, allocations = [], []
-    for place in block.order:
-        name = block.signals[place]
-        terms = block.terms(place, _write_sample, function_name)
-        steps += [f"{name}(k) = 0;", *(f"{name}(k) = {name}(k) + {term};" for term in terms)]
-    for output, start in zip(outputs, starts, strict=True):
-        allocations += [f"{output} = zeros(size({inputs[0]}));", f"{output}(1:given) = {start}(1:given);"]
-    for place, name in enumerate(block.signals[block.outputs : block.computed]):
+    allocations = [f"{name} = zeros(size({inputs[0]}));" for name in (*outputs, *states)]
+    if block.is_state_space:
+        places = range(block.outputs, block.computed)
+        return _STATE_SPACE_FILE.format(
+            outputs=", ".join(outputs),
+            states=", ".join(states),
+            arguments=len(inputs) + 1,
+            start=", ".join(map(repr, block.first_states())),
+            allocations="\n  ".join(allocations),
+            first_states="\n      ".join(
+                f"{name}(k) = start({place});" for place, name in enumerate(states, start=1)
+            ),
+            next_states="\n      ".join(_write_equations(block, places)),
+            observations="\n    ".join(_write_equations(block, range(block.outputs))),
+            **shared,
+        )
+    allocations += [
+        f"{output}(1:given) = {start}(1:given);" for output, start in zip(outputs, starts, strict=True)
+    ]
+    for place, name in enumerate(states):
         start = block.start_text(place, _write_sample, function_name)
-        first = f"for k = 1:given, {name}(k) = {start}; end"
-        allocations += [f"{name} = zeros(size({inputs[0]}));", first]
+        allocations.append(f"for k = 1:given, {name}(k) = {start}; end")
     name = "state_model" if block.starts else "coupled_narx_model"
     return _SIGNALS_FILE.format(
         name=name,
@@ -93,9 +139,19 @@ def matlab_source(block: Block) -> str:
         outputs=", ".join(outputs),
         starts=", ".join(starts),
         allocations="\n  ".join(allocations),
-        steps="\n    ".join(steps),
+        steps="\n    ".join(_write_equations(block, block.order)),
         **shared,
     )
+
+
+def _write_equations(block: Block, places: Iterable[int]) -> list[str]:
+    """Return the statements that compute signals at sample k."""
+    steps = []
+    for place in places:
+        name = block.signals[place]
+        terms = block.terms(place, _write_sample, function_name)
+        steps += [f"{name}(k) = 0;", *(f"{name}(k) = {name}(k) + {term};" for term in terms)]
+    return steps
 
 
 def _write_sample(name: str, lag: int) -> str:

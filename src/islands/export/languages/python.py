@@ -14,6 +14,8 @@ from islands.models.block import Block
 _MODULE = '''"""NARX model: {equation}
 
 {description}
+
+{note}
 """
 
 import math
@@ -41,6 +43,8 @@ _SIGNALS_MODULE = '''"""{title}
 {equations}
 
 {description}
+
+{note}
 """
 
 import math
@@ -63,13 +67,51 @@ def simulate({inputs}, {starts}):
     return {outputs}
 '''
 
+_STATE_SPACE_MODULE = '''"""{title}
+
+{equations}
+
+{description}
+
+{note}
+"""
+
+import math
+
+#: States at sample 0 unless others are given: {states}.
+START = {start}
+{constants}
+
+{functions}def advance(k, {states}, {inputs}):
+    """Return {states} at sample k from sample k - 1."""
+{advance_code}
+    return {next_states}
+
+
+def observe(k, {states}, {inputs}):
+    """Return {outputs} at sample k from the states and inputs of that sample."""
+{observe_code}
+    return {next_outputs}
+
+
+def simulate({inputs}, start=START):
+    """Return {outputs} at all samples from the inputs and the states at sample 0."""
+    {first_samples}
+    for k in range(len({first_input})):
+        if k > 0:
+            {next_states} = advance(k, {states}, {inputs})
+            {append_states}
+        {next_outputs} = observe(k, {states}, {inputs})
+        {append_outputs}
+    return {outputs}
+'''
+
 
 def python_source(block: Block) -> str:
     """Return a block as the source of a Python module.
 
     The module defines the functions ``predict`` (one sample) and ``simulate`` (free run). It needs only the
-    standard library. Its results equal those of this package's kernels bit for bit, because sums and products
-    are evaluated in the same order.
+    standard library. Sums and products are evaluated in the same order as in this package's kernels.
 
     Raises
     ------
@@ -81,6 +123,7 @@ def python_source(block: Block) -> str:
     sources = [function_source(primitive) for primitive in used]
     shared = {
         "description": block.describe_signals(escape_name),
+        "note": block.describe_start(""),
         "lag": block.maximum_lag,
         "constants": "".join(f"{name} = {value}\n" for name, value in required_globals(used).items()),
         "functions": "\n\n".join(sources) + ("\n\n" if sources else ""),
@@ -93,31 +136,60 @@ def python_source(block: Block) -> str:
             equation=block.texts[0], terms="\n    ".join(f"total += {term}" for term in terms), **shared
         )
     outputs, states = names[: block.outputs], names[block.outputs :]
-    code, first = [], [f"{name} = [float(value) for value in first_{name}[:MAXIMUM_LAG]]" for name in outputs]
-    for place in block.order:
-        next_name = f"next_{names[place]}"
-        terms = block.terms(
-            place,
-            lambda name, lag: _write_sample(name, lag) if lag or name in inputs else f"next_{name}",
-            python_name,
+    shared |= {
+        "title": block.kind_title,
+        "equations": "\n".join(block.texts),
+        "outputs": ", ".join(outputs),
+    }
+    if block.is_state_space:
+        first = [f"{name} = [start[{place}]]" for place, name in enumerate(states)]
+        return _STATE_SPACE_MODULE.format(
+            states=", ".join(states),
+            start=block.first_states(),
+            advance_code=_write_equations(block, states),
+            observe_code=_write_equations(block, outputs),
+            next_states=_name_next(states),
+            next_outputs=_name_next(outputs),
+            first_samples="\n    ".join([*first, *(f"{name} = []" for name in outputs)]),
+            append_states="\n            ".join(_append_next(states)),
+            append_outputs="\n        ".join(_append_next(outputs)),
+            **shared,
         )
-        code += [f"    {next_name} = 0.0", *(f"    {next_name} += {term}" for term in terms)]
+    first = [f"{name} = [float(value) for value in first_{name}[:MAXIMUM_LAG]]" for name in outputs]
     for place, name in enumerate(states):
         start = block.start_text(place, _write_sample, python_name)
         first.append(f"{name} = [{start} for k in range(MAXIMUM_LAG)]")
     return _SIGNALS_MODULE.format(
-        title=block.kind_title,
-        equations="\n".join(block.texts),
         signals=", ".join(block.signals),
-        outputs=", ".join(outputs),
         computed=", ".join(names),
         starts=", ".join(f"first_{output}" for output in outputs),
         first_samples="\n    ".join(first),
-        results=", ".join(f"next_{name}" for name in names),
-        equations_code="\n".join(code),
-        appends="\n        ".join(f"{name}.append(next_{name})" for name in names),
+        results=_name_next(names),
+        equations_code=_write_equations(block, (*states, *outputs)),
+        appends="\n        ".join(_append_next(names)),
         **shared,
     )
+
+
+def _write_equations(block: Block, names: Sequence[str]) -> str:
+    """Return the statements that compute signals; those of the same sample are in the variables next_..."""
+
+    def write(name: str, lag: int) -> str:
+        return f"next_{name}" if not lag and name in names else _write_sample(name, lag)
+
+    lines = []
+    for name in names:
+        terms = block.terms(block.signals.index(name), write, python_name)
+        lines += [f"    next_{name} = 0.0", *(f"    next_{name} += {term}" for term in terms)]
+    return "\n".join(lines)
+
+
+def _name_next(names: Sequence[str]) -> str:
+    return ", ".join(f"next_{name}" for name in names)
+
+
+def _append_next(names: Sequence[str]) -> list[str]:
+    return [f"{name}.append(next_{name})" for name in names]
 
 
 def _write_sample(name: str, lag: int) -> str:

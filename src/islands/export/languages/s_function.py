@@ -136,5 +136,5 @@ def s_function_source(block: Block) -> str:
         block=c_block(block),
         direct=", ".join(str(int(each)) for each in block.feedthrough),
         states=block.size,
-        default="those of its states" if block.starts else "zeros",
+        default="the operating point" if any(block.start_values()) else "zeros",
     )

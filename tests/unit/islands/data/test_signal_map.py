@@ -1,7 +1,6 @@
 """Every path from a measured record to an output of a model gives the same output."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -20,16 +19,6 @@ from islands.models.operating_point import static_characteristic
 from islands.models.signal_statement import describe_values
 from islands.simulation.predictors import free_run
 from islands.simulation.step_response import step_response
-from support.block_cases import model_case
-from support.exported_programs import (
-    needs_compiler,
-    needs_octave,
-    run_c,
-    run_fmu,
-    run_matlab,
-    run_matlab_system,
-    run_s_function,
-)
 
 STEPS = (
     {"detrend": "constant"},
@@ -98,52 +87,6 @@ def test_every_path_gives_the_output_of_the_search(steps, feedthrough, average, 
     found = PATHS[path](model, measured())
     # The value of an advanced input behind the end of a record is unknown and unused by the search.
     np.testing.assert_allclose(found[:-1], expected_output(prepared, model)[:-1], rtol=1e-9, atol=1e-9)
-
-
-def every_case():
-    """Yield every combination of steps, feedthrough and means: the expected output, the model, the record."""
-    for steps, feedthrough, average in product(STEPS, (False, True), (1, 2)):
-        prepared, model = fitted(steps, feedthrough, average)
-        yield expected_output(prepared, model)[:-1], model, match_rate(model, measured())
-
-
-@pytest.mark.ci
-@needs_compiler
-def test_compiled_programs_give_the_output_of_the_search(tmp_path):
-    for expected, model, data in every_case():
-        found = run_c(model, data, tmp_path)[model.maximum_lag : -1]
-        np.testing.assert_allclose(found, expected[model.maximum_lag :], rtol=1e-9)
-
-
-@pytest.mark.ci
-@needs_octave
-def test_matlab_programs_give_the_output_of_the_search(tmp_path):
-    expected, models, records = zip(*every_case(), strict=True)
-    found = run_matlab(list(zip(models, records, strict=True)), tmp_path)
-    for y, simulated, model in zip(expected, found, models, strict=True):
-        lag = model.maximum_lag
-        np.testing.assert_allclose(simulated[lag:-1], y[lag:], rtol=1e-9)
-
-
-BLOCKS = {
-    "s-function": pytest.param(
-        lambda case, folder: run_s_function(case, case.past, folder)[1], marks=needs_compiler
-    ),
-    "matlab-system": pytest.param(run_matlab_system, marks=needs_octave),
-    "fmu": pytest.param(lambda case, folder: run_fmu(case, folder, "fmu"), marks=needs_compiler),
-    "fmu2": pytest.param(lambda case, folder: run_fmu(case, folder, "fmu2"), marks=needs_compiler),
-}
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("run", BLOCKS.values(), ids=BLOCKS)
-@pytest.mark.parametrize("feedthrough", [False, True])
-def test_blocks_give_the_output_of_the_search(run, feedthrough, tmp_path):
-    prepared, model = fitted(STEPS[-1], feedthrough, average=2)
-    case = model_case(model, match_rate(model, measured()))
-    found = run(case, tmp_path)
-    expected = expected_output(prepared, model)[model.maximum_lag : -1, None]
-    np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("steps", STEPS, ids=str)

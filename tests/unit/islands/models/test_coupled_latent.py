@@ -110,18 +110,3 @@ def test_offsets_are_subtracted_from_inputs_and_added_to_outputs():
 def test_every_text_format_has_both_outputs(kind):
     second = {"latex": "y_{2,k}", "mathml": "<mi>y</mi><mrow><mn>2</mn>", "json": "force (N)"}
     assert second.get(kind, "y2") in export(BOTH, kind)
-
-
-def test_the_python_module_simulates_like_the_kernel():
-    namespace = {}
-    exec(export(BOTH, "python"), namespace)
-    # The program starts at rest, as a record that begins there.
-    u, first = np.concatenate([np.zeros(400), smooth_input(80, 3)]), np.zeros(BOTH.maximum_lag)
-    settled = np.array(namespace["simulate"](u.tolist(), first.tolist(), first.tolist())).T[200:]
-    record = CoupledRecord(
-        tuple(
-            Dataset(u[200:], column, 0.01, ("u_V",), name)
-            for column, name in zip(settled.T, BOTH.output_names, strict=True)
-        )
-    )
-    assert free_run(BOTH, record, 100).y[100:] == pytest.approx(settled[100:], abs=1e-9)

@@ -1,4 +1,4 @@
-"""Modelica export: the block has as many equations as unknowns, and its right-hand side is the model."""
+"""Modelica export: its right-hand side is the model, and its functions, units and columns."""
 
 import re
 from dataclasses import replace
@@ -13,7 +13,6 @@ from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from support.block_cases import OF_STATES
-from support.coupled_systems import PREY, TWO_MASSES
 from support.programs import CASES, model
 
 SAMPLED = {name: replace(each, dt=each.dt or 0.1) for name, each in CASES.items()} | OF_STATES
@@ -48,23 +47,6 @@ def test_the_right_hand_side_is_the_model(name):
 
 
 @pytest.mark.parametrize("name", SAMPLED)
-def test_the_block_has_one_equation_for_each_unknown(name):
-    text = export(SAMPLED[name], "modelica")
-    stored = {signal: int(depth) for signal, depth in re.findall(r"discrete Real past_(\w+)\[(\d+)\]", text)}
-    first, *others = [each.partition(" = ") for each in body(text)]
-    assert first[0] == "y"
-    assert {left: right for left, _, right in others} == {
-        f"past_{signal}[{lag}]": f"pre(past_{signal}[{lag - 1}])" if lag > 1 else signal
-        for signal, depth in stored.items()
-        for lag in range(1, depth + 1)
-    }
-    for signal, depth in stored.items():
-        assert f"parameter Real start_{signal}[{depth}] = fill(0.0, {depth})" in text
-    read = set(re.findall(r"pre\(past_(\w+)\[(\d+)\]\)", first[2]))
-    assert all(int(lag) <= stored[signal] for signal, lag in read)
-
-
-@pytest.mark.parametrize("name", SAMPLED)
 def test_functions_are_defined_if_and_only_if_they_are_called(name):
     text = export(SAMPLED[name], "modelica")
     defined = re.findall(r"  function (f_\w+)\n", text)
@@ -78,23 +60,6 @@ def test_the_block_has_the_units_and_the_columns():
     assert r'RealInput u(unit = "V") "u \"1\" \\ [V]";' in text
     assert 'RealOutput y(unit = "um") "y_um";' in text
     assert "when sample(0, 0.001) then" in text
-
-
-@pytest.mark.parametrize("exported", [PREY, TWO_MASSES], ids=["prey", "two masses"])
-def test_a_block_of_two_outputs_has_an_equation_for_each(exported):
-    text = export(exported, "modelica")
-    samples = np.random.default_rng(0).normal(size=(3, 5))
-    for place, written in enumerate(body(text)[:2]):
-        left, _, right = " ".join(written.split()).partition(" = ")
-        assert left == f"y{place + 1}"
-        # The parser knows one output: all signals are read as inputs 1, 2 and 3.
-        outputs_read = re.sub(r"pre\(past_y(\d)\[(\d+)\]\)", r"u\1(k-\2)", right)
-        all_read = re.sub(r"pre\(past_u\[(\d+)\]\)", r"u3(k-\1)", outputs_read)
-        found = value(islands.parse(all_read), lambda channel, lag: samples[channel - 1][lag])
-        terms = zip(exported.models[place].parameters, exported.expressions(place), strict=True)
-        assert found == pytest.approx(
-            sum(theta * value(each, lambda channel, lag: samples[channel][lag]) for theta, each in terms)
-        )
 
 
 def test_a_user_defined_primitive_is_refused():

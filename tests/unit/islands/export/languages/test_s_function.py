@@ -1,36 +1,22 @@
-"""S-function export: it compiles against a substitute of Simulink, which drives it like the free run."""
+"""S-function export: its parameter, and its list of ports."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from islands.export import export
-from support.block_cases import OF_BLOCKS, OF_STATES, block_case
-from support.exported_programs import needs_compiler, run_s_function
-from support.programs import bits
-
-
-@pytest.mark.ci
-@needs_compiler
-@pytest.mark.parametrize("name", OF_BLOCKS)
-def test_the_block_simulates_like_the_free_run(name, tmp_path):
-    case = block_case(name)
-    error, found = run_s_function(case, case.past, tmp_path)
-    assert error is None
-    np.testing.assert_allclose(found, case.outputs, rtol=1e-12, atol=0)
-
-
-@needs_compiler
-def test_an_empty_parameter_is_a_past_of_zeros(tmp_path):
-    case = block_case("published 12")
-    empty, zeros = (run_s_function(case, each, tmp_path)[1] for each in ([], np.zeros(len(case.past))))
-    assert bits(empty) == bits(zeros)
+from support.block_cases import OF_STATES, start_from_record
+from support.exported_programs import build_s_function, needs_compiler
 
 
 @needs_compiler
 @pytest.mark.parametrize(("count", "is_double"), [(3, True), (5, True), (4, False)])
 def test_a_parameter_of_another_size_or_class_is_refused(count, is_double, tmp_path):
-    error, _ = run_s_function(block_case("published 12"), np.zeros(count), tmp_path, is_double)
-    assert error == b"the parameter has to be [] or a vector of 4 samples of class double"
+    simulate = build_s_function(OF_STATES["published 12"], tmp_path)
+    run, _ = start_from_record("published 12")
+    with pytest.raises(AssertionError, match=r"has to be \[\] or a vector of 4 samples of class double"):
+        simulate(replace(run, past=np.zeros(count)), is_double)
 
 
 def test_the_file_lists_ports_and_past_samples():

@@ -1,7 +1,6 @@
 """Free runs of coupled models: exact for the true model, and equal to those of single models."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -18,9 +17,7 @@ from islands.io.models import read_coupled_model, write_model
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run, multiple_shooting
-from support.block_cases import coupled_case
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record, simulate_scalar
-from support.exported_programs import needs_compiler, needs_octave, run_fmu, run_matlab_system
 
 #: Equations that do not read the other output, with products, calls and constants.
 DECOUPLED = CoupledModel(
@@ -159,12 +156,6 @@ def run_python(model, record, _folder):
     return found
 
 
-def run_block(run, model, record, folder):
-    data = match_coupled(model, record.map(lambda each: match_rate(model, each)))
-    found = run(coupled_case(model, data), folder)
-    return np.vstack([np.full((model.maximum_lag, found.shape[1]), np.nan), found])
-
-
 COUPLED_PATHS = {
     "measured record": lambda model, record, _: free_run(model, record).y,
     "at the rate of the model": lambda model, record, _: (
@@ -176,12 +167,6 @@ COUPLED_PATHS = {
     "file": lambda model, record, folder: free_run(written_and_read(model, folder), record).y,
     "measured units": lambda model, record, _: free_run(measured_coupled_model(model), record).y,
     "python": run_python,
-    "fmu": pytest.param(
-        partial(run_block, partial(run_fmu, kind="fmu")), marks=[pytest.mark.ci, needs_compiler]
-    ),
-    "matlab-system": pytest.param(
-        partial(run_block, run_matlab_system), marks=[pytest.mark.ci, needs_octave]
-    ),
 }
 
 
