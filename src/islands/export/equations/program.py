@@ -376,10 +376,13 @@ class EquationProgram(ABC):
         language, lag = self.language, block.maximum_lag
         states = list(enumerate(block.signals[block.outputs : block.computed], start=block.outputs))
         own = {name for _, name in states}
+        leads = dict(zip(block.signals, block.leads, strict=True))
 
         def read(name: str, back: int) -> str:
             if name in own:
                 return f"{name}_{back}"
+            # The program reads the same column as the simulation, which may be one sample early.
+            back += leads[name]
             return language.past.format(name, back) if back else self._at(name)
 
         def start(place: int, back: int) -> str:

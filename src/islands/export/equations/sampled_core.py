@@ -12,7 +12,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.io.models import model_from_json
 from islands.models.measured_signals import measured_block
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
+from islands.simulators.ode.output_system import SIMULATED, make_output_system
 from islands.simulators.ode.system import OdeSystem
 from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 
@@ -46,11 +46,10 @@ def read_output_system(spec: ExtendedSpec) -> OdeSystem:
 
 
 def _make_model(spec: ModelSpec, output: str) -> SampledCore:
-    # The program reads the same column as the simulation, which may be one sample early.
-    model = replace(model_from_json(json.dumps(spec.model), spec.name), input_names=(INPUT,))
-    block = measured_block(model)
+    block = measured_block(model_from_json(json.dumps(spec.model), spec.name))
+    start = "the operating point" if block.is_state_space else f"{block.maximum_lag} measured outputs"
     return SampledCore(
-        f"free run of the model {'; '.join(block.texts)} from {block.maximum_lag} measured outputs",
+        f"free run of the model {'; '.join(block.texts)} from {start}",
         block=block,
         columns={MEASURED: output},
     )

@@ -35,13 +35,14 @@ class _CProgram(EquationProgram):
         signals = [(code.identifiers[render(each)], "", "") for each in code.signals]
         variables = [(code.identifiers[name], "", "") for name, _ in self.given.system.variables]
         moments = self.given.moment_maps
+        parameters = code.list_parameters() or [("none", "0.0", "there are no parameters")]
         return {
-            "parameters": _list_members(code.list_parameters()),
+            "parameters": _list_members(parameters),
             "states": _list_members(self.states),
             "signal_members": _list_members(signals or [("none", "", "")]),
             "record": "\n".join(f"    const double *{name};" for name in self.columns)
             + (f"\n    const double *{self.moments}; /* set by simulate() */" if moments else ""),
-            "parameter_values": _list_values(code.list_parameters()),
+            "parameter_values": _list_values(parameters),
             "state_values": _list_values(self.states),
             "variables": "/* Variables of the equations. */\n"
             f"struct variables {{\n{_list_members(variables)}\n}};\n\n"

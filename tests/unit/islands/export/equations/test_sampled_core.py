@@ -1,19 +1,25 @@
 """Simulations in discrete time in C and MATLAB simulate like the package, with effects and terms."""
 
+import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from islands.data.input_lead import advance_all_inputs
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError
 from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler
+from islands.io.models import model_json
+from islands.simulation.predictors import free_run
 from islands.simulators.context import make_context
 from islands.simulators.ode.output_system import make_output_system
 from islands.simulators.output_equation import OutputEquation, add_output_equation
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ColumnSpec, LinearSpec, ModelSpec
 from support.equation_programs import OCTAVE, compare, extend, list_effects, run_c, run_matlab
+from support.latent_systems import make_model
 from support.simulated_records import MODEL_SPEC, recorded, wave
 
 # Every program is compiled.
@@ -26,6 +32,11 @@ SAMPLES = 150
 U = wave(SAMPLES) + 3.0
 RECORD = recorded(U, 2.0 + 0.3 * U, units=("V", "um"))
 COLUMNS = {"other": 0.3 * U + 0.001 * U**2}
+
+
+def specify(model):
+    return ModelSpec(kind="model", model=json.loads(model_json(model)), name="m")
+
 
 FILTER = {"kind": "linear", "numerator": (0.1, 0.02, -0.01), "denominator": (1.2, -0.5), "level": 1.5}
 SIMULATIONS = {
@@ -45,6 +56,7 @@ SIMULATIONS = {
         },
         name="m",
     ),
+    "state space": specify(make_model(units=("tanh",), output_name="y_um", dt=RECORD.dt)),
     "column": ColumnSpec(kind="column", column="other"),
 }
 
@@ -90,6 +102,18 @@ def make_programs(names):
 def test_a_program_in_c_simulates_like_the_package(name, tmp_path):
     for spec, expected in zip(*make_programs([name]), strict=True):
         compare(run_c(spec, RECORD, tmp_path, COLUMNS), expected)
+
+
+@needs_compiler
+def test_a_state_space_whose_input_acts_at_once_reads_the_early_column(tmp_path):
+    record = advance_all_inputs(RECORD)
+    direct = {"a1_1": 0.9, "b1": 0.1, "c1": 0.5, "d": 0.2, "level": 1.0}
+    model = make_model(direct, (), 1, input_names=("u_V+1",), output_name="y_um", dt=record.dt)
+    spec, expected = extend(make_simulator(specify(model), record, {}), record)
+    found = run_c(spec, record, tmp_path)
+    compare(found, expected)
+    # The effect of the initial states has decayed.
+    np.testing.assert_allclose(found[100:], free_run(model, record).y[100:], atol=1e-3)
 
 
 @needs_octave
