@@ -233,7 +233,8 @@ def make_block_simulator(
         raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
     start, length = find_intervals(record, warm_up, interval if block.restarts_from_outputs else None)
     outputs = np.atleast_2d(record.y.T)
-    for y in outputs:
+    # The states of a state space are estimated from the known outputs, and rest without any.
+    for y in () if block.is_state_space else outputs:
         check_warm_up(y, start, warm_up)
     return BlockSimulator(block, outputs, record.u.T, start, length, warm_up)
 

@@ -1,10 +1,13 @@
 """Initial states of a free run: those of the least error over the warm-up."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset, join
 from islands.data.input_lead import advance_inputs
+from islands.export import export
 from islands.kernels.state_space import simulate_state_space
 from islands.simulation.initial_states import (
     Segment,
@@ -119,3 +122,12 @@ def test_a_minimum_away_from_rest_is_found():
     assert model.rest == pytest.approx([0.0])
     found = estimate_states(model.theta, model.codes, record, model.rest)
     assert np.abs(found) == pytest.approx([1.8], abs=0.01)
+
+
+def test_without_measured_outputs_the_states_rest_at_the_operating_point():
+    record, module = spring_record(100), {}
+    model = make_model(operating_inputs=(0.5,))
+    exec(export(model, "python"), module)
+    run = free_run(model, replace(record, y=np.full(100, np.nan)))
+    assert np.isnan(run.y[:20]).all()
+    assert run.y[20:] == pytest.approx(module["simulate"](record.u[:, 0].tolist())[20:], abs=1e-12)
