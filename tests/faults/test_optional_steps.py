@@ -10,6 +10,7 @@ import islands
 import islands.facade.library_fit
 import islands.facade.results.identification
 import islands.io.result_folder
+from islands import export
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution import search_result
 from islands.facade import final_models, refit
@@ -175,3 +176,14 @@ def test_a_step_of_several_outputs_that_fails_leaves_a_line_and_the_model(step, 
     assert step in {each["step"] for each in document["not_computed"]}
     assert f"Not computed: {step}: InjectedError" in " ".join((folder / "summary.txt").read_text().split())
     assert islands.load(folder).equation == result.equation
+
+
+def test_an_export_that_fails_states_the_reason_and_leaves_the_file(monkeypatch, tmp_path):
+    result = fit(make_record())
+    path = tmp_path / "model.c"
+    result.export("c", path)
+    before = path.read_bytes()
+    monkeypatch.setattr(export, "EXPORTS", {**export.EXPORTS, "c": fail})
+    with pytest.raises(islands.ModelError, match="the export as c is not computed .InjectedError"):
+        result.export("c", path)
+    assert path.read_bytes() == before

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeAlias, TypeVar
 
-from islands.errors import SettingsError, lookup
+from islands.errors import IslandsError, ModelError, SettingsError, lookup
 from islands.export.fmu.archive import fmu2, fmu3
 from islands.export.languages.c import c_source
 from islands.export.languages.matlab import matlab_source
@@ -23,6 +23,7 @@ from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.protocol import DynamicModel
+from islands.progress import explain_failure
 
 #: Models that can be exported.
 Exported: TypeAlias = DynamicModel | CoupledModel
@@ -84,11 +85,23 @@ def export(model: Exported, kind: str) -> str:
     ------
     SettingsError
         The format is unknown or is not text.
+    ModelError
+        The export fails.
     """
     if kind in FILE_EXPORTS:
         raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
     lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
-    return EXPORTS[kind](model)
+    return _write(EXPORTS, kind, model)
+
+
+def _write(formats: Mapping[str, Callable[[Exported], Text]], kind: str, model: Exported) -> Text:
+    try:
+        return formats[kind](model)
+    except IslandsError:
+        raise
+    except Exception as error:
+        reason = explain_failure(error)
+        raise ModelError(f"the export as {kind} is not computed ({reason}): take another format") from error
 
 
 def write_export(model: Exported, kind: str, path: str | Path) -> None:
@@ -98,9 +111,11 @@ def write_export(model: Exported, kind: str, path: str | Path) -> None:
     ------
     SettingsError
         The format is unknown.
+    ModelError
+        The export fails.
     """
     if kind in FILE_EXPORTS:
-        Path(path).write_bytes(FILE_EXPORTS[kind](model))
+        Path(path).write_bytes(_write(FILE_EXPORTS, kind, model))
         return
     Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")
 
