@@ -1,6 +1,6 @@
 """Catalogue of effects.
 
-To add an effect, define it in the file of its family and add it to `EFFECTS`.
+To add an effect, define it in the file of its family and add it to `_IN_ORDER`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -53,10 +53,10 @@ from islands.effects.timing import (
     VARYING_DELAY,
 )
 
-#: All effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
+#: Effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the
 #: scale of an encoder, so that they act before its cyclic error. A second input acts behind the actuator of
 #: the first one. The order also breaks ties between scores: another order changes results.
-EFFECTS: tuple[Effect, ...] = (
+_IN_ORDER: tuple[Effect, ...] = (
     DELAY,
     VARYING_DELAY,
     CLOCK_SKEW,
@@ -103,6 +103,19 @@ EFFECTS: tuple[Effect, ...] = (
     SENSOR_GAIN,
     *FREE_FORMS,
 )
+
+
+class _Effects(tuple[Effect, ...]):
+    """Effects whose representation, in the signatures of functions, is their public name."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return "islands.EFFECTS"
+
+
+#: All effects and free forms.
+EFFECTS: tuple[Effect, ...] = _Effects(_IN_ORDER)
 
 #: Maps of an actuator whose response depends on their order.
 ACTUATOR_MAPS = (

@@ -253,7 +253,17 @@ _BUILT_IN = (
     ),
 )
 
-PRIMITIVES: Mapping[str, Primitive] = MappingProxyType({entry.name: entry for entry in _BUILT_IN})
+
+class _Primitives(dict[str, Primitive]):
+    """Primitives whose representation, in the signatures of functions, is their public name."""
+
+    def __repr__(self) -> str:
+        return "islands.PRIMITIVES"
+
+
+PRIMITIVES: Mapping[str, Primitive] = MappingProxyType(
+    _Primitives({entry.name: entry for entry in _BUILT_IN})
+)
 
 
 def _less(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:

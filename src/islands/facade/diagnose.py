@@ -1,7 +1,7 @@
 """`diagnose` names what a simulation gets wrong on a record; `plan_experiment` says what one could show."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -36,10 +36,13 @@ from islands.simulators.specification.table import (
 if TYPE_CHECKING:
     from islands.io.data_frames import ReadingLike, RecordLike
 
+#: Simulation as a user names it; quoted in signatures, because its specifications take a thousand letters.
+SimulationLike: TypeAlias = str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator
+
 
 def diagnose(
     record: "RecordLike",
-    simulation: str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator,
+    simulation: "SimulationLike",
     *,
     inputs: str | Sequence[str] = (),
     output: str | None = None,
@@ -134,7 +137,7 @@ def diagnose(
 
 def plan_experiment(
     record: Dataset,
-    simulation: str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator,
+    simulation: "SimulationLike",
     *,
     noise_std: float | None = None,
     separate: Sequence[str] = (),
@@ -192,7 +195,7 @@ def _find_recorded(simulation: object, columns: Mapping[str, Signal]) -> tuple[s
 
 
 def _as_simulator(
-    simulation: str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator,
+    simulation: "SimulationLike",
     record: Dataset,
     columns: Mapping[str, Signal] | None,
 ) -> Simulator:

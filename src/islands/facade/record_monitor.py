@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -33,10 +33,13 @@ from islands.simulators.specification.table import (
 
 _LOCAL_SPEC: TypeAdapter[LocalSpec] = TypeAdapter(LocalSpec)
 
+#: Simulation as a user names it, quoted in signatures.
+MonitoredLike: TypeAlias = str | SimulationSpec | LocalSpec | Mapping[str, Any]
+
 
 def create_monitor(
     record: Dataset,
-    simulation: str | SimulationSpec | LocalSpec | Mapping[str, Any],
+    simulation: "MonitoredLike",
     *,
     false_alarms: str = DEFAULT_RATE,
     interval: float | None = None,
@@ -82,7 +85,7 @@ def create_monitor(
     return SavedMonitor(spec, *signals, false_alarms, interval, MonitorState(settings))
 
 
-def parse_monitored(simulation: str | SimulationSpec | LocalSpec | Mapping[str, Any]) -> LocalSpec:
+def parse_monitored(simulation: "MonitoredLike") -> LocalSpec:
     """Return the specification of a simulation that can be monitored."""
     if isinstance(simulation, str):
         path = find_extended_file(simulation.removeprefix("model:"))

@@ -2,8 +2,11 @@
 
 import inspect
 from collections import defaultdict
+from contextlib import suppress
 
 import islands
+import islands.sklearn
+import islands_api
 from islands.facade.evolution_run import SearchCallback
 from islands.facade.fit import fit
 from islands.facade.identify import identify
@@ -52,3 +55,29 @@ def test_callbacks_mean_the_same_in_every_function():
     assert found["progress"] == {str(ProgressCallback)}
     assert found["on_epoch"] == {str(SearchCallback | None)}
     assert "stage" not in found
+
+
+def list_callables():
+    """Yield the names and values of the public functions, classes and methods of the packages."""
+    for package in (islands, islands_api, islands.sklearn):
+        for name in getattr(package, "__all__", ("IslandsRegressor",)):
+            entry = getattr(package, name)
+            yield name, entry
+            if isinstance(entry, type):
+                yield from ((f"{name}.{each}", getattr(entry, each)) for each in dir(entry) if each[0] != "_")
+
+
+def test_signatures_are_for_readers():
+    """A signature names tables and types, and does not spell out what is in them."""
+    found = {}
+    for name, entry in list_callables():
+        if callable(entry):
+            with suppress(TypeError, ValueError):  # exceptions have no signature
+                found[name] = inspect.signature(entry)
+    assert len(found) > 200
+    assert {name: len(str(each)) for name, each in found.items() if len(str(each)) > 2000} == {}
+    parameters = [(name, str(each)) for name in found for each in found[name].parameters.values()]
+    # The type of arrays of NumPy takes 300 characters.
+    assert [each for each in parameters if len(each[1]) > 400] == []
+    assert "effects: collections.abc.Sequence" in str(found["diagnose"])
+    assert "= islands.EFFECTS" in str(found["diagnose"])

@@ -61,7 +61,7 @@ class SavedMonitor:
     rejected : tuple of RejectedRecord
     """
 
-    simulation: LocalSpec
+    simulation: "LocalSpec"  # quoted: signatures would list every kind
     inputs: tuple[str, ...]
     output: str
     dt: float
