@@ -1,4 +1,4 @@
-"""MkDocs hook: add the generated files to the site and expand ``folder/*`` in the navigation.
+"""MkDocs hook: generated files, the links to them, and ``folder/*`` in the navigation.
 
 A module of this folder generates files if it has a function ``make_pages()`` that yields the path below
 ``docs/`` and the content of each file.
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
     from mkdocs.structure.files import Files
+    from mkdocs.structure.pages import Page
 
 SCRIPTS = Path(__file__).parent
 DOCS = SCRIPTS.parent
@@ -73,3 +74,11 @@ def on_files(files: "Files", config: "MkDocsConfig") -> None:
 
     for path, content in config.extra.pop("generated").items():
         files.append(File.generated(config, path, content=content))
+
+
+def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:
+    """Let the links of a written page to the source of a generated page lead to that page."""
+    if page.file.generated_by is not None:
+        return markdown
+    adapted: str = import_module("project_pages").adapt_links(markdown, f"docs/{page.file.src_uri}")
+    return adapted
