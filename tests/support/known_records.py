@@ -9,6 +9,9 @@ from islands.kernels.memory_operators import play_from
 
 Signal = NDArray[np.float64]
 
+#: Law of `runaway`.
+RUNAWAY = {"y(k-1)": 0.9, "u(k-1)": 0.1, "y(k-1)^2": 0.02, "y(k-1)*u(k-1)": 0.08}
+
 
 def white(samples: int, seed: int) -> Signal:
     return np.random.default_rng(seed).standard_normal(samples)
@@ -44,3 +47,18 @@ def measure(u: Signal, y: Signal, noise: float = 0.0, seed: int = 0, dt: float =
     """Return a record with white noise, relative to the standard deviation of the output."""
     random = np.random.default_rng([seed, 1]).standard_normal(len(y))
     return Dataset(u, y + noise * y.std() * random, dt)
+
+
+def runaway(samples: int, seed: int, noise: float) -> Dataset:
+    """Return a record of a reaction that runs away if the input is held at 0.8 of its amplitude.
+
+    Shorter steps of the full amplitude leave the output bounded. The noise is a fraction of its range.
+    """
+    generator = np.random.default_rng(seed)
+    levels = np.repeat(generator.uniform(-1.0, 1.0, samples), generator.integers(3, 10, samples))
+    u, y = levels[:samples], np.zeros(samples)
+    for k in range(1, samples):
+        terms = y[k - 1], u[k - 1], y[k - 1] ** 2, y[k - 1] * u[k - 1]
+        y[k] = np.dot([*RUNAWAY.values()], terms)
+    y += noise * np.ptp(y) * generator.standard_normal(samples)
+    return Dataset(u[:, None], y, 1.0)

@@ -9,11 +9,15 @@ different warm-ups are compared over the samples that both predict. Decision 001
 A model may be good on the validation data by chance. Its error on the estimation data is then large, or no
 smaller than that of a smaller model.
 
+The measured data are the evidence. The physics checks simulate inputs that the record does not contain, and a
+system may diverge at them as its models do: a reaction that runs away, a spring that softens. The checks
+therefore choose among models that the data do not distinguish. Property 1 is a requirement of the search.
+
 The setting ``select`` can replace this rule by the paper's choice of Appendix A: the least training error.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isinf, isnan, sqrt
 
 import numpy as np
@@ -48,8 +52,36 @@ _NEAR = 1.0
 #: Drift of the output at the end of such a hold, in ranges, that is not stated.
 _STILL = 0.01
 
+#: Reasons to exclude models, in the order of the criteria.
+DIVERGENCE = "validation-divergence"
+PROPERTY_1 = "property-1"
+VALIDATION_ERROR = "validation-error"
+ESTIMATION_ERROR = "estimation-error"
+WORSE = "worse-than-reference"
+EQUALS_ESTIMATION_ERROR = "estimation-error-of-equals"
+CHECKS = "physics-checks"
+
+#: Reasons that exclude models which are as good as the reference.
+_OF_EQUALS = (EQUALS_ESTIMATION_ERROR, CHECKS)
+
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusion:
+    """Models that one criterion excludes from a recommendation.
+
+    Attributes
+    ----------
+    reason : str
+        ``validation-divergence``, ``property-1``, ``validation-error``, ``estimation-error``,
+        ``worse-than-reference``, ``estimation-error-of-equals`` or ``physics-checks``.
+    ranks : tuple of int
+    """
+
+    reason: str
+    ranks: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +94,32 @@ class Recommendation:
         Rank of the model; 1 has the least validation error.
     reasons : tuple of str
         Reasons for the choice, each a statement about measured quantities.
+    reference : int or None
+        Rank of the model that the others are compared with. None if models are not compared, and in results
+        of earlier versions.
+    excluded : tuple of Exclusion
+        In the order of the criteria. The smallest of the models that none excludes is recommended.
     """
 
     rank: int
     reasons: tuple[str, ...]
+    reference: int | None = None
+    excluded: tuple[Exclusion, ...] = ()
+
+
+class _Funnel:
+    """Models that the criteria of a recommendation leave, and those that each of them excludes."""
+
+    def __init__(self, count: int) -> None:
+        self.left = list(range(count))
+        self.excluded: list[Exclusion] = []
+
+    def keep(self, reason: str, kept: list[int]) -> None:
+        """Exclude all models but some of those that are left, unless there are none."""
+        if kept and len(kept) < len(self.left):
+            others = sorted({*self.left}.difference(kept))
+            self.left = kept
+            self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
 def recommend(
@@ -73,17 +127,17 @@ def recommend(
 ) -> Recommendation:
     """Choose the smallest model that is as good as the best one.
 
-    Candidates are the models whose free run on the validation data is bounded and which pass the physics
-    checks: holds and excursions stay bounded and, if the search constrains models of hysteresis, Property 1
-    holds. Those whose error on the validation data exceeds twice the least are left out, and of the others
-    those whose free-run error on the estimation data exceeds twice the least of them. Of the rest, the one
-    with the least RMSE is the reference. A model is as good as the reference if its RMSE exceeds that of the
-    reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds that of the reference by
-    at most 20 % and the mean squared errors differ by at most three standard errors. The standard error is
-    that of the mean difference over blocks of the validation data. A model is also as good if its RMSE on the
-    estimation data exceeds that of the reference by at most 1 %, and that on the validation data by at most
-    50 %. Of these models, those whose free-run error on the estimation data exceeds 1.5 times the least of
-    them are passed over.
+    Candidates are the models whose free run on the validation data is bounded and, if the search constrains
+    models of hysteresis, that have Property 1. Those whose error on the validation data exceeds twice the
+    least are excluded, and of the others those whose free-run error on the estimation data exceeds twice the
+    least of them. Of the rest, the one with the least RMSE is the reference. A model is as good as the
+    reference if its RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range,
+    or if it exceeds that of the reference by at most 20 % and the mean squared errors differ by at most three
+    standard errors. The standard error is that of the mean difference over blocks of the validation data. A
+    model is also as good if its RMSE on the estimation data exceeds that of the reference by at most 1 %, and
+    that on the validation data by at most 50 %. Of these models, those whose free-run error on the estimation
+    data exceeds 1.5 times the least of them are excluded, and of the rest those that diverge in holds or
+    excursions. A criterion that no model meets excludes none.
 
     Parameters
     ----------
@@ -101,26 +155,31 @@ def recommend(
         return Recommendation(
             1, ("the free run of every model diverges; this one has the least one-step-ahead error",)
         )
-    sound = [at for at in bounded if is_sound(assessments[at].physics, hysteresis)]
-    candidates = sound or bounded
-    best = min(candidates, key=lambda at: (assessments[at].validation_error, at))
-    comparable = _pass_over(candidates, assessments, _LARGEST_RATIO, _measure_validation)
-    close = _pass_over(comparable, assessments, _LARGEST_RATIO)
-    lucky = best not in close
-    best = min(close, key=lambda at: (assessments[at].validation_error, at))
-    equal = [
-        at
-        for at in close
-        if _is_as_good(assessments[at], assessments[best])
-        or _is_as_good_in_estimation(assessments[at], assessments[best])
-    ]
-    kept = _pass_over(equal, assessments, LARGEST_ESTIMATION_RATIO)
-    chosen = min(kept, key=lambda at: (sizes[at], at))
-    reasons = (
-        _describe_choice(chosen, best, len(equal), len(kept), assessments, unit) + _describe_luck(lucky),
-        _describe_physics(bool(sound), hysteresis, assessments[chosen].final_physics),
+    funnel = _Funnel(len(assessments))
+    funnel.keep(DIVERGENCE, bounded)
+    if hysteresis:
+        funnel.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
+    funnel.keep(VALIDATION_ERROR, _pass_over(funnel.left, assessments, _LARGEST_RATIO, _measure_validation))
+    funnel.keep(ESTIMATION_ERROR, _pass_over(funnel.left, assessments, _LARGEST_RATIO))
+    reference = min(funnel.left, key=lambda at: (assessments[at].validation_error, at))
+    best = assessments[reference]
+    funnel.keep(
+        WORSE,
+        [
+            at
+            for at in funnel.left
+            if _is_as_good(assessments[at], best) or _is_as_good_in_estimation(assessments[at], best)
+        ],
     )
-    return Recommendation(chosen + 1, tuple(filter(None, reasons)))
+    funnel.keep(EQUALS_ESTIMATION_ERROR, _pass_over(funnel.left, assessments, LARGEST_ESTIMATION_RATIO))
+    funnel.keep(CHECKS, [at for at in funnel.left if is_sound(assessments[at].physics, hysteresis)])
+    chosen = min(funnel.left, key=lambda at: (sizes[at], at))
+    found = Recommendation(chosen + 1, (), reference + 1, tuple(funnel.excluded))
+    reasons = (
+        _describe_choice(found, sizes, assessments, unit),
+        _describe_physics(found, assessments, hysteresis, unit),
+    )
+    return replace(found, reasons=tuple(filter(None, reasons)))
 
 
 def recommend_fittest(
@@ -148,8 +207,47 @@ def recommend_fittest(
     entry = assessments[chosen]
     if not is_sound(entry.physics, hysteresis):
         return Recommendation(chosen + 1, (reason,))
-    checks = _describe_physics(True, hysteresis, entry.final_physics)
+    checks = _describe_passed(hysteresis, entry.final_physics)
     return Recommendation(chosen + 1, tuple(filter(None, (reason, checks))))
+
+
+def list_rivals(
+    found: Recommendation, sizes: Sequence[int], assessments: Sequence[Assessment]
+) -> tuple[Exclusion, ...]:
+    """Return the excluded models that the errors on the validation data alone would prefer.
+
+    They have a smaller error than the reference, or are as good as it and smaller than the recommended model.
+    """
+    if found.reference is None:
+        return ()
+    best, size = assessments[found.reference - 1], sizes[found.rank - 1]
+
+    def is_rival(rank: int) -> bool:
+        entry = assessments[rank - 1]
+        is_better = entry.validation_error < best.validation_error
+        return is_better or (sizes[rank - 1] < size and _is_as_good(entry, best))
+
+    rivals = (replace(each, ranks=tuple(filter(is_rival, each.ranks))) for each in found.excluded)
+    return tuple(each for each in rivals if each.ranks)
+
+
+def describe_exclusion(exclusion: Exclusion, assessments: Sequence[Assessment]) -> str:
+    """State what excludes some models, to be read after their names."""
+    if exclusion.reason == PROPERTY_1:
+        return "without Property 1"
+    if exclusion.reason == CHECKS:
+        return _describe_divergence([assessments[rank - 1].physics for rank in exclusion.ranks])
+    of_equals = exclusion.reason in _OF_EQUALS
+    ratio, least = (LARGEST_ESTIMATION_RATIO, " of these") if of_equals else (_LARGEST_RATIO, "")
+    return f"with more than {ratio:g} times the least error{least} on the estimation data"
+
+
+def _describe_divergence(physics: Sequence[PhysicsChecks]) -> str:
+    """State at which holds and excursions some models diverge."""
+    levels = sorted({abs(hold.level) for each in physics for hold in each.holds if not hold.bounded})
+    names = dict.fromkeys(test.name for each in physics for test in each.excursions if not test.bounded)
+    held = f"inputs held at {' and '.join(f'{level:g}' for level in levels)} times their recorded amplitude"
+    return f"with a divergence at {' and at '.join([*([held] if levels else []), *names])}"
 
 
 def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
@@ -244,43 +342,79 @@ def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> 
 
 
 def _describe_choice(
-    chosen: int, best: int, equal: int, kept: int, assessments: Sequence[Assessment], unit: str
+    found: Recommendation, sizes: Sequence[int], assessments: Sequence[Assessment], unit: str
 ) -> str:
-    """State the choice among a number of equal models, of which some are kept for the estimation data."""
-    error, least = (f"{assessments[at].validation_error:.4g} {unit}".rstrip() for at in (chosen, best))
-    if chosen == best:
-        both = " on both parts of the data" if kept < equal else ""
-        return f"least free-run error on the validation data, RMSE {error}; no smaller model is as good{both}"
-    exception = (
-        f", without {equal - kept} with more than {LARGEST_ESTIMATION_RATIO:g} times the least error of these"
-        " on the estimation data"
+    """State the criterion, the errors, and the excluded models that the criterion would prefer."""
+    chosen, best = (assessments[rank - 1] for rank in (found.rank, found.reference or found.rank))
+    error, least = (_write_error(entry.validation_error, unit) for entry in (chosen, best))
+    rivals = list_rivals(found, sizes, assessments)
+    equals, others = (
+        [
+            f"{_write_models(each.ranks, assessments, unit)} {describe_exclusion(each, assessments)}"
+            for each in rivals
+            if (each.reason in _OF_EQUALS) == of_equals
+        ]
+        for of_equals in (True, False)
     )
-    exception = exception if kept < equal else ""
-    if _is_as_good(assessments[chosen], assessments[best]):
+    exception = f", except {' and '.join(equals)}" if equals else ""
+    scope = " of the models that are not left out" if others else ""
+    end = f"; left out: {' and '.join(others)}" if others else ""
+    data = f"free-run error on the validation data{scope}"
+    if chosen is best:
+        return f"least {data}, RMSE {error}; no smaller model is as good{exception}{end}"
+    count = len(assessments) - sum(
+        len(each.ranks) for each in found.excluded if each.reason not in _OF_EQUALS
+    )
+    if _is_as_good(chosen, best):
         return (
-            f"smallest of {equal} models whose free-run errors on the validation data do not differ "
-            f"significantly from the least{exception}: RMSE {error}, least {least}"
+            f"smallest of {count} models whose free-run errors on the validation data do not differ "
+            f"significantly from the least{scope}{exception}: RMSE {error}, least {least}{end}"
         )
     return (
-        f"smallest of {equal} models as good as that with the least free-run error on the validation data"
-        f"{exception}: its error on the estimation data is no larger, that on the validation data is RMSE "
-        f"{error}, least {least}"
+        f"smallest of {count} models as good as that with the least {data}{exception}: its error on the "
+        f"estimation data is no larger, that on the validation data is RMSE {error}, least {least}{end}"
     )
 
 
-def _describe_luck(lucky: bool) -> str:
-    """State whether the model with the least validation error of all is left out."""
-    if not lucky:
-        return ""
-    condition = f"more than {_LARGEST_RATIO:g} times the least error on the estimation data"
-    return f"; models with {condition} are left out"
+def _write_error(error: float, unit: str) -> str:
+    return f"{error:.4g} {unit}".rstrip()
 
 
-def _describe_physics(sound: bool, hysteresis: bool, physics: PhysicsChecks) -> str:
-    """State the levels at which the model is bounded, or those of the checks that no model passes.
+def _write_models(ranks: Sequence[int], assessments: Sequence[Assessment], unit: str) -> str:
+    """Return the number of some models, with their errors on the validation data."""
+    errors = [assessments[rank - 1].validation_error for rank in ranks]
+    limits = dict.fromkeys(f"{error:.4g}" for error in (min(errors), max(errors)))
+    return f"{len(ranks)} (RMSE {' to '.join(limits)}{unit and f' {unit}'})"
+
+
+def _describe_physics(
+    found: Recommendation, assessments: Sequence[Assessment], hysteresis: bool, unit: str
+) -> str:
+    """State the levels at which the model is bounded, or which models pass the checks that it fails.
 
     Empty if the model was not checked.
     """
+    entry = assessments[found.rank - 1]
+    if entry.physics.not_computed:
+        return ""
+    if is_sound(entry.physics, hysteresis):
+        return _describe_passed(hysteresis, entry.final_physics)
+    checks = _list_checks("bounded", max(map(abs, LEVELS)), "", hysteresis)
+    passing = [
+        at
+        for at, each in enumerate(assessments, start=1)
+        if each.outcomes["validation"]["free_run"] and is_sound(each.physics, hysteresis)
+    ]
+    if not passing:
+        return f"no model passes the physics checks ({checks})"
+    return (
+        f"the data contradict the physics checks ({checks}): the models that pass them have larger errors on "
+        f"the validation or the estimation data, {_write_models(passing, assessments, unit)}"
+    )
+
+
+def _describe_passed(hysteresis: bool, physics: PhysicsChecks) -> str:
+    """State the levels at which a model that passes the physics checks is bounded; empty if not checked."""
     if physics.not_computed:
         return ""
     beyond = [abs(each.level) for each in physics.extremes if not each.plausible]
@@ -288,20 +422,22 @@ def _describe_physics(sound: bool, hysteresis: bool, physics: PhysicsChecks) -> 
         (abs(each.level) for each in physics.extremes if abs(each.level) < min(beyond, default=inf)),
         default=0,
     )
-    held = max(held, *map(abs, LEVELS)) if sound else max(map(abs, LEVELS))
+    held = max(held, *map(abs, LEVELS))
+    moves = _describe_motion(held, physics)
+    state, remark = ("no divergence", f" (where {moves})") if moves else ("bounded", "")
+    return _list_checks(state, held, remark, hysteresis)
+
+
+def _list_checks(state: str, held: float, remark: str, hysteresis: bool) -> str:
     factors = {
         kind: " and ".join(f"{factor:g}" for named, factor in EXCURSIONS if named == kind)
         for kind in ("amplitude", "rate")
     }
-    state, remark = "bounded", ""
-    if sound and (moves := _describe_motion(held, physics)):
-        state, remark = "no divergence", f" (where {moves})"
-    checks = (
+    return (
         f"{state} at inputs held at up to {held:g} times their recorded amplitude about the midpoint{remark}"
         f", at {factors['amplitude']} times the amplitude and at {factors['rate']} times the rate"
+        f"{', and Property 1 holds' if hysteresis else ''}"
     )
-    checks += ", and Property 1 holds" if hysteresis else ""
-    return checks if sound else f"no model passes the physics checks ({checks})"
 
 
 def _describe_motion(held: float, physics: PhysicsChecks) -> str:

@@ -20,7 +20,7 @@ from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
 from islands.progress import Steps, StoppedError
 from islands.validation.assessment import Assessment, average_errors
-from islands.validation.recommendation import recommend
+from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
 #: models keep that property.
@@ -264,14 +264,21 @@ def _select_kind(
             "estimation data"
             f"{list_others(errors, close[0])}"
         )
-    models = list(compared.values())
-    best = recommend([each.model.size for each in models], models, False)
-    kind = list(compared)[best.rank - 1]
-    smallest = "" if errors[kind] == least else ", the smallest without a significantly larger error,"
+    kinds, models = list(compared), list(compared.values())
+    sizes = [each.model.size for each in models]
+    best = recommend(sizes, models, False)
+    kind = kinds[best.rank - 1]
+    is_least = errors[kind] == least or best.rank == best.reference
+    smallest = "" if is_least else ", the smallest without a significantly larger error,"
+    left_out = [
+        f"{' and '.join(kinds[rank - 1] for rank in each.ranks)} {describe_exclusion(each, models)}"
+        for each in list_rivals(best, sizes, models)
+    ]
     return kind, (
         f"because the free-run RMSE of its recommended model{smallest} on the validation data"
         f"{means} is "
         f"{percent(errors[kind])} of the output range of the estimation data{list_others(errors, kind)}"
+        f"{'; left out: ' + ' and '.join(left_out) if left_out else ''}"
     )
 
 

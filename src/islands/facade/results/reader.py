@@ -16,7 +16,7 @@ from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.result_models import check_single_output, read_shooting_interval
 from islands.io.saved_documents import find_recommended, read_listed_model
 from islands.validation.metrics import Metrics
-from islands.validation.recommendation import Recommendation
+from islands.validation.recommendation import Exclusion, Recommendation
 
 
 def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Result:
@@ -66,8 +66,13 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
             )
             for entry, model in zip(entries, models, strict=True)
         )
-        reasons = document.get("recommended", {}).get("reasons", ())
-        recommendation = Recommendation(find_recommended(document)["rank"], tuple(reasons))
+        chosen = document.get("recommended", {})
+        recommendation = Recommendation(
+            find_recommended(document)["rank"],
+            tuple(chosen.get("reasons", ())),
+            chosen.get("reference"),
+            tuple(Exclusion(each["reason"], tuple(each["ranks"])) for each in chosen.get("excluded", ())),
+        )
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error
     return Result(stored, recommendation, document["settings"], folder, MappingProxyType(document))

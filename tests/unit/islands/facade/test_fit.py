@@ -18,6 +18,8 @@ from islands.io.result_text.statements import describe
 from islands.models.equations import equation, latex_equation
 from islands.progress import StoppedError
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
+from islands.validation.physics import check_physics
+from support.known_records import RUNAWAY, runaway
 from support.undrawn import undrawn_figures
 
 
@@ -418,3 +420,21 @@ def test_output_of_zeros_raises_settings_error():
         SettingsError, match=r"no model could be estimated: no term of the library reduces the error"
     ):
         islands.fit(zeros, library="polynomial")
+
+
+@pytest.mark.parametrize(("seed", "noise"), [(0, 0.003), (4, 0.01)])
+def test_a_law_that_diverges_in_the_physics_checks_is_recommended_if_the_data_say_so(seed, noise):
+    """The law, its estimate and every model that follows the record diverge at a held input."""
+    record = runaway(600, seed, noise)
+    options = {"degree": 2, "lags": 1, "max_terms": 5, "average": 1, "certificate": 0}
+    found = islands.fit(record, library="polynomial", **options)
+    best = found.best.model
+    assert set(best.equation().terms) == RUNAWAY.keys()
+    law = best.with_parameters([RUNAWAY[term] for term in best.equation().terms])
+    for model in (law, best):
+        assert not all(hold.bounded for hold in check_physics(model, record).holds)
+    choice, physics = found.recommendation.reasons
+    assert "left out" not in choice
+    assert physics.startswith("the data contradict the physics checks")
+    lines = describe(result_document(found.search_result))
+    assert any(line.startswith(f"Fails at: {physics};") for line in lines)

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import inf, nan
 
 import numpy as np
@@ -111,7 +111,8 @@ def test_a_result_states_the_error_that_the_parameters_minimise(findings):
 def test_a_result_names_the_recommended_model_with_reasons(findings):
     result = loaded(findings)
     found = findings.recommendation
-    assert result["recommended"] == {"rank": found.rank, "reasons": list(found.reasons)}
+    assert result["recommended"] == json.loads(json.dumps(asdict(found)))
+    assert found.excluded
     assert [model["rank"] for model in result["models"] if model["recommended"]] == [found.rank]
 
 

@@ -12,7 +12,12 @@ from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import ClusterSum, ExcursionTest, ExtremeTest, HoldTest, PhysicsChecks
-from islands.validation.recommendation import compare_blocks, recommend, recommend_fittest
+from islands.validation.recommendation import (
+    Exclusion,
+    compare_blocks,
+    recommend,
+    recommend_fittest,
+)
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 
@@ -132,14 +137,14 @@ def test_the_least_validation_error_by_chance_is_passed_over():
     least, error = (sqrt(np.mean(blocks)) for blocks in (0.99 * NOISE, NOISE))
     assert found.reasons[0] == (
         "smallest of 2 models whose free-run errors on the validation data do not differ significantly from "
-        "the least, without 1 with more than 1.5 times the least error of these on the estimation data: "
-        f"RMSE {error:.4g} um, least {least:.4g} um"
+        f"the least, except 1 (RMSE {least:.4g} um) with more than 1.5 times the least error of these on the "
+        f"estimation data: RMSE {error:.4g} um, least {least:.4g} um"
     )
     found = recommend([3, 4], entries[::-1], False)
     assert "no smaller model is as good" not in found.reasons[0]
     lucky = Candidate(3, NOISE, estimated=0.018).assessment()
     found = recommend([4, 3], [Candidate(4, 0.99 * NOISE).assessment(), lucky], False)
-    assert found.reasons[0].endswith("; no smaller model is as good on both parts of the data")
+    assert re.search(r"no smaller model is as good, except 1 \(RMSE .*\) with more", found.reasons[0])
 
 
 @pytest.mark.parametrize(("estimated", "size"), [(0.0199, 3), (0.0201, 4), (nan, 4)])
@@ -154,12 +159,13 @@ def test_samples_without_a_prediction_do_not_hide_a_large_validation_error():
     assert recommend([6, 7], [right.assessment(), lucky.assessment()], False).rank == 1
 
 
-def test_the_reason_states_that_a_reference_is_left_out():
+def test_the_reason_states_which_better_models_are_left_out():
     entries = [Candidate(3, NOISE, estimated=0.2).assessment(), Candidate(4, 4 * NOISE).assessment()]
-    assert (
-        recommend([3, 4], entries, False)
-        .reasons[0]
-        .endswith("; models with more than 2 times the least error on the estimation data are left out")
+    least, error = sqrt(NOISE.mean()), sqrt(4 * NOISE.mean())
+    assert recommend([3, 4], entries, False, "um").reasons[0] == (
+        "least free-run error on the validation data of the models that are not left out, "
+        f"RMSE {error:.4g} um; no smaller model is as good; left out: 1 (RMSE {least:.4g} um) with more than "
+        "2 times the least error on the estimation data"
     )
 
 
@@ -173,15 +179,78 @@ def test_rounding_errors_of_exact_models_do_not_matter():
     assert chosen(Candidate(2, NOISE), *exact) == 3
 
 
-def test_a_model_that_diverges_beyond_the_record_is_not_recommended():
-    assert chosen(Candidate(3, NOISE, bounded=False), Candidate(5, 2 * NOISE)) == 5
+def test_a_check_decides_between_models_that_the_data_do_not_distinguish():
+    candidates = Candidate(3, NOISE, bounded=False), Candidate(5, 1.01 * NOISE)
+    assert chosen(*candidates) == 5
+    found = recommend([3, 5], [each.assessment() for each in candidates], False, "um")
+    least, error = (sqrt(factor * NOISE.mean()) for factor in (1.0, 1.01))
+    assert found.reasons[0] == (
+        "smallest of 2 models whose free-run errors on the validation data do not differ significantly from "
+        f"the least, except 1 (RMSE {least:.4g} um) with a divergence at rate x 5: RMSE {error:.4g} um, "
+        f"least {least:.4g} um"
+    )
+    assert found.excluded == (Exclusion("physics-checks", (1,)),)
     assert chosen(Candidate(3, NOISE, bounded=False), Candidate(5, [])) == 3
 
 
+def test_a_check_that_the_data_contradict_excludes_no_model():
+    """A reaction runs away at a held input: models that cannot do so do not follow the record either."""
+    candidates = [
+        Candidate(7, NOISE, bounded=False),
+        Candidate(4, 1.01 * NOISE, bounded=False),
+        Candidate(2, 50 * NOISE, estimated=0.1),
+    ]
+    assert chosen(*candidates) == 4
+    found = recommend([7, 4, 2], [each.assessment() for each in candidates], False, "um")
+    assert found.reasons[0].startswith("smallest of 2 models")
+    assert re.fullmatch(
+        r"the data contradict the physics checks \(bounded at .* times the rate\): the models that pass them "
+        r"have larger errors on the validation or the estimation data, 1 \(RMSE \S+ um\)",
+        found.reasons[1],
+    )
+    assert found.excluded == (Exclusion("validation-error", (3,)),)
+
+
+def test_the_reason_states_every_excluded_model_that_the_criterion_would_prefer():
+    generator = np.random.default_rng(8)
+    for _ in range(200):
+        made = [
+            Candidate(
+                int(generator.integers(1, 9)),
+                NOISE * generator.choice([1.0, 1.01, 1.2, 5.0]),
+                *(bool(each) for each in generator.integers(0, 2, 2)),
+                estimated=generator.choice([0.01, 0.0101, 0.017, 0.05]),
+            )
+            for _ in range(6)
+        ]
+        made.sort(key=lambda each: np.mean(each.blocks))
+        sizes, entries = [each.size for each in made], [each.assessment() for each in made]
+        found = recommend(sizes, entries, hysteresis=bool(generator.integers(2)))
+        excluded = [rank for each in found.excluded for rank in each.ranks]
+        left = {*range(1, 7)}.difference(excluded)
+        assert len(excluded) + len(left) == 6  # one reason for each
+        assert min(sizes[rank - 1] for rank in left) == sizes[found.rank - 1]
+        stated = sum(map(int, re.findall(r"(\d) \(RMSE", found.reasons[0])))
+        errors = [entry.validation_error for entry in entries]
+        least, size = errors[found.reference - 1], sizes[found.rank - 1]
+        preferred = {
+            rank
+            for rank in excluded
+            if errors[rank - 1] < least or (sizes[rank - 1] < size and errors[rank - 1] <= 1.01 * least)
+        }
+        assert stated == len(preferred)
+        scoped = "of the models that are not left out" in found.reasons[0]
+        assert scoped == ("; left out: " in found.reasons[0])
+        assert scoped or min(errors) == least
+
+
 def test_property_1_is_required_of_models_of_hysteresis_only():
-    candidates = Candidate(3, NOISE, property_1=False), Candidate(5, 2 * NOISE)
+    """The search requires it: a model without it is excluded, however small its error is."""
+    candidates = Candidate(3, NOISE, property_1=False), Candidate(5, 9 * NOISE)
     assert chosen(*candidates, hysteresis=True) == 5
     assert chosen(*candidates) == 3
+    found = recommend([3, 5], [each.assessment() for each in candidates], True)
+    assert re.search(r"left out: 1 \(RMSE \S+\) without Property 1", found.reasons[0])
     only = Candidate(4, NOISE, property_1=False)
     found = recommend([4], [only.assessment()], True)
     assert found.reasons[1].startswith("no model passes the physics checks")
