@@ -64,6 +64,9 @@ CHECKS = "physics-checks"
 #: Reasons that exclude models which are as good as the reference.
 _OF_EQUALS = (EQUALS_ESTIMATION_ERROR, CHECKS)
 
+#: Reasons that may exclude a model whose error on the validation data is the least.
+_BESIDES_ERROR = (PROPERTY_1, ESTIMATION_ERROR, *_OF_EQUALS)
+
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
 
@@ -163,14 +166,7 @@ def recommend(
     funnel.keep(ESTIMATION_ERROR, _pass_over(funnel.left, assessments, _LARGEST_RATIO))
     reference = min(funnel.left, key=lambda at: (assessments[at].validation_error, at))
     best = assessments[reference]
-    funnel.keep(
-        WORSE,
-        [
-            at
-            for at in funnel.left
-            if _is_as_good(assessments[at], best) or _is_as_good_in_estimation(assessments[at], best)
-        ],
-    )
+    funnel.keep(WORSE, [at for at in funnel.left if _is_equal(assessments[at], best)])
     funnel.keep(EQUALS_ESTIMATION_ERROR, _pass_over(funnel.left, assessments, LARGEST_ESTIMATION_RATIO))
     funnel.keep(CHECKS, [at for at in funnel.left if is_sound(assessments[at].physics, hysteresis)])
     chosen = min(funnel.left, key=lambda at: (sizes[at], at))
@@ -214,7 +210,7 @@ def recommend_fittest(
 def list_rivals(
     found: Recommendation, sizes: Sequence[int], assessments: Sequence[Assessment]
 ) -> tuple[Exclusion, ...]:
-    """Return the excluded models that the errors on the validation data alone would prefer.
+    """Return the excluded models that would be preferred without the reason that excludes them.
 
     They have a smaller error than the reference, or are as good as it and smaller than the recommended model.
     """
@@ -225,10 +221,10 @@ def list_rivals(
     def is_rival(rank: int) -> bool:
         entry = assessments[rank - 1]
         is_better = entry.validation_error < best.validation_error
-        return is_better or (sizes[rank - 1] < size and _is_as_good(entry, best))
+        return is_better or (sizes[rank - 1] < size and _is_equal(entry, best))
 
     rivals = (replace(each, ranks=tuple(filter(is_rival, each.ranks))) for each in found.excluded)
-    return tuple(each for each in rivals if each.ranks)
+    return tuple(each for each in rivals if each.ranks and each.reason in _BESIDES_ERROR)
 
 
 def describe_exclusion(exclusion: Exclusion, assessments: Sequence[Assessment]) -> str:
@@ -256,6 +252,11 @@ def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
         excursion.bounded for excursion in physics.excursions
     )
     return bounded and (physics.property_1 or not hysteresis)
+
+
+def _is_equal(entry: Assessment, reference: Assessment) -> bool:
+    """Return whether a model is as good as the reference."""
+    return _is_as_good(entry, reference) or _is_as_good_in_estimation(entry, reference)
 
 
 def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
@@ -362,16 +363,16 @@ def _describe_choice(
     data = f"free-run error on the validation data{scope}"
     if chosen is best:
         return f"least {data}, RMSE {error}; no smaller model is as good{exception}{end}"
-    count = len(assessments) - sum(
-        len(each.ranks) for each in found.excluded if each.reason not in _OF_EQUALS
-    )
+    worse = {rank for each in found.excluded if each.reason not in _OF_EQUALS for rank in each.ranks}
+    equal = [each for rank, each in enumerate(assessments, start=1) if rank not in worse]
     if _is_as_good(chosen, best):
+        count = sum(_is_as_good(each, best) for each in equal)
         return (
             f"smallest of {count} models whose free-run errors on the validation data do not differ "
             f"significantly from the least{scope}{exception}: RMSE {error}, least {least}{end}"
         )
     return (
-        f"smallest of {count} models as good as that with the least {data}{exception}: its error on the "
+        f"smallest of {len(equal)} models as good as that with the least {data}{exception}: its error on the "
         f"estimation data is no larger, that on the validation data is RMSE {error}, least {least}{end}"
     )
 
@@ -399,12 +400,12 @@ def _describe_physics(
         return ""
     if is_sound(entry.physics, hysteresis):
         return _describe_passed(hysteresis, entry.final_physics)
-    checks = _list_checks("bounded", max(map(abs, LEVELS)), "", hysteresis)
     passing = [
         at
         for at, each in enumerate(assessments, start=1)
         if each.outcomes["validation"]["free_run"] and is_sound(each.physics, hysteresis)
     ]
+    checks = _list_checks("bounded", max(map(abs, LEVELS)), "", hysteresis and not passing)
     if not passing:
         return f"no model passes the physics checks ({checks})"
     return (

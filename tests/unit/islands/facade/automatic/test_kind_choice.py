@@ -1,6 +1,7 @@
 """Choice of the preset auto: the kind of a record, its dead times, and precedence of explicit settings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,13 +11,20 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.errors import SettingsError
 from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
-from islands.facade.automatic.kind_choice import choice_from_document, list_others
+from islands.facade.automatic.kind_choice import (
+    _select_kind,
+    choice_from_document,
+    list_others,
+    measure_share,
+)
 from islands.facade.automatic.kind_trials import percent
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import take_library
 from islands.progress import ignore_progress, never_stop
+from support.assessments import with_changes
+from support.known_records import runaway
 from support.portfolio_records import KINDS as RECORDS
 
 #: Smallest search, for the settings of its result.
@@ -218,3 +226,20 @@ def test_errors_with_equal_digits_are_as_much():
     errors = {"smooth": 0.1431, "friction": 0.1429, "magnitude": 0.02}
     assert list_others(errors, "smooth") == ", compared with as much for friction, 2 % for magnitude"
     assert list_others({"smooth": 0.1}, "smooth") == ""
+
+
+def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
+    data = runaway(600, 0, 0.003)
+    options = {"degree": 2, "lags": 1, "max_terms": 5, "average": 1, "certificate": 0}
+    found = islands.fit(data, library="polynomial", **options).search_result
+    law, larger = (next(each for each in found.models if each.model.size == size) for size in (4, 5))
+    bounded = next(each for each in found.models if each.model.size == 2).physics
+    models = {"smooth": law, "magnitude": with_changes(larger, physics=bounded)}
+    errors = {kind: measure_share(each, data) for kind, each in models.items()}
+    libraries = dict.fromkeys(models, SimpleNamespace(constraints="none"))
+    kind, reason = _select_kind(data, libraries, None, models, errors, 1)
+    assert kind == "magnitude"
+    assert "; left out: smooth with a divergence at inputs held at 0.8 times their" in reason
+    kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors, 1)
+    assert kind == "smooth"
+    assert "left out" not in reason
