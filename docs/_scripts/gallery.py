@@ -1,8 +1,9 @@
 """Picture of the README: the four example records, the equations found in them, and their free runs.
 
-``python docs/_scripts/gallery.py`` draws ``docs/pictures/gallery.svg`` again.
+``command_outputs.py`` draws it from the results of the commands of the README.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +30,11 @@ PICTURE = Path(__file__).parents[1] / "pictures" / "gallery.svg"
 SHOWN = 150
 
 
-def draw(axes: Axes, name: str) -> None:
+def draw(axes: Axes, name: str, result: islands.Result) -> None:
     """Draw the first part of the validation data, and the free run of the recommended model."""
     record = EXAMPLE_RECORDS[name].make()
     validation = split(record).validation
-    best = islands.fit(record).best
+    best = result.best
     run = best.simulate(validation).y[:SHOWN]
     time, measured = validation.time[:SHOWN], validation.y[:SHOWN]
     axes.plot(time, measured, color=MEASURED, lw=MEASURED_WIDTH, label="measured")
@@ -48,15 +49,11 @@ def draw(axes: Axes, name: str) -> None:
 
 
 @house_style()
-def draw_gallery() -> None:
-    """Draw and save the picture."""
+def draw_gallery(results: Mapping[str, islands.Result]) -> None:
+    """Draw and save the picture of the results of all example records, by name."""
     figure = blank(4.4, "")
     places = figure.subplots(2, 2)
     for axes, name in zip(places.flat, EXAMPLE_RECORDS, strict=True):
-        draw(axes, name)
+        draw(axes, name, results[name])
     places[0, 0].legend(fontsize=7.0, loc="lower right")
     save(finish(figure), PICTURE)
-
-
-if __name__ == "__main__":
-    draw_gallery()

@@ -1,4 +1,4 @@
-"""Commands of the README, run in their order in an empty folder, and the output that the first steps show."""
+"""Commands of the README, run in their order in an empty folder, and the outputs that it shows."""
 
 import re
 import shlex
@@ -9,6 +9,7 @@ from contextlib import chdir
 from pathlib import Path
 
 import pytest
+from command_outputs import PAGES, update
 
 import islands
 from islands.io.models import read_model
@@ -33,12 +34,16 @@ def read_commands(page: Path) -> list[list[str]]:
 
 
 @pytest.mark.ci
-def test_every_command_runs_and_the_shown_equation_is_that_of_the_result(tmp_path: Path) -> None:
-    """The figures are not laid out."""
-    shown = re.search(
-        r"^speed_rad_s\(k\) =.*?\n\n", README.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
-    )
-    assert shown is not None
+def test_every_command_runs_and_the_shown_outputs_are_those_of_the_commands(tmp_path: Path) -> None:
+    """The figures are not laid out. ``python docs/_scripts/command_outputs.py`` writes the outputs."""
+    text = README.read_text(encoding="utf-8")
+    outputs: dict[str, str] = {}
+
+    def run(command: str) -> str:
+        if command not in outputs:
+            outputs[command] = succeed(*shlex.split(command))
+        return outputs[command]
+
     with chdir(tmp_path), undrawn_figures():
         commands = read_commands(README)
         assert {each[0] for each in commands} >= {
@@ -55,26 +60,31 @@ def test_every_command_runs_and_the_shown_equation_is_that_of_the_result(tmp_pat
             if command[-1:] == ["--out"] and (known := folders.setdefault((*command,), last)) != last:
                 shutil.copytree(known, last)  # the same command with another folder
             else:
-                succeed(*words)
-        assert shown[0] in Path("motor/summary.txt").read_text(encoding="utf-8")
+                run(shlex.join(words))
+        for page in PAGES:
+            shown = page.read_text(encoding="utf-8")
+            assert update(shown, run) == shown
         check_first_model(FIRST_MODEL)
         assert read_model(Path("motor/models/01.json")).input_names == ("drive_V",)
-        (program,) = re.findall(r"^```python\n(.*?)^```", README.read_text(encoding="utf-8"), re.M | re.S)
+        (program,) = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
         Path("program.py").write_text(program, encoding="utf-8")
         subprocess.run([sys.executable, "program.py"], check=True, timeout=120)
 
 
-def check_first_model(page: Path) -> None:
-    """Compare the blocks of a page with the record and the results in the current folder."""
-    for words in read_commands(page):
-        if "--out" in words and not Path(words[words.index("--out") + 1]).exists():
-            succeed(*words)
-    record, *outputs = (code for language, code in pages.blocks(page) if language == "text")
-    assert Path("motor.csv").read_text(encoding="utf-8").startswith(record)
-    summaries = "".join(
-        Path(f"{name}/summary.txt").read_text(encoding="utf-8") for name in ("motor", "piezo")
+def test_a_shown_output_is_an_excerpt_of_that_of_its_command() -> None:
+    page = "Try\n\n    islands diagnose a.csv  # now\n\n```text\n{}```\n\nEnd\n"
+    output = "In short\n\nIt lacks 2\n    of 3.\nSo it\n  goes on\nOn the 2nd\n  half\nEnd\n"
+    old = page.format("It lacks 1.\nOn the first half\n")
+    assert update(old, lambda _: output) == page.format(
+        "It lacks 2\n    of 3.\n...\nOn the 2nd\n  half\n...\n"
     )
-    assert len(outputs) > 2
-    assert not [output for output in outputs if output not in summaries]
+    with pytest.raises(ValueError, match="the output has no paragraph"):
+        update(page.format("No such line\n"), lambda _: output)
+
+
+def check_first_model(page: Path) -> None:
+    """Compare the record and the program of a page with those in the current folder."""
+    record, *_ = (code for language, code in pages.blocks(page) if language == "text")
+    assert Path("motor.csv").read_text(encoding="utf-8").startswith(record)
     (program,) = (code for language, code in pages.blocks(page) if language == "c")
     assert program in islands.load("motor").export("c")

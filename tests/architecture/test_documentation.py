@@ -51,7 +51,7 @@ def test_links_of_a_page_lead_to_files_and_anchors(page: Path) -> None:
         assert not anchor or file.suffix != ".md" or anchor in pages.anchors(file), target
 
 
-def test_a_link_to_the_source_of_a_generated_page_leads_to_that_page_in_the_site() -> None:
+def test_a_link_to_the_source_of_a_page_leads_to_the_page_in_the_site() -> None:
     text = "[effects](../../src/islands/effects/catalogue.py#free-forms), [first](../../examples/01_first.py)"
     assert adapt_links(text, "docs/how-to/page.md") == (
         "[effects](../reference/effects.md#free-forms), [first](../tutorials/01_first.md)"

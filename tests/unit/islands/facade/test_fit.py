@@ -423,7 +423,7 @@ def test_output_of_zeros_raises_settings_error():
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(0, 0.003), (4, 0.01)])
-def test_a_law_that_diverges_in_the_physics_checks_is_recommended_if_the_data_say_so(seed, noise):
+def test_a_law_that_fails_the_physics_checks_is_recommended_if_the_data_say_so(seed, noise):
     """The law, its estimate and every model that follows the record diverge at a held input."""
     record = runaway(600, seed, noise)
     options = {"degree": 2, "lags": 1, "max_terms": 5, "average": 1, "certificate": 0}
