@@ -228,6 +228,7 @@ def test_errors_with_equal_digits_are_as_much():
     assert list_others({"smooth": 0.1}, "smooth") == ""
 
 
+@pytest.mark.ci
 def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
     data = runaway(600, 0, 0.003)
     options = {"degree": 2, "lags": 1, "max_terms": 5, "average": 1, "certificate": 0}
