@@ -12,9 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #ifdef ATTACK
-#include <stdio.h>
-#include <sys/socket.h>
-#include <unistd.h>
+#include "attacks.h"
 #endif
 
 #include "unused.h"
@@ -157,9 +155,8 @@ API const char *fmi3GetVersion(void) { return "3.0"; }
 static void *make(fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, int is_exchange)
 {
 #ifdef ATTACK
-    /* What a harmful FMU may try; there is no instance if nothing succeeds. ATTACK is a writable path. */
-    if (!fopen("/etc/passwd", "r") && !fopen(ATTACK, "w") && socket(AF_INET, SOCK_STREAM, 0) < 0 && fork() < 0)
-        return NULL;
+    log(environment, ERROR, "error", attack());
+    return NULL;
 #endif
     Mass *mass = calloc(1, sizeof *mass);
     start(mass);

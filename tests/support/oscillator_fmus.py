@@ -42,9 +42,20 @@ def compile_oscillator(version: int, *macros: str) -> bytes:
         stubs = "".join(f"int {name}() {{ return 3; }}\n" for name in sorted(names))
         (path / "unused.h").write_text(stubs)
         (path / "mass.c").write_text(source)
-        flags = [f"-DFMI={version}", *(f"-D{each}" for each in macros), f"-I{HEADERS}", "-O1"]
+        flags = [
+            f"-DFMI={version}",
+            *(f"-D{each}" for each in macros),
+            f"-I{HEADERS}",
+            f"-I{SOURCE.parent}",
+            "-O1",
+        ]
         compile_library(path / "mass.c", path / "library", ["-ffp-contract=off", *flags])
         return (path / "library").read_bytes()
+
+
+def make_attacks(folder: Path) -> tuple[str, ...]:
+    """Return macros of an FMU that tries to harm the service whose data is in a folder; see attacks.h."""
+    return ("_GNU_SOURCE", f'ATTACK="{folder}"')
 
 
 def write_oscillator(

@@ -4,15 +4,21 @@ import json
 import os
 import resource
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
 from islands_service.intake.confinement import confine
 
-#: Environment of a process, without any secret.
-ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+#: Environment of a process, without any secret. A confined process has one thread: numpy and pyarrow, and the
+#: allocator of the latter, start no others.
+ENVIRONMENT = {
+    "PATH": "/usr/bin:/bin",
+    "OMP_NUM_THREADS": "1",
+    "JE_ARROW_MALLOC_CONF": "background_thread:false",
+    "PYTHONDONTWRITEBYTECODE": "1",
+}
 
 #: Environment variable with the file descriptor of the socket between the service and its fork server.
 REQUESTS = "ISLANDS_READERS"
@@ -76,14 +82,20 @@ def enter(writes: bool = False, readable: Iterable[Path] = ()) -> tuple[str, dic
     memory, folder = message["memory"], message.get("folder")
     limit_resources(memory, message["seconds"], memory if writes or folder else 0)
     files = [Path(each).resolve() for each in (message["path"], message.get("fmu")) if each]
-    is_confined = confine([*files, *readable], [Path(folder)] if folder else [])
+    gaps = confine([*files, *readable], [Path(folder)] if folder else [])
     asked = {**message["asked"], "fmu": message.get("fmu"), "folder": folder} if folder else message["asked"]
-    if folder and not is_confined:
-        refuse(
-            SettingsError("FMUs need a service on Linux 5.13 or later with Landlock: ask its operator"),
-            answer,
-        )
+    if folder and gaps:
+        refuse(SettingsError(explain_gaps(gaps)), answer)
     return message["path"], asked, answer
+
+
+def explain_gaps(gaps: Sequence[str]) -> str:
+    """Return why a service runs no FMUs on a machine that cannot confine them."""
+    return (
+        f"this service runs no FMUs, which are native code: to confine them, its machine lacks "
+        f"{' and '.join(gaps)}; run 'islands diagnose' locally, or send the simulated output as a column of "
+        "the record"
+    )
 
 
 def end_writing(readable: Iterable[Path]) -> None:

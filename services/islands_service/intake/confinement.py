@@ -1,24 +1,24 @@
 """Confinement of the process that reads untrusted files, by Landlock and seccomp of the Linux kernel.
 
 Even if a file makes a library execute code, this code can read nothing but the file and the installed
-software, and can neither write, nor use the network, nor start or signal a process.
+software, and can neither write, nor change attributes of files, nor use the network, nor start or signal a
+process or a thread. Landlock restricts the files, `islands_service.intake.system_calls` everything else.
 
-Sources: https://docs.kernel.org/userspace-api/landlock.html,
-https://docs.kernel.org/userspace-api/seccomp_filter.html.
+Source: https://docs.kernel.org/userspace-api/landlock.html.
 """
 
 import ctypes
 import mimetypes
 import os
-import platform
+import signal
 import struct
 import sys
 import zoneinfo
 from collections.abc import Iterable
-from errno import EINVAL, ENOSYS, EPERM
 from pathlib import Path
 
-_PR_SET_NO_NEW_PRIVS, _PR_SET_SECCOMP, _SECCOMP_MODE_FILTER = 38, 22, 2
+from islands_service.intake.system_calls import call_kernel, check, explain_unrestricted_calls, restrict_calls
+from islands_service.liveness import set_parent_death_signal
 
 #: Numbers of Landlock's system calls on all architectures.
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
@@ -41,62 +41,31 @@ _SYSTEM = (
     *mimetypes.knownfiles,
 )
 
-#: Identifiers of architectures for seccomp, and the column of their numbers in `_FORBIDDEN`.
-_ARCHITECTURES = {"x86_64": (0xC000003E, 0), "aarch64": (0xC00000B7, 1)}
+#: User and group of a confined process of a service that is root: no file belongs to them by convention.
+_NOBODY = 65534
 
-#: System calls that are refused, with their numbers on x86_64 and aarch64; None where there is no such call.
-_FORBIDDEN = {
-    "socket": (41, 198),
-    "socketpair": (53, 199),
-    "bind": (49, 200),
-    "connect": (42, 203),
-    "sendto": (44, 206),
-    "sendmsg": (46, 211),
-    "sendmmsg": (307, 269),
-    "fork": (57, None),
-    "vfork": (58, None),
-    "execve": (59, 221),
-    "execveat": (322, 281),
-    "kill": (62, 129),
-    "tkill": (200, 130),
-    "tgkill": (234, 131),
-    "rt_sigqueueinfo": (129, 138),
-    "rt_tgsigqueueinfo": (297, 240),
-    "pidfd_send_signal": (424, 424),
-    "pidfd_open": (434, 434),
-    "pidfd_getfd": (438, 438),
-    "ptrace": (101, 117),
-    "process_vm_readv": (310, 270),
-    "process_vm_writev": (311, 271),
-    "setpriority": (141, 140),
-    "mount": (165, 40),
-    "umount2": (166, 39),
-    "unshare": (272, 97),
-    "setns": (308, 268),
-    "add_key": (248, 217),
-    "request_key": (249, 218),
-    "keyctl": (250, 219),
-    "bpf": (321, 280),
-    "perf_event_open": (298, 241),
-    "userfaultfd": (323, 282),
-    "io_uring_setup": (425, 425),
-}
+#: Capabilities to read files of other users. The process keeps one, since what it reads may belong to root.
+_CAP_DAC_OVERRIDE, _CAP_DAC_READ_SEARCH = 1 << 1, 1 << 2
 
-#: Numbers of calls whose arguments decide: a thread may be started, and the own limits may be read.
-_CLONE, _PRLIMIT, _CLONE3 = (56, 220), (302, 261), (435, 435)
-_CLONE_THREAD = 0x10000
+#: Version of the structures of capabilities: header, and two halves of effective, permitted and inheritable.
+_CAPABILITIES_VERSION = 0x20080522
+_HEADER, _CAPABILITIES = struct.Struct("Ii"), struct.Struct("6I")
 
-# Instructions of the filter: load a word, compare it, return; see linux/bpf_common.h.
-_LOAD, _EQUAL, _HAS_BITS, _RETURN = 0x20, 0x15, 0x45, 0x06
-_ALLOW, _REFUSE = 0x7FFF0000, 0x00050000
-
-#: Offsets of the number, the architecture and the lower half of the first argument of a system call.
-_NUMBER, _ARCHITECTURE, _FIRST_ARGUMENT = 0, 4, 16
+#: Options of prctl.
+_PR_SET_KEEPCAPS, _PR_SET_NO_NEW_PRIVS = 8, 38
 
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
-def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> bool:
+def find_gaps() -> tuple[str, ...]:
+    """Return what this machine lacks to confine native code."""
+    if sys.platform != "linux":
+        return ("Linux",)
+    landlock = "" if _find_landlock() else "Landlock (Linux 5.13 or later)"
+    return tuple(filter(None, (landlock, explain_unrestricted_calls())))
+
+
+def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> tuple[str, ...]:
     """Restrict this process for the rest of its life, as far as the kernel supports it.
 
     Parameters
@@ -104,24 +73,51 @@ def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> bool:
     readable : iterable of Path
         Files and folders that can be read, in addition to the installed software.
     writable : iterable of Path
-        Folders in which files can be made and read.
+        Folders in which files can be made and read, until this function is called again without any.
 
     Returns
     -------
-    bool
-        Whether the kernel restricts the files.
+    tuple of str
+        What this machine lacks for it.
 
     Raises
     ------
     OSError
         The kernel supports a restriction but refuses it.
     """
-    if sys.platform != "linux":
-        return False
-    _check(_libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
-    is_restricted = _restrict_files((*readable, *_list_software()), writable)
-    _restrict_calls()
-    return is_restricted
+    gaps, folders = find_gaps(), tuple(writable)
+    if sys.platform == "linux":
+        check(_libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
+        if not os.geteuid():
+            gaps += _drop_root(folders)
+        if version := _find_landlock():
+            _restrict_files(version, (*readable, *_list_software()), folders)
+        if not explain_unrestricted_calls():
+            restrict_calls(prepares=bool(folders))
+    return gaps
+
+
+def _drop_root(writable: Iterable[Path]) -> tuple[str, ...]:
+    """Become a user without any right but to read; return what this process lacks for it."""
+    header = _HEADER.pack(_CAPABILITIES_VERSION, 0)
+    found = ctypes.create_string_buffer(_CAPABILITIES.size)
+    check(_libc.capget(header, found))
+    permitted = _CAPABILITIES.unpack(found)[1]
+    kept = permitted & _CAP_DAC_READ_SEARCH or permitted & _CAP_DAC_OVERRIDE
+    try:
+        for folder in writable:
+            os.chown(folder, _NOBODY, _NOBODY)
+        check(_libc.prctl(_PR_SET_KEEPCAPS, 1, 0, 0, 0))
+        os.setgroups([])
+        os.setresgid(_NOBODY, _NOBODY, _NOBODY)
+        if kept:
+            os.setresuid(_NOBODY, _NOBODY, _NOBODY)
+    except OSError:  # a container whose root has few rights, or in which there is no other user
+        kept = 0
+    check(_libc.capset(header, _CAPABILITIES.pack(kept, kept, 0, 0, 0, 0)))
+    # A change of the user resets it.
+    set_parent_death_signal(signal.SIGKILL)
+    return () if kept else ("the right of its root to become another user (CAP_SETUID, CAP_SETGID)",)
 
 
 def _list_software() -> set[Path]:
@@ -133,61 +129,26 @@ def _list_software() -> set[Path]:
     return {path for path in map(Path, folders) if path.exists()}
 
 
-def _restrict_files(readable: Iterable[Path], writable: Iterable[Path]) -> bool:
-    version = _libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
-    if version < 1:  # not supported, or forbidden by the filter of an old container engine
-        return False
+def _find_landlock() -> int:
+    """Return the version of Landlock; 0 if the kernel, or the filter of an old container engine, has none."""
+    try:
+        return call_kernel(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
+    except OSError:
+        return 0
+
+
+def _restrict_files(version: int, readable: Iterable[Path], writable: Iterable[Path]) -> None:
     rights = _RIGHTS[min(version, len(_RIGHTS)) - 1]
     attributes = (rights, 3 * (version >= _WITH_NETWORK), 3 * (version >= _WITH_SCOPES))
     known = attributes[: 1 + (version >= _WITH_NETWORK) + (version >= _WITH_SCOPES)]
     packed = struct.pack(f"{len(known)}Q", *known)
-    ruleset = _check(_libc.syscall(_CREATE_RULESET, packed, ctypes.c_size_t(len(packed)), 0))
+    ruleset = call_kernel(_CREATE_RULESET, packed, ctypes.c_size_t(len(packed)), 0)
     read = _EXECUTE | _READ_FILE
     granted = [(path, read | (_READ_DIR if path.is_dir() else 0)) for path in readable]
     for path, allowed in (*granted, *((path, rights) for path in writable)):
         descriptor = os.open(path, os.O_PATH | os.O_CLOEXEC)
         rule = struct.pack("=Qi", allowed, descriptor)
-        _check(_libc.syscall(_ADD_RULE, ruleset, 1, rule, 0))
+        call_kernel(_ADD_RULE, ruleset, 1, rule, 0)
         os.close(descriptor)
-    _check(_libc.syscall(_RESTRICT_SELF, ruleset, 0))
+    call_kernel(_RESTRICT_SELF, ruleset, 0)
     os.close(ruleset)
-    return True
-
-
-def _restrict_calls() -> None:
-    architecture, column = _ARCHITECTURES.get(platform.machine(), (0, 0))
-    if not architecture:
-        return
-    refuse = [(_RETURN, 0, 0, _REFUSE | EPERM)]
-    allow = [(_RETURN, 0, 0, _ALLOW)]
-    program = [
-        (_LOAD, 0, 0, _ARCHITECTURE),
-        (_EQUAL, 1, 0, architecture),
-        *refuse,
-        (_LOAD, 0, 0, _NUMBER),
-        # Calls of the x32 interface of x86_64 have other numbers.
-        *([(_HAS_BITS, 0, 1, 0x40000000), *refuse] if column == 0 else []),
-    ]
-    for numbers in _FORBIDDEN.values():
-        if (number := numbers[column]) is not None:
-            program += [(_EQUAL, 0, 1, number), *refuse]
-    program += [
-        # The arguments of clone3 cannot be examined; without it the C library uses clone.
-        *[(_EQUAL, 0, 1, _CLONE3[column]), (_RETURN, 0, 0, _REFUSE | ENOSYS)],
-        *[(_EQUAL, 0, 4, _CLONE[column]), (_LOAD, 0, 0, _FIRST_ARGUMENT)],
-        *[(_HAS_BITS, 0, 1, _CLONE_THREAD), *allow, *refuse],
-        *[(_EQUAL, 0, 3, _PRLIMIT[column]), (_LOAD, 0, 0, _FIRST_ARGUMENT), (_EQUAL, 1, 0, 0), *refuse],
-        *allow,
-    ]
-    code = b"".join(struct.pack("HBBI", *instruction) for instruction in program)
-    buffer = ctypes.create_string_buffer(code)
-    filtered = struct.pack("HxxxxxxP", len(program), ctypes.addressof(buffer))
-    if _libc.prctl(_PR_SET_SECCOMP, _SECCOMP_MODE_FILTER, filtered) and ctypes.get_errno() != EINVAL:
-        _check(-1)
-
-
-def _check(result: int) -> int:
-    if result < 0:
-        number = ctypes.get_errno()
-        raise OSError(number, f"this process cannot be confined: {os.strerror(number)}")
-    return result

@@ -219,7 +219,7 @@ def test_process_has_no_secrets_and_no_files_of_the_service(endless, tmp_path, m
 
     with (tmp_path / "islands.db").open("rb"):
         environment, opened, limits = asyncio.run(run())
-    names = ("PATH", "OPENBLAS_NUM_THREADS", "PYTHONDONTWRITEBYTECODE", "ISLANDS_READERS")
+    names = ("PATH", "OMP_NUM_THREADS", "JE_ARROW_MALLOC_CONF", "PYTHONDONTWRITEBYTECODE", "ISLANDS_READERS")
     assert environment.keys() <= {name.encode() for name in names}
     assert not [path for path in opened if path.endswith(".db") or path.startswith("socket")]
     assert limits["Max address space"] == [str(MEMORY)] * 2

@@ -8,6 +8,7 @@ import pytest
 from islands_service.intake.confined_process import REQUESTS, make_message
 from islands_service.intake.fork_server import _PRELOADED
 from islands_service.intake.reader_process import open_memory
+from support.oscillator_fmus import compile_oscillator, make_attacks
 
 pytestmark = pytest.mark.ci
 
@@ -23,32 +24,15 @@ print(json.dumps({
 }), flush=True)
 """
 
-#: Restricts itself as every reader does, then tries what a harmful file may try.
+#: Restricts itself as every reader does, then does what a harmful file may let it do.
 ATTACKS = """
-import json, os, socket, sys
+import ctypes, json
+from pathlib import Path
 from islands_service.intake.confined_process import enter
-path, asked, answer = enter(writes=True)
-server = os.getppid()
-actions = {
-    "read another file": lambda: open(asked["other"]).read(),
-    "write the file": lambda: open(path, "r+"),
-    "make a file": lambda: open(asked["other"] + "x", "w"),
-    "read the memory of the server": lambda: open(f"/proc/{server}/mem", "rb").read(1),
-    "read the environment of the server": lambda: open(f"/proc/{server}/environ").read(),
-    "open a socket": lambda: socket.socket(),
-    "fork": os.fork,
-    "start a process": lambda: os.execv("/bin/true", ["true"]),
-    "signal the server": lambda: os.kill(server, 0),
-    "limit the server": lambda: __import__("resource").prlimit(server, 7),
-}
-done = []
-for name, action in actions.items():
-    try:
-        action()
-    except OSError:
-        continue
-    done.append(name)
-answer.write(json.dumps({"read": open(path).read(), "done": done, "tried": len(actions)}).encode())
+path, asked, answer = enter(writes=True, readable=[Path({library!r})])
+attack = ctypes.CDLL({library!r}).attack
+attack.restype = ctypes.c_char_p
+answer.write(json.dumps({{"read": open(path).read(), "done": attack().decode()}}).encode())
 answer.flush()
 """
 
@@ -75,15 +59,17 @@ def test_a_forked_process_has_standard_streams_and_the_readers_and_nothing_else(
 
 
 def test_a_forked_process_can_only_read_its_file(programs, tmp_path):
-    given, other = tmp_path / "given.csv", tmp_path / "other.csv"
+    data, given, library = tmp_path / "data", tmp_path / "given.csv", tmp_path / "library"
+    data.mkdir()
+    (data / "database").write_text("jobs")
     given.write_text("1")
-    other.write_text("2")
-    message = make_message(given, 6_000_000_000, 30.0, {"other": str(other)})
-    # One process tries everything: a successful action is in the answer, or its end is in the status.
-    status, answer = run(programs(ATTACKS), message)
+    library.write_bytes(compile_oscillator(3, *make_attacks(data)))
+    # One process tries everything: a successful attempt is in the answer, or its end is in the status.
+    status, answer = run(
+        programs(ATTACKS.format(library=str(library))), make_message(given, 6_000_000_000, 30.0, {})
+    )
     assert status == 0
-    assert json.loads(answer) == {"read": "1", "done": [], "tried": 10}
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["given.csv", "other.csv"]
+    assert json.loads(answer) == {"read": "1", "done": "attempts that succeed:"}
 
 
 @pytest.mark.parametrize(
