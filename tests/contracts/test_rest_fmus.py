@@ -89,6 +89,17 @@ def test_an_fmu_is_no_data_set(shared, dataset, fmu):
     problem_of(shared.client.post("/v1/jobs", json=spec(fmu)), 404, "no-such-dataset")
 
 
+def test_an_fmu_may_be_as_large_as_a_data_set(shared, content):
+    """Other bodies have at most one megabyte."""
+    large = io.BytesIO(content)
+    with zipfile.ZipFile(large, "a") as archive:
+        archive.writestr("resources/noise", np.random.default_rng(1).bytes(3_400_000))
+    answer = send(shared, large.getvalue())
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["bytes"] > 3_400_000
+    shared.client.delete(answer.headers["location"])
+
+
 def test_a_file_that_is_no_fmu_is_refused_with_the_reason(shared, content):
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:

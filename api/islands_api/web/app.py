@@ -15,6 +15,7 @@ from islands_api.web.auth import KeyCache, make_verifier
 from islands_api.web.dependencies import open_state
 from islands_api.web.middleware import BodyLimit, HeadRequests, RequestLogging, RootPath, SameOrigin
 from islands_api.web.problems import ProblemDocument
+from islands_api.web.requests import FormRoute
 from islands_api.web.routes import ROUTERS
 from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.outbound.delivery_sender import DeliverySender
@@ -85,7 +86,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     # Compression reduces figures and the dashboard to a third. A single job is too small to gain from it.
     # Event streams are not buffered.
     app.add_middleware(GZipMiddleware, minimum_size=_GZIP_MIN_BYTES, compresslevel=5)
-    app.add_middleware(BodyLimit, settings=settings)
+    app.add_middleware(BodyLimit, settings=settings, uploads=_list_upload_paths())
     app.add_middleware(SameOrigin, settings=settings)
     app.add_middleware(HeadRequests)
     app.add_middleware(RequestLogging)
@@ -94,6 +95,11 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     _install_tracing(app, traces)
     _install_openapi(app, settings.oidc_issuer)
     return app
+
+
+def _list_upload_paths() -> frozenset[str]:
+    routes = (route for router in ROUTERS for route in router.routes)
+    return frozenset(each.path for each in routes if isinstance(each, FormRoute) and each.body_field)
 
 
 def _install_tracing(app: FastAPI, traces: Traces) -> None:

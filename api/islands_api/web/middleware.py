@@ -3,6 +3,7 @@
 import asyncio
 import re
 import secrets
+from collections.abc import Container
 from dataclasses import dataclass
 from http import HTTPStatus
 from time import perf_counter
@@ -26,9 +27,6 @@ MAX_BODY_BYTES = 1_000_000
 
 #: Bytes that a form may have in addition to its file.
 FORM_OVERHEAD_BYTES = 100_000
-
-#: Path that accepts uploads.
-UPLOAD_PATH = "/v1/datasets"
 
 #: Headers of every response. The dashboard loads nothing from other origins, and no page may frame it.
 SECURITY_HEADERS = {
@@ -148,17 +146,26 @@ class _Entry:
 
 
 class BodyLimit:
-    """Middleware that rejects bodies that are too large, with or without a Content-Length header."""
+    """Middleware that rejects bodies that are too large, with or without a Content-Length header.
 
-    def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
-        self._app, self._max_upload_bytes = app, settings.max_upload + FORM_OVERHEAD_BYTES
+    Parameters
+    ----------
+    app : ASGIApp
+    settings : ServiceSettings
+    uploads : container of str
+        Paths that accept files.
+    """
+
+    def __init__(self, app: ASGIApp, settings: ServiceSettings, uploads: Container[str]) -> None:
+        self._app, self._uploads = app, uploads
+        self._max_upload_bytes = settings.max_upload + FORM_OVERHEAD_BYTES
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle a request."""
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
         path = scope["path"].removeprefix(scope.get("root_path", ""))
-        max_bytes = self._max_upload_bytes if path == UPLOAD_PATH else MAX_BODY_BYTES
+        max_bytes = self._max_upload_bytes if path in self._uploads else MAX_BODY_BYTES
         declared = Headers(scope=scope).get("content-length", "0")
         error = PayloadTooLargeError(f"the request has more than {max_bytes} bytes, the maximum of this path")
         if declared.isdecimal() and int(declared) > max_bytes:

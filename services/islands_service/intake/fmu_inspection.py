@@ -13,6 +13,9 @@ from islands_service.intake.confined_process import enter, refuse, send_document
 #: Largest numbers of files in an FMU, and of variables of type real, whose descriptions are stored.
 _MAX_FILES, _MAX_VARIABLES = 5000, 5000
 
+#: Largest size of a model description: a hundred thousand local variables take some ten megabytes.
+_MAX_DESCRIPTION_BYTES = 100_000_000
+
 
 async def inspect_fmu(path: Path, most_bytes: int, memory: int, seconds: float) -> Mapping[str, Any]:
     """Return the description of an FMU as JSON, see `islands_service.domain.uploaded_fmu.describe_fmu`.
@@ -51,20 +54,25 @@ def main() -> None:
 
 def _describe(path: str, most_bytes: int) -> dict[str, Any]:
     from islands.simulators.fmu.fmi_description import read_description  # noqa: PLC0415
-    from islands_service.domain.uploaded_fmu import VARIABLES, describe_fmu  # noqa: PLC0415
+    from islands_service.domain.uploaded_fmu import describe_fmu  # noqa: PLC0415
 
-    description = read_description(path)
+    with suppress(zipfile.BadZipFile):  # whose reader says what is wrong with it
+        _check_sizes(path, most_bytes)
+    return describe_fmu(read_description(path, most=_MAX_VARIABLES))
+
+
+def _check_sizes(path: str, most_bytes: int) -> None:
+    from islands.simulators.fmu.model_description import DESCRIPTION  # noqa: PLC0415
+
     with zipfile.ZipFile(path) as archive:
-        files = archive.infolist()
-    if len(files) > _MAX_FILES or sum(each.file_size for each in files) > most_bytes:
+        sizes = {each.filename: each.file_size for each in archive.infolist()}
+    if len(sizes) > _MAX_FILES or sum(sizes.values()) > most_bytes:
         raise ModelError(
             f"{path} unpacks to more than {most_bytes / 1e6:.0f} MB or {_MAX_FILES} files, the most of this "
             "service: export it without sources and documentation"
         )
-    count = sum(len(getattr(description, kind)) for kind in VARIABLES)
-    if count > _MAX_VARIABLES:
+    if sizes.get(DESCRIPTION, 0) > _MAX_DESCRIPTION_BYTES:
         raise ModelError(
-            f"{path} has {count} variables of type real that are inputs, outputs, parameters or states, and "
-            f"{_MAX_VARIABLES} is the most of this service: export it with fewer parameters"
+            f"the {DESCRIPTION} of {path} has more than {_MAX_DESCRIPTION_BYTES / 1e6:.0f} MB, the most of "
+            "this service: export it with fewer variables"
         )
-    return describe_fmu(description)

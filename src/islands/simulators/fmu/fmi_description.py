@@ -1,4 +1,4 @@
-"""Model description of an FMU: its variables of type real, and its interfaces, read by fmpy."""
+"""Model description of an FMU for a simulation: its variables of type real, and one of its interfaces."""
 
 import hashlib
 import zipfile
@@ -10,6 +10,7 @@ from typing import Any
 
 from islands.distribution import describe_missing_extra
 from islands.errors import ModelError, SettingsError
+from islands.simulators.fmu.model_description import Attributes, ModelDescription, read_model_description
 
 
 class FmiInterface(StrEnum):
@@ -19,6 +20,10 @@ class FmiInterface(StrEnum):
     MODEL_EXCHANGE = "model-exchange"
     #: The FMU contains a solver, which takes communication steps.
     CO_SIMULATION = "co-simulation"
+
+
+#: Elements of a model description with the interfaces, in the order of preference.
+_ELEMENTS = {FmiInterface.MODEL_EXCHANGE: "ModelExchange", FmiInterface.CO_SIMULATION: "CoSimulation"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,73 +114,74 @@ def import_fmpy() -> Any:
     return fmpy
 
 
-def read_description(path: str, interface: str = "") -> FmiDescription:
+def read_description(path: str, interface: str = "", most: int | None = None) -> FmiDescription:
     """Read the description of an FMU and check that it can be simulated on this machine.
 
     Parameters
     ----------
     interface : str
         An `FmiInterface`; by default model exchange if the FMU offers it, otherwise co-simulation.
+    most : int, optional
+        Largest number of variables, see `islands.simulators.fmu.model_description.read_model_description`.
 
     Raises
     ------
     ModelError
-        The file is not an FMU, is of FMI 1.0, or has no library for this machine.
+        The file is not an FMU, is of another version than FMI 2.0 and 3.0, has no library for this machine,
+        or has too many variables.
     SettingsError
         The FMU does not offer the interface, or fmpy is not installed.
     """
     fmpy = import_fmpy()
     try:
-        content = Path(path).read_bytes()
         # Not validated: many tools write descriptions that violate a rule but can be simulated.
-        found = fmpy.read_model_description(path, validate=False)
-        with zipfile.ZipFile(path) as archive:
-            files = archive.namelist()
-    except Exception as error:  # fmpy raises the exceptions of its XML parser and bare ones
+        found = read_model_description(path, most)
+        version = int(found.version.partition(".")[0])
+        variables = [(each["causality"], _make_variable(each)) for each in found.variables]
+        states = [None if each is None else _make_variable(each) for each in found.states]
+        with Path(path).open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+            files = zipfile.ZipFile(stream).namelist()
+    except ModelError:
+        raise
+    except Exception as error:  # those of the parser, of the archive and of numbers that are none
         raise ModelError(f"{path} cannot be read as an FMU ({error}): write fmu:FILE.fmu") from error
-    version = int(str(found.fmiVersion).partition(".")[0])
-    if version < 2:
-        raise ModelError(f"{path} is of FMI {found.fmiVersion}: export it for FMI 2.0 or 3.0")
+    if version not in (2, 3):
+        raise ModelError(f"{path} is of FMI {found.version}: export it for FMI 2.0 or 3.0")
     chosen = _choose_interface(path, found, interface)
-    offered = found.modelExchange if chosen == FmiInterface.MODEL_EXCHANGE else found.coSimulation
+    offered = found.interfaces[_ELEMENTS[chosen]]
     _check_platform(path, files, fmpy.platform_tuple if version == 3 else fmpy.platform)
-    states = [unknown.variable.derivative for unknown in found.derivatives]
-    if chosen == FmiInterface.MODEL_EXCHANGE and None in map(_make_variable, states):
+    if chosen == FmiInterface.MODEL_EXCHANGE and None in states:
         raise ModelError(f"{path} has states that are not scalars of type real: export them as scalars")
-    real = [(each, variable) for each in found.modelVariables if (variable := _make_variable(each))]
-    fixed_step = getattr(offered, "fixedInternalStepSize", None)
+    fixed_step = offered.get("fixedInternalStepSize") if version == 3 else None
+
+    def choose(causality: str) -> tuple[FmiVariable, ...]:
+        return tuple(variable for kind, variable in variables if kind == causality)
+
     return FmiDescription(
         path,
-        hashlib.sha256(content).hexdigest(),
+        digest,
         version,
         chosen,
-        inputs=tuple(variable for each, variable in real if each.causality == "input"),
-        outputs=tuple(variable for each, variable in real if each.causality == "output"),
-        parameters=tuple(
-            variable
-            for each, variable in real
-            if each.causality == "parameter" and variable.start is not None
-        ),
-        states=tuple(variable for each in states if (variable := _make_variable(each))),
-        settable=tuple(
-            each.name for each in states if each is not None and each.initial == "exact" and each.start
-        ),
+        inputs=choose("input"),
+        outputs=choose("output"),
+        parameters=tuple(each for each in choose("parameter") if each.start is not None),
+        states=tuple(each for each in states if each is not None),
+        settable=tuple(each["name"] for each in found.states if each is not None and _is_settable(each)),
         fixed_step=None if fixed_step is None else float(fixed_step),
-        has_variable_step=bool(getattr(offered, "canHandleVariableCommunicationStepSize", False)),
-        indicators=int(found.numberOfEventIndicators),
-        completes=bool(getattr(offered, "needsCompletedIntegratorStep", False)),
+        has_variable_step=_is_true(offered, "canHandleVariableCommunicationStepSize"),
+        indicators=found.indicators,
+        completes=(
+            not _is_true(offered, "completedIntegratorStepNotNeeded")
+            if version == 2
+            else _is_true(offered, "needsCompletedIntegratorStep")
+        )
+        and chosen == FmiInterface.MODEL_EXCHANGE,
     )
 
 
-def _choose_interface(path: str, found: Any, interface: str) -> FmiInterface:
-    offered = [
-        each
-        for each, given in (
-            (FmiInterface.MODEL_EXCHANGE, found.modelExchange),
-            (FmiInterface.CO_SIMULATION, found.coSimulation),
-        )
-        if given is not None
-    ]
+def _choose_interface(path: str, found: ModelDescription, interface: str) -> FmiInterface:
+    offered = [each for each, element in _ELEMENTS.items() if element in found.interfaces]
     if not offered:
         raise ModelError(f"{path} offers neither co-simulation nor model exchange: export it for one of them")
     if interface and interface not in offered:
@@ -194,23 +200,25 @@ def _check_platform(path: str, files: list[str], platform: str) -> None:
         )
 
 
-def _make_variable(given: Any) -> FmiVariable | None:
-    """Return a variable; None if it is not a scalar number of type real."""
-    if given is None or given.type not in ("Real", "Float64") or given.dimensions:
-        return None
-    kind = given.declaredType
+def _make_variable(given: Attributes) -> FmiVariable:
     start, lower, upper = (
-        _parse(getattr(given, field) or getattr(kind, field, None)) for field in ("start", "min", "max")
+        float(given[name]) if given.get(name) else None for name in ("start", "min", "max")
     )
     return FmiVariable(
-        given.name,
-        given.valueReference,
-        given.unit or getattr(kind, "unit", None) or "",
+        given["name"],
+        int(given["valueReference"]),
+        given.get("unit", ""),
         start,
         -inf if lower is None else lower,
         inf if upper is None else upper,
     )
 
 
-def _parse(text: str | None) -> float | None:
-    return None if text is None else float(text)
+def _is_settable(state: Attributes) -> bool:
+    """Return whether a start value of a state can be set before a simulation."""
+    default = "exact" if state.get("causality") == "input" else "calculated"
+    return state.get("initial", default) == "exact" and bool(state.get("start"))
+
+
+def _is_true(given: Attributes, name: str) -> bool:
+    return given.get(name) in ("true", "1")

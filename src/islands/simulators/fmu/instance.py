@@ -20,6 +20,7 @@ from islands.errors import ModelError
 from islands.simulators.fmu.fmi_calls import TERMINATED, FmiFunctions
 from islands.simulators.fmu.fmi_description import FmiDescription, FmiInterface, import_fmpy, read_description
 from islands.simulators.fmu.fmi_kernel import FmuEquations, integrate, take_steps
+from islands.simulators.fmu.model_description import read_head
 from islands.simulators.ode.sampled_signal import SampledSignal
 
 #: Largest number of FMUs that a process keeps loaded.
@@ -141,10 +142,9 @@ class FmuInstance:
         self._resources.release()
         description = self.description
         folder = self._resources.extract(description)
-        found = import_fmpy().read_model_description(folder, validate=False)
         log = _make_log(self._messages)
         kind = "ModelExchange" if description.interface == FmiInterface.MODEL_EXCHANGE else "CoSimulation"
-        self._fmu = instantiate_fmu(folder, found, fmi_type=kind, logger=log)
+        self._fmu = instantiate_fmu(folder, _identify(folder), fmi_type=kind, logger=log)
         self._resources.fmu = self._fmu
         # Other systems keep a library without its file; then a process that is killed leaves no folder.
         if sys.platform != "win32" and not Path(folder, "resources").exists():
@@ -275,6 +275,20 @@ def load_fmu(description: FmiDescription) -> FmuInstance:
 @lru_cache(maxsize=_LOADED)
 def _load(path: str, digest: str, interface: FmiInterface) -> FmuInstance:
     return FmuInstance(replace(read_description(path, interface), digest=digest))
+
+
+def _identify(folder: str) -> Any:
+    """Return the part of a model description that fmpy needs to make an instance."""
+    from fmpy import model_description  # noqa: PLC0415 - only if an FMU is used
+
+    head = read_head(folder)
+    found = model_description.ModelDescription()
+    found.fmiVersion, found.guid = head.version, head.token
+    if given := head.interfaces.get("ModelExchange"):
+        found.modelExchange = model_description.ModelExchange(modelIdentifier=given["modelIdentifier"])
+    if given := head.interfaces.get("CoSimulation"):
+        found.coSimulation = model_description.CoSimulation(modelIdentifier=given["modelIdentifier"])
+    return found
 
 
 def _make_log(messages: list[str]) -> Callable[..., None]:

@@ -1,5 +1,6 @@
 """Model descriptions: what is read of an FMU, and which files are refused."""
 
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -94,3 +95,63 @@ def test_a_description_that_cannot_be_simulated_is_refused(
         archive.writestr("modelDescription.xml", description)
     with pytest.raises(ModelError, match=message):
         read_description(str(tmp_path / "model.fmu"))
+
+
+def add_variables(source: Path, target: Path, text: str, types: str = "", indicators: str = "") -> str:
+    """Write a copy of an FMU with further variables, types and event indicators; return its path."""
+    with zipfile.ZipFile(source) as given, zipfile.ZipFile(target, "w") as changed:
+        for name in given.namelist():
+            data = given.read(name)
+            if name == "modelDescription.xml":
+                words = data.decode().replace("<ModelVariables>", f"{types}<ModelVariables>")
+                words = words.replace("<EventIndicator", f"{indicators}<EventIndicator")
+                data = words.replace("</ModelVariables>", f"{text}</ModelVariables>").encode()
+            changed.writestr(name, data)
+    return str(target)
+
+
+@needs_compiler
+def test_types_aliases_and_arrays_of_fmi_3_are_resolved(tmp_path: Path) -> None:
+    common = 'causality="parameter" variability="tunable"'
+    path = add_variables(
+        write_oscillator(tmp_path / "mass.fmu"),
+        tmp_path / "more.fmu",
+        '<UInt64 name="n" valueReference="50" causality="structuralParameter" start="3"/>'
+        f'<Float64 name="p" valueReference="51" {common} start="2" declaredType="T"><Alias name="q"/></Float64>'
+        f'<Float64 name="a" valueReference="52" {common} start="1 2 3"><Dimension valueReference="50"/></Float64>'
+        '<Float64 name="b" valueReference="53"><Dimension start="2"/><Dimension start="4"/></Float64>',
+        types='<TypeDefinitions><Float64Type name="T" unit="kg" min="0.1"/></TypeDefinitions>',
+        indicators='<EventIndicator valueReference="52"/><EventIndicator valueReference="53"/>',
+    )
+    found = read_description(path)
+    described = [(each.name, each.unit, each.start, each.lower) for each in found.parameters[3:]]
+    assert described == [("p", "kg", 2.0, 0.1), ("q", "kg", 2.0, 0.1)]
+    assert found.indicators == 1 + 3 + 8
+
+
+@needs_compiler
+@pytest.mark.parametrize("version", [2, 3])
+def test_the_reading_ends_at_the_limit_whatever_follows(version: int, tmp_path: Path) -> None:
+    mass = write_oscillator(tmp_path / "mass.fmu", version)
+    # An input, an output, three parameters and two states.
+    assert read_description(str(mass), most=7).states
+    for most in (4, 6):
+        with pytest.raises(ModelError, match=rf"mass.fmu has more than {most} variables of type real"):
+            read_description(str(mass), most=most)
+    broken = add_variables(mass, tmp_path / "broken.fmu", "</this is no XML>")
+    with pytest.raises(ModelError, match=r"broken\.fmu has more than 4 variables"):
+        read_description(broken, most=4)
+
+
+@needs_compiler
+def test_local_variables_are_not_kept(tmp_path: Path) -> None:
+    local = "".join(f'<Float64 name="q{each}" valueReference="{each}"/>' for each in range(100, 20_100))
+    path = add_variables(write_oscillator(tmp_path / "mass.fmu"), tmp_path / "large.fmu", local)
+    read_description(path)
+    tracemalloc.start()
+    try:
+        found = read_description(path, most=7)
+        assert tracemalloc.get_traced_memory()[1] < 1e6
+    finally:
+        tracemalloc.stop()
+    assert [each.name for each in found.states] == ["x", "v"]
