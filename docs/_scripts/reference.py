@@ -198,7 +198,7 @@ def service_settings() -> str:
 
 def _default(field: Any) -> str:
     if field.default_factory is not None:
-        return "the data folder of the user"
+        return "see there"
     return "" if field.default in (None, "") else code(_shown(field.default))
 
 

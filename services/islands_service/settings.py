@@ -30,6 +30,11 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 DEFAULT_COORDINATORS = 4
 
 
+def _is_for_one_user(given: dict[str, Any]) -> bool:
+    """Return whether a service with these settings needs no key, since only its user can reach it."""
+    return given.get("host") in LOOPBACK and not (given.get("require_keys") or given.get("oidc_issuer"))
+
+
 class ServiceSettings(BaseSettings):
     """Settings of all roles. Sizes are in bytes, times in seconds.
 
@@ -93,9 +98,9 @@ class ServiceSettings(BaseSettings):
     inspection_memory, inspection_seconds
         Memory and time budget of the process that reads an uploaded file.
     allow_fmus
-        Whether clients may upload FMUs, and simulate them in previews and diagnoses. An FMU is native code;
-        it runs in a process that can read nothing but the FMU and the installed software, as Linux 5.13 and
-        later enforce.
+        Whether clients may upload FMUs, and simulate them in previews and diagnoses: by default those of a
+        service for one user, which needs no key. An FMU is native code; it runs in a process that can do
+        nothing but read the FMU and the installed software, as Linux 5.13 and later enforce.
     max_stored
         Largest total size of the data sets of one owner.
     max_active
@@ -200,7 +205,6 @@ class ServiceSettings(BaseSettings):
     body_rate: Annotated[float, Field(ge=0.0)] = 20_000.0
     inspection_memory: Count = 6_000_000_000
     inspection_seconds: Positive = 120.0
-    allow_fmus: bool = False
     max_stored: Count = 5_000_000_000
     max_active: Count = 10_000
     max_running: Count = 1000
@@ -225,6 +229,7 @@ class ServiceSettings(BaseSettings):
     oidc_roles: str = DEFAULT_ROLES
     oidc_algorithms: str = "RS256,PS256,ES256,Ed25519"
     oidc_leeway: Annotated[float, Field(ge=0.0, le=300.0)] = 30.0
+    allow_fmus: bool = Field(default_factory=_is_for_one_user)
     tls_certificate: Path | None = None
     tls_key: Path | None = None
     max_webhooks: Annotated[int, Field(ge=0)] = 10
@@ -275,7 +280,7 @@ class ServiceSettings(BaseSettings):
     @property
     def keys_needed(self) -> bool:
         """Whether every request needs a key or a token."""
-        return self.require_keys or bool(self.oidc_issuer) or not self.on_loopback
+        return not _is_for_one_user(vars(self))
 
     def read_admin_key(self) -> str | None:
         """Return the key of the operator; None without a file.

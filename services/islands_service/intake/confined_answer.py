@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any
 
-from islands_service.intake.confined_process import check_status, make_message, timeout_error
+from islands_service.intake.confined_process import Task, check_status, make_message, timeout_error
 from islands_service.intake.reader_process import FORK_SERVER, ForkServer, ReaderProcess
 
 #: Largest number of bytes of an answer, which a harmful file may control, and of a part of it.
@@ -24,6 +24,7 @@ async def ask_confined(
     seconds: float,
     server: ForkServer | None = None,
     fmu: Path | None = None,
+    task: Task | None = None,
 ) -> Mapping[str, Any]:
     """Return the answer of a process that reads a file.
 
@@ -40,12 +41,15 @@ async def ask_confined(
         By default that of the readers.
     fmu : Path, optional
         FMU that the process extracts and runs.
+    task : Task, optional
+        By default the reading of the file.
 
     Raises
     ------
     RecordError, ModelError, SettingsError
         The file cannot be read as asked, or not within the limits.
     """
+    task = task or Task(path.name)
     with ExitStack() as files:
         (answers, output), (complaints, errors) = _open_pipe(files), _open_pipe(files)
         folder = files.enter_context(TemporaryDirectory(prefix="islands-fmu-")) if fmu else None
@@ -56,17 +60,19 @@ async def ask_confined(
         output.close()
         errors.close()
         try:
+            # A server that has to start first takes seconds, which are not those of the file.
+            await process.wait_start_async()
             async with asyncio.timeout(seconds):
                 answer, complaint = await asyncio.gather(
                     _read_output(process, answers), _read_output(process, complaints)
                 )
                 status = await process.wait_async()
         except TimeoutError:
-            raise timeout_error(path.name, seconds) from None
+            raise timeout_error(task, seconds) from None
         finally:
             process.kill()
             await process.wait_async()
-    check_status(status, answer, complaint, path.name, memory, seconds)
+    check_status(status, answer, complaint, task, memory, seconds)
     return dict(json.loads(answer))
 
 

@@ -10,7 +10,7 @@ import socket
 import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from struct import Struct
 from tempfile import TemporaryDirectory
@@ -25,7 +25,7 @@ from islands.simulators.fmu.instance import FmuInstance, FmuLane, FmuRun
 from islands.simulators.fmu.source import FmuSource
 from islands_service.domain.uploaded_fmu import check_interface, describe_fmu, read_fmu
 from islands_service.intake.confined_process import end_writing, enter, make_message
-from islands_service.intake.reader_process import SIMULATION_SERVER, open_memory
+from islands_service.intake.reader_process import SIMULATION_SERVER, ReaderProcess, open_memory
 
 #: Length of a request; numbers of outputs, of samples, and of bytes of the failure in an answer.
 _REQUEST, _ANSWER = Struct("<q"), Struct("<qqq")
@@ -57,7 +57,7 @@ class ConfinedFmu:
         self._name, self._connection, self._check = name, connection, check
         connection.settimeout(_CHECK_SECONDS)
 
-    def wait(self) -> None:
+    def wait(self, process: ReaderProcess) -> None:
         """Wait until the process has loaded the FMU.
 
         Raises
@@ -65,6 +65,11 @@ class ConfinedFmu:
         ModelError
             It cannot be loaded.
         """
+        while True:
+            self._check()
+            with suppress(TimeoutError):
+                process.wait_start(_CHECK_SECONDS)
+                break
         if failure := self._receive(0, 0).failure:
             raise ModelError(failure)
 
@@ -165,7 +170,7 @@ def open_confined(
             process = SIMULATION_SERVER.start("confined_fmu", message, theirs.fileno(), errors.fileno())
         stack.enter_context(process)
         confined = ConfinedFmu(description.name, ours, check)
-        confined.wait()
+        confined.wait(process)
         yield FmuSource(lambda _, interface: check_interface(description, interface), lambda _: confined)
 
 

@@ -5,6 +5,7 @@ import os
 import resource
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
@@ -91,10 +92,15 @@ def enter(writes: bool = False, readable: Iterable[Path] = ()) -> tuple[str, dic
 
 def explain_gaps(gaps: Sequence[str]) -> str:
     """Return why a service runs no FMUs on a machine that cannot confine them."""
+    needs = " and ".join(gaps)
+    return explain_no_fmus(f"ask its operator for a machine that can confine them, which needs {needs}")
+
+
+def explain_no_fmus(remedy: str) -> str:
+    """Return why a service runs no FMUs, and what to do; the remedy is that of its operator."""
     return (
-        f"this service runs no FMUs, which are native code: to confine them, its machine lacks "
-        f"{' and '.join(gaps)}; run 'islands diagnose' locally, or send the simulated output as a column of "
-        "the record"
+        f"this service runs no FMUs, which are native code: {remedy}, run 'islands diagnose' locally, or "
+        "send the simulated output as a column of the record"
     )
 
 
@@ -129,8 +135,29 @@ def send_document(document: Mapping[str, Any], answer: IO[bytes]) -> None:
     answer.flush()
 
 
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a process is started for, in the words of messages about it.
+
+    Attributes
+    ----------
+    name : str
+        Subject of the messages: the file that is read.
+    verb, failure : str
+        Behind a time that it takes, and before the limits within which it fails.
+    cause, remedy : str
+        Why it may fail, and what to do if it takes too long.
+    """
+
+    name: str
+    verb: str = " to read"
+    failure: str = "cannot be read"
+    cause: str = "it is damaged, or unpacks to more than this service accepts"
+    remedy: str = "give a shorter record, or NPZ instead of text"
+
+
 def check_status(
-    status: int | None, answer: bytes, complaint: bytes, file: str, memory: int, seconds: float
+    status: int | None, answer: bytes, complaint: bytes, task: Task, memory: int, seconds: float
 ) -> None:
     """Raise the error of a process that has ended.
 
@@ -140,8 +167,7 @@ def check_status(
         Exit status.
     answer, complaint : bytes
         Standard output and standard error, or their beginnings.
-    file : str
-        Name of the file, for the message.
+    task : Task
 
     Raises
     ------
@@ -158,13 +184,11 @@ def check_status(
         if "/" in reason:  # a path of this machine, which is not for the owner of the file
             reason = reason.partition(":")[0]
         raise RecordError(
-            f"{file} cannot be read within {memory / 1e9:.1f} GB of memory and {seconds:.0f} s ({reason}): "
-            "it is damaged, or unpacks to more than this service accepts"
+            f"{task.name} {task.failure} within {memory / 1e9:.1f} GB of memory and {seconds:.0f} s "
+            f"({reason}): {task.cause}"
         )
 
 
-def timeout_error(file: str, seconds: float) -> RecordError:
+def timeout_error(task: Task, seconds: float) -> RecordError:
     """Return the error of a process that takes too long."""
-    return RecordError(
-        f"{file} takes longer than {seconds:.0f} s to read: give a shorter record, or NPZ instead of text"
-    )
+    return RecordError(f"{task.name} takes longer than {seconds:.0f} s{task.verb}: {task.remedy}")

@@ -42,9 +42,9 @@ _SYSTEM = (
 )
 
 #: User and group of a confined process of a service that is root: no file belongs to them by convention.
-_NOBODY = 65534
+_UNPRIVILEGED = 65534
 
-#: Capabilities to read files of other users. The process keeps one, since what it reads may belong to root.
+#: Capabilities to read files of other users. The process keeps one, since its file may belong to root.
 _CAP_DAC_OVERRIDE, _CAP_DAC_READ_SEARCH = 1 << 1, 1 << 2
 
 #: Version of the structures of capabilities: header, and two halves of effective, permitted and inheritable.
@@ -106,12 +106,12 @@ def _drop_root(writable: Iterable[Path]) -> tuple[str, ...]:
     kept = permitted & _CAP_DAC_READ_SEARCH or permitted & _CAP_DAC_OVERRIDE
     try:
         for folder in writable:
-            os.chown(folder, _NOBODY, _NOBODY)
+            os.chown(folder, _UNPRIVILEGED, _UNPRIVILEGED)
         check(_libc.prctl(_PR_SET_KEEPCAPS, 1, 0, 0, 0))
         os.setgroups([])
-        os.setresgid(_NOBODY, _NOBODY, _NOBODY)
+        os.setresgid(_UNPRIVILEGED, _UNPRIVILEGED, _UNPRIVILEGED)
         if kept:
-            os.setresuid(_NOBODY, _NOBODY, _NOBODY)
+            os.setresuid(_UNPRIVILEGED, _UNPRIVILEGED, _UNPRIVILEGED)
     except OSError:  # a container whose root has few rights, or in which there is no other user
         kept = 0
     check(_libc.capset(header, _CAPABILITIES.pack(kept, kept, 0, 0, 0, 0)))

@@ -19,6 +19,7 @@ from typing import NoReturn
 
 from islands.processes.settings import freeze_garbage_collector
 from islands_service.intake import file_inspection, fmu_inspection, record_reading, sample_reading
+from islands_service.intake.reader_process import STARTED
 from islands_service.liveness import EVERY, send_heartbeat, set_parent_death_signal
 from islands_service.settings import service_settings
 
@@ -134,6 +135,8 @@ class _ForkServer:
             if pid == 0:
                 _run_program(self._programs[name.decode()], standard, own)
             self._controls[pid] = socket(fileno=control)
+            with suppress(BrokenPipeError):
+                self._controls[pid].send(STARTED)
             self._selector.register(self._controls[pid], selectors.EVENT_READ, pid)
         for descriptor in standard:
             os.close(descriptor)

@@ -2,10 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
 from islands_service.domain.uploaded_fmu import UploadedFmuSpec, check_interface, read_fmu
+from islands_service.intake.confined_process import explain_gaps, explain_no_fmus
+from islands_service.intake.confinement import find_gaps
 from islands_service.intake.job_inputs import link_blob
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store.blobs import Blobs
@@ -17,16 +21,16 @@ if TYPE_CHECKING:
 
 def explain_refusal(settings: ServiceSettings) -> str:
     """Return why a service runs no FMUs, and what to do; empty if it runs them."""
-    if settings.allow_fmus:
-        return ""
-    return (
-        "this service runs no FMUs, which are native code: ask its operator to set ISLANDS_ALLOW_FMUS=true, "
-        "run 'islands diagnose' locally, or send the simulated output as a column of the record"
-    )
+    if not settings.allow_fmus:
+        return explain_no_fmus("ask its operator to set ISLANDS_ALLOW_FMUS=true")
+    if find_spec("fmpy") is None:
+        return describe_missing_extra("the simulation of an FMU", "fmi")
+    gaps = find_gaps()
+    return explain_gaps(gaps) if gaps else ""
 
 
 def check_allowed(settings: ServiceSettings) -> None:
-    """Refuse FMUs unless the operator allows them.
+    """Refuse FMUs unless the operator allows them, and this machine can confine them.
 
     Raises
     ------

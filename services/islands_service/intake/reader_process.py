@@ -18,6 +18,9 @@ from islands_service.settings import read_simulation_environment, service_settin
 #: Largest number of bytes of an exit status.
 _MAX_STATUS = 16
 
+#: What a fork server sends when it has started a process.
+STARTED = b"."
+
 
 class ReaderProcess:
     """Process that reads one file with limited resources. It is killed at the end of a ``with`` block.
@@ -25,11 +28,12 @@ class ReaderProcess:
     Parameters
     ----------
     control : socket
-        Connection to the fork server, which sends the exit status, and kills the process if it is closed.
+        Connection to the fork server, which sends `STARTED` and the exit status, and kills the process if it
+        is closed.
     """
 
     def __init__(self, control: socket.socket) -> None:
-        self._control = control
+        self._control, self._is_started = control, False
 
     def __enter__(self) -> Self:
         return self
@@ -44,18 +48,48 @@ class ReaderProcess:
         with suppress(OSError):  # the fork server has ended, and with it the process
             self._control.shutdown(socket.SHUT_WR)
 
-    def wait(self, seconds: float | None = None) -> int:
-        """Wait for the end of the process; return its exit status, that of a killed one without the server.
+    def wait_start(self, seconds: float | None = None) -> None:
+        """Wait until the process has started, or the server has ended. A new server takes seconds to start.
 
         Raises
         ------
         TimeoutError
         """
+        if not self._is_started:
+            self._control.settimeout(seconds)
+            self._receive(len(STARTED))
+            self._is_started = True
+
+    def wait(self, seconds: float | None = None) -> int:
+        """Wait for the end of the process; return its exit status, that of a killed one without the server.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            Longest time from the start of the process.
+
+        Raises
+        ------
+        TimeoutError
+        """
+        self.wait_start()
         self._control.settimeout(seconds)
-        return _parse_status(self._receive())
+        return _parse_status(self._receive(_MAX_STATUS))
+
+    async def wait_start_async(self) -> None:
+        """Wait as `wait_start` does without a limit, in an event loop."""
+        if not self._is_started:
+            await self._await_message()
+            self._receive(len(STARTED))
+            self._is_started = True
 
     async def wait_async(self) -> int:
         """Wait as `wait` does without a limit, in an event loop."""
+        await self.wait_start_async()
+        await self._await_message()
+        return _parse_status(self._receive(_MAX_STATUS))
+
+    async def _await_message(self) -> None:
         self._control.setblocking(False)
         readable = asyncio.Event()
         loop = asyncio.get_running_loop()
@@ -64,11 +98,10 @@ class ReaderProcess:
             await readable.wait()
         finally:
             loop.remove_reader(self._control)
-        return _parse_status(self._receive())
 
-    def _receive(self) -> bytes:
+    def _receive(self, size: int) -> bytes:
         try:
-            return self._control.recv(_MAX_STATUS)
+            return self._control.recv(size)
         except ConnectionResetError:
             return b""
 

@@ -9,7 +9,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands_service.domain.job_spec import SimulatedRecord
 from islands_service.domain.plot_envelopes import describe_envelopes
 from islands_service.intake.confined_answer import ask_confined
-from islands_service.intake.confined_process import enter, refuse, send_document
+from islands_service.intake.confined_process import Task, enter, refuse, send_document
 from islands_service.intake.reader_process import SIMULATION_SERVER
 
 #: Names of the signals of a preview.
@@ -56,7 +56,17 @@ async def preview_simulation(
         The record or the simulation cannot be used, or not within the limits.
     """
     asked = {"request": asdict(request)}
-    return await ask_confined("simulation_preview", path, asked, memory, seconds, SIMULATION_SERVER, fmu)
+    simulation = request.job["simulation"]["kind"] if fmu is None else fmu.name
+    task = Task(
+        f"the preview of {simulation} on {path.name}",
+        verb="",
+        failure="cannot be made",
+        cause="the simulation fails, calls what a service forbids, or needs too much memory",
+        remedy="select fewer rows, or start the diagnosis, which has more time",
+    )
+    return await ask_confined(
+        "simulation_preview", path, asked, memory, seconds, SIMULATION_SERVER, fmu, task
+    )
 
 
 def main() -> None:

@@ -113,12 +113,15 @@ def test_child_process_inherits_the_rest_of_the_environment(monkeypatch, tmp_pat
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])
 def test_loopback_address_needs_no_key_unless_keys_are_required(host):
     assert not ServiceSettings(host=host).keys_needed
-    assert ServiceSettings(host=host, require_keys=True).keys_needed
+    assert ServiceSettings(host=host).allow_fmus
+    shared = ServiceSettings(host=host, require_keys=True)
+    assert (shared.keys_needed, shared.allow_fmus) == (True, False)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.0.7", "islands.example.org", ""])
 def test_other_addresses_need_keys(host):
     assert ServiceSettings(host=host).keys_needed
+    assert not ServiceSettings(host=host).allow_fmus
 
 
 def test_database_is_in_the_data_folder_unless_another_is_given(tmp_path, monkeypatch):

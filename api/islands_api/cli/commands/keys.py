@@ -7,7 +7,7 @@ import typer
 from rich.table import Column, Table
 from rich.text import Text
 
-from islands.cli.console import output
+from islands.cli.console import errors, output
 from islands.errors import SettingsError
 from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
 from islands_service.store.tenants.keys import SCOPES
@@ -34,7 +34,7 @@ def create(
     data_dir: DataDir = None,
     database: Database = None,
 ) -> None:
-    """Create a key. It is shown once: only its hash is stored."""
+    """Create a key and print it. It is shown once: only its hash is stored."""
     if days is not None and not 0.0 < days < inf:
         raise SettingsError(f"--days is a number of days above 0, got {days:g}")
     with open_store(data_dir, database) as store:
@@ -42,7 +42,8 @@ def create(
             name, frozenset(scopes), owner, None if days is None else days * _DAY_SECONDS, COMMAND_LINE
         )
     output.print(secret, markup=False)
-    output.print(f"key {key.id} of owner {key.owner}: {', '.join(sorted(key.scopes))}", markup=False)
+    # Standard output can be the file that a program reads the key from.
+    errors.print(f"key {key.id} of owner {key.owner}: {', '.join(sorted(key.scopes))}", markup=False)
 
 
 @keys.command("list")

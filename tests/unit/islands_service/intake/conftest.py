@@ -11,7 +11,7 @@ SERVER = """
 import sys
 from islands_service.intake import fork_server
 program = compile(sys.argv[1], "program", "exec")
-fork_server.PROGRAMS = dict.fromkeys(fork_server.PROGRAMS, lambda: exec(program, {}))
+fork_server.PROGRAMS = dict.fromkeys((*fork_server.PROGRAMS, "simulation_preview"), lambda: exec(program, {}))
 fork_server.main()
 """
 

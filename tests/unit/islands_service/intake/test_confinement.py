@@ -1,4 +1,4 @@
-"""A confined process of root is another user, who can read what root can."""
+"""A confined process of root is another user with the right to read what root can read."""
 
 import json
 import os

@@ -54,6 +54,12 @@ def test_a_process_ends_with_its_server(programs):
         eventually(lambda: not alive([pid]), seconds=10.0)
 
 
+def test_the_start_of_the_server_is_not_counted(programs):
+    with open_memory("answer") as output, start(programs("pass"), output) as process:
+        # An interpreter takes longer to start, and to import the readers.
+        assert process.wait(0.2) == 0
+
+
 def test_waiting_has_a_limit_and_a_killed_process_has_ended(programs):
     with open_memory("answer") as output, start(programs("while True: pass"), output) as process:
         with pytest.raises(TimeoutError):

@@ -137,7 +137,8 @@ export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows
     try {
       if (simulated === null) {
         const { items } = await getJson("v1/simulations", { signal });
-        simulated = makeSimulationChoice(items, initial, update, signal);
+        const accepted = items.filter(({ refusal }) => !refusal);
+        simulated = makeSimulationChoice(accepted, initial, update, signal);
         host.replaceChildren(simulated.node);
       }
     } catch (error) {

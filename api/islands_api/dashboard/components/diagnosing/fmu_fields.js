@@ -150,14 +150,12 @@ function writeFile(file, names, parameters) {
 }
 
 /**
- * Make the choice of an FMU; `refusal` says why the service runs none, or is empty. `read()` returns the
- * simulation, its tolerances and the parts of its command, or null. `onChange()` is called at every change;
- * `setChannels(channels)` states the channels `{name, unit}` of the record, and `fill(request)` loads the FMU
- * of a request.
+ * Make the choice of an FMU. `read()` returns the simulation, its tolerances and the parts of its command, or
+ * null. `onChange()` is called at every change; `setChannels(channels)` states the channels `{name, unit}` of
+ * the record, and `fill(request)` loads the FMU of a request.
  */
-export function makeFmuFields(refusal, onChange, signal) {
-  const complaint = el("p", { class: "complaint" }, refusal);
-  if (refusal) return { node: complaint, setChannels() {}, fill() {}, read: () => null };
+export function makeFmuFields(onChange, signal) {
+  const complaint = el("p", { class: "complaint" });
   const file = el("input", { name: "fmu", type: "file", accept: ".fmu" });
   const stored = el("select", { name: "stored-fmu" });
   const storedFields = el(

@@ -164,7 +164,7 @@ export function makeSimulationChoice(simulations, initial, onChange, signal) {
     linear: makeLinearFields,
     ode: () => makeEquationsEditor(templates, onChange, signal),
     model: () => makeModelFields(onChange, signal),
-    fmu: () => makeFmuFields(byKind.get("fmu").refusal, onChange, signal),
+    fmu: () => makeFmuFields(onChange, signal),
   };
   const made = new Map();
   const host = el("div");

@@ -112,13 +112,13 @@ def add_variables(source: Path, target: Path, text: str, types: str = "", indica
 
 @needs_compiler
 def test_types_aliases_and_arrays_of_fmi_3_are_resolved(tmp_path: Path) -> None:
-    common = 'causality="parameter" variability="tunable"'
+    common = 'causality="parameter" variability="tunable" start="2"'
     path = add_variables(
         write_oscillator(tmp_path / "mass.fmu"),
         tmp_path / "more.fmu",
         '<UInt64 name="n" valueReference="50" causality="structuralParameter" start="3"/>'
-        f'<Float64 name="p" valueReference="51" {common} start="2" declaredType="T"><Alias name="q"/></Float64>'
-        f'<Float64 name="a" valueReference="52" {common} start="1 2 3"><Dimension valueReference="50"/></Float64>'
+        f'<Float64 name="p" valueReference="51" {common} declaredType="T"><Alias name="q"/></Float64>'
+        f'<Float64 name="a" valueReference="52" {common}><Dimension valueReference="50"/></Float64>'
         '<Float64 name="b" valueReference="53"><Dimension start="2"/><Dimension start="4"/></Float64>',
         types='<TypeDefinitions><Float64Type name="T" unit="kg" min="0.1"/></TypeDefinitions>',
         indicators='<EventIndicator valueReference="52"/><EventIndicator valueReference="53"/>',
