@@ -17,6 +17,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands_service.intake import confined_answer
+from islands_service.intake.confined_process import ENVIRONMENT
 from islands_service.intake.file_inspection import InspectionRequest, describe_file, inspect_file
 from islands_service.intake.record_reading import RecordRequest, read_confined
 from support.odd_files import write_workbook
@@ -219,8 +220,7 @@ def test_process_has_no_secrets_and_no_files_of_the_service(endless, tmp_path, m
 
     with (tmp_path / "islands.db").open("rb"):
         environment, opened, limits = asyncio.run(run())
-    names = ("PATH", "OMP_NUM_THREADS", "JE_ARROW_MALLOC_CONF", "PYTHONDONTWRITEBYTECODE", "ISLANDS_READERS")
-    assert environment.keys() <= {name.encode() for name in names}
+    assert environment.keys() <= {name.encode() for name in (*ENVIRONMENT, "ISLANDS_READERS")}
     assert not [path for path in opened if path.endswith(".db") or path.startswith("socket")]
     assert limits["Max address space"] == [str(MEMORY)] * 2
     assert limits["Max cpu time"] == ["31", "31"]
