@@ -65,13 +65,13 @@ def _check_sizes(path: str, most_bytes: int) -> None:
     from islands.simulators.fmu.model_description import DESCRIPTION  # noqa: PLC0415
 
     with zipfile.ZipFile(path) as archive:
-        sizes = {each.filename: each.file_size for each in archive.infolist()}
-    if len(sizes) > _MAX_FILES or sum(sizes.values()) > most_bytes:
+        files = archive.infolist()  # a name can appear twice
+    if len(files) > _MAX_FILES or sum(each.file_size for each in files) > most_bytes:
         raise ModelError(
             f"{path} unpacks to more than {most_bytes / 1e6:.0f} MB or {_MAX_FILES} files, the most of this "
             "service: export it without sources and documentation"
         )
-    if sizes.get(DESCRIPTION, 0) > _MAX_DESCRIPTION_BYTES:
+    if any(each.filename == DESCRIPTION and each.file_size > _MAX_DESCRIPTION_BYTES for each in files):
         raise ModelError(
             f"the {DESCRIPTION} of {path} has more than {_MAX_DESCRIPTION_BYTES / 1e6:.0f} MB, the most of "
             "this service: export it with fewer variables"
