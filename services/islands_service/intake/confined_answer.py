@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any
 
-from islands_service.intake.confined_process import Task, check_status, make_message, timeout_error
+from islands_service.intake.confined_process import ConfinedTask, check_status, make_message, timeout_error
 from islands_service.intake.reader_process import FORK_SERVER, ForkServer, ReaderProcess
 
 #: Largest number of bytes of an answer, which a harmful file may control, and of a part of it.
@@ -24,7 +24,7 @@ async def ask_confined(
     seconds: float,
     server: ForkServer | None = None,
     fmu: Path | None = None,
-    task: Task | None = None,
+    task: ConfinedTask | None = None,
 ) -> Mapping[str, Any]:
     """Return the answer of a process that reads a file.
 
@@ -41,7 +41,7 @@ async def ask_confined(
         By default that of the readers.
     fmu : Path, optional
         FMU that the process extracts and runs.
-    task : Task, optional
+    task : ConfinedTask, optional
         By default the reading of the file.
 
     Raises
@@ -49,7 +49,7 @@ async def ask_confined(
     RecordError, ModelError, SettingsError
         The file cannot be read as asked, or not within the limits.
     """
-    task = task or Task(path.name)
+    task = task or ConfinedTask(path.name)
     with ExitStack() as files:
         (answers, output), (complaints, errors) = _open_pipe(files), _open_pipe(files)
         folder = files.enter_context(TemporaryDirectory(prefix="islands-fmu-")) if fmu else None

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from islands_service.intake.confined_process import Task, check_status, make_message, timeout_error
+from islands_service.intake.confined_process import ConfinedTask, check_status, make_message, timeout_error
 from islands_service.intake.reader_process import FORK_SERVER, open_memory
 
 #: Largest number of bytes of an error message.
@@ -45,7 +45,7 @@ def open_answer(
         try:
             status = process.wait(seconds)
         except TimeoutError:
-            raise timeout_error(Task(path.name), seconds) from None
+            raise timeout_error(ConfinedTask(path.name), seconds) from None
         finally:
             process.kill()
             process.wait()
@@ -55,5 +55,5 @@ def open_answer(
             raise MemoryError(f"the process that reads {path.name} was killed: check the machine's memory")
         if status:
             answer, complaint = output.read(_MAX_MESSAGE), errors.read(_MAX_MESSAGE)
-            check_status(status, answer, complaint, Task(path.name), memory, seconds)
+            check_status(status, answer, complaint, ConfinedTask(path.name), memory, seconds)
         yield output

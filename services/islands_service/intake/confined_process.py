@@ -136,7 +136,7 @@ def send_document(document: Mapping[str, Any], answer: IO[bytes]) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class ConfinedTask:
     """What a process is started for, in the words of messages about it.
 
     Attributes
@@ -157,7 +157,7 @@ class Task:
 
 
 def check_status(
-    status: int | None, answer: bytes, complaint: bytes, task: Task, memory: int, seconds: float
+    status: int | None, answer: bytes, complaint: bytes, task: ConfinedTask, memory: int, seconds: float
 ) -> None:
     """Raise the error of a process that has ended.
 
@@ -167,7 +167,7 @@ def check_status(
         Exit status.
     answer, complaint : bytes
         Standard output and standard error, or their beginnings.
-    task : Task
+    task : ConfinedTask
 
     Raises
     ------
@@ -189,6 +189,6 @@ def check_status(
         )
 
 
-def timeout_error(task: Task, seconds: float) -> RecordError:
+def timeout_error(task: ConfinedTask, seconds: float) -> RecordError:
     """Return the error of a process that takes too long."""
     return RecordError(f"{task.name} takes longer than {seconds:.0f} s{task.verb}: {task.remedy}")

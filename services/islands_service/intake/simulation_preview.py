@@ -9,7 +9,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands_service.domain.job_spec import SimulatedRecord
 from islands_service.domain.plot_envelopes import describe_envelopes
 from islands_service.intake.confined_answer import ask_confined
-from islands_service.intake.confined_process import Task, enter, refuse, send_document
+from islands_service.intake.confined_process import ConfinedTask, enter, refuse, send_document
 from islands_service.intake.reader_process import SIMULATION_SERVER
 
 #: Names of the signals of a preview.
@@ -57,7 +57,7 @@ async def preview_simulation(
     """
     asked = {"request": asdict(request)}
     simulation = request.job["simulation"]["kind"] if fmu is None else fmu.name
-    task = Task(
+    task = ConfinedTask(
         f"the preview of {simulation} on {path.name}",
         verb="",
         failure="cannot be made",

@@ -5,12 +5,12 @@ import json
 import pytest
 
 from islands.errors import RecordError
-from islands_service.intake.confined_process import Task, check_status
+from islands_service.intake.confined_process import ConfinedTask, check_status
 
 
 def message(status: int, answer: bytes = b"", complaint: bytes = b"") -> str:
     with pytest.raises(RecordError) as caught:
-        check_status(status, answer, complaint, Task("a.csv"), 10**9, 5.0)
+        check_status(status, answer, complaint, ConfinedTask("a.csv"), 10**9, 5.0)
     return str(caught.value)
 
 
@@ -23,4 +23,4 @@ def test_failure_of_the_reader_is_described_without_paths() -> None:
 
 def test_refusal_of_the_reader_is_passed_on() -> None:
     assert message(3, json.dumps({"error": "line 7 is wrong"}).encode()) == "line 7 is wrong"
-    check_status(0, b"", b"", Task("a.csv"), 10**9, 5.0)
+    check_status(0, b"", b"", ConfinedTask("a.csv"), 10**9, 5.0)

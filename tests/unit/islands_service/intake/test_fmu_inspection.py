@@ -25,7 +25,7 @@ def test_a_name_that_appears_twice_is_counted_twice(tmp_path):
         _check_sizes(path, 1199)
 
 
-def test_a_description_has_a_limit_of_its_own(tmp_path, monkeypatch):
+def test_a_description_has_a_further_limit(tmp_path, monkeypatch):
     monkeypatch.setattr(fmu_inspection, "_MAX_DESCRIPTION_BYTES", 500)
     path = write(tmp_path / "mass.fmu", ("modelDescription.xml", 501), ("modelDescription.xml", 1))
     with pytest.raises(ModelError, match=r"the modelDescription\.xml of .*mass\.fmu has more than"):
