@@ -148,6 +148,10 @@ class LinearSimulation:
         Coefficients of A after the leading 1.
     basis : ndarray, shape (columns, rows)
         Orthonormal basis of the initial states and the columns, divided by A.
+    triangle : ndarray, shape (columns, columns)
+        The initial states and the columns, divided by A, in this basis.
+    coefficients : ndarray, shape (columns,)
+        Initial states and coefficients of the columns.
     residual : ndarray, shape (rows,)
     squares : float
         Sum of squares of the residual.
@@ -156,6 +160,8 @@ class LinearSimulation:
     problem: LinearProblem
     denominator: NDArray[np.float64]
     basis: NDArray[np.float64]
+    triangle: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
     residual: NDArray[np.float64]
     squares: float
 
@@ -223,7 +229,11 @@ def solve(problem: LinearProblem, denominator: NDArray[np.float64]) -> LinearSim
         return None
     residual = factored.residual
     squares = float(dot(residual, 0, residual, 0, residual.size))
-    return LinearSimulation(problem, denominator, basis, residual, squares) if np.isfinite(squares) else None
+    if not np.isfinite(squares):
+        return None
+    return LinearSimulation(
+        problem, denominator, basis, factored.triangle, factored.coefficients, residual, squares
+    )
 
 
 def differentiate(found: LinearSimulation) -> NDArray[np.float64]:
@@ -242,6 +252,12 @@ class _Factors(NamedTuple):
     projection: NDArray[np.float64]
     residual: NDArray[np.float64]
 
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """Coefficients of least squares."""
+        found: NDArray[np.float64] = scipy.linalg.solve_triangular(self.triangle, self.projection)
+        return found
+
 
 def factor(columns: NDArray[np.float64], target: NDArray[np.float64]) -> _Factors | None:
     """Orthogonalise columns in place; return None if one depends on those before it."""
@@ -258,10 +274,7 @@ def project(columns: NDArray[np.float64], target: NDArray[np.float64]) -> NDArra
     The columns are overwritten.
     """
     factored = factor(columns, target)
-    if factored is None:
-        return None
-    coefficients: NDArray[np.float64] = scipy.linalg.solve_triangular(factored.triangle, factored.projection)
-    return coefficients
+    return factored.coefficients if factored else None
 
 
 def _reflect(denominator: NDArray[np.float64]) -> NDArray[np.float64]:

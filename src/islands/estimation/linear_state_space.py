@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
-from islands.estimation.linear_simulation import find_start, minimise, project
+from islands.estimation.linear_simulation import find_start, minimise
 from islands.estimation.output_error import make_problem
 from islands.kernels.state_space import simulate_states
 from islands.models.latent import StateSpaceLayout
@@ -78,11 +78,8 @@ def fit_linear_state_space(record: Dataset, order: int) -> LinearStateSpace | No
     start = find_start(problem) if problem.is_determined else None
     if start is None:
         return None
-    poles = minimise(start, _LEAST_GAIN).denominator
-    divided = np.roll(problem.divide(poles, problem.columns), -problem.states, axis=0)
-    coefficients = project(divided, problem.y)
-    if coefficients is None:
-        return None
+    minimum = minimise(start, _LEAST_GAIN)
+    poles, coefficients = minimum.denominator, minimum.coefficients[problem.states :]
     a = np.diag(np.ones(order - 1), 1)
     a[:, 0] = -poles
     b, d, at = np.zeros((order, record.inputs)), np.zeros(record.inputs), 0

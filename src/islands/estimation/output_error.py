@@ -15,6 +15,7 @@ from dataclasses import replace
 from math import inf
 
 import numpy as np
+import scipy
 
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
@@ -29,7 +30,6 @@ from islands.estimation.linear_simulation import (
     find_start,
     measure_criterion,
     minimise,
-    project,
     solve,
 )
 from islands.estimation.noise_model import fit_whitening, is_rounding_error
@@ -221,20 +221,20 @@ def _fit_coloured(found: LinearSimulation) -> LinearSimulation | None:
 
 def _make_structure(found: LinearSimulation, record: Dataset, criterion: Criterion) -> FittedStructure:
     """Return the difference equation with its parameters and their standard errors."""
-    problem = found.problem
-    divided = np.roll(problem.divide(found.denominator, problem.columns), -problem.states, axis=0)
-    slopes = -differentiate(found)
-    coefficients = project(np.array(divided), problem.y)
-    assert coefficients is not None, "the solution has independent columns"
-    count = len(problem.columns)
-    values = [*(-found.denominator).tolist(), *coefficients[:count].tolist()]
-    variances = np.diag(sandwich_of_jacobian(np.vstack([slopes, divided]), found.residual))
-    errors = np.sqrt(np.maximum(variances, 0.0))[: len(problem.terms)].tolist()
+    problem, states = found.problem, found.problem.states
+    values = [*(-found.denominator).tolist(), *found.coefficients[states:].tolist()]
+    # The rank of the columns is that of the simulation: its basis, not the columns, is the Jacobian.
+    columns = len(found.basis)
+    covariance = sandwich_of_jacobian(np.vstack([found.basis, -differentiate(found)]), found.residual)
+    half = scipy.linalg.solve_triangular(found.triangle, covariance[:columns, :columns])
+    of_columns = scipy.linalg.solve_triangular(found.triangle, half.T)
+    variances = np.append(np.diag(covariance)[columns:], np.diag(of_columns)[states:])
+    errors = np.sqrt(np.maximum(variances, 0.0)).tolist()
     terms = list(zip(problem.terms, values, strict=True))
     model = make_model(terms, record.input_names, record.output_name, record.dt)
     # The same order of the terms as that of the model, without the factors of the expressions, which are 1.
     ordered = make_model(list(zip(problem.terms, errors, strict=True)), record.input_names)
     assert ordered.regressors == model.regressors
     model = replace(model, standard_errors=ordered.theta, preprocessing=record.preprocessing)
-    variance = found.squares / max(1, problem.y.size - len(divided) - problem.order)
+    variance = found.squares / max(1, problem.y.size - columns - problem.order)
     return FittedStructure(model, variance, criterion=criterion)

@@ -64,3 +64,17 @@ def test_part_has_no_segment_that_its_initial_states_take():
 def test_steps_from_the_start_find_the_exact_equation():
     found = minimise(find_start(make_problem((80, 60, 90))), 1e-7)
     assert found.denominator == pytest.approx(A, abs=1e-9)
+
+
+def test_whether_columns_depend_on_each_other_is_decided_once():
+    """In another order of the columns, the initial state depends on them: the solution keeps its rank."""
+    random = np.random.default_rng(2)
+    other, rest = random.standard_normal((2, 90))
+    pulse = np.eye(1, 90)[0]
+    columns = np.vstack([pulse - 1e-3 * other - 1e-12 * rest, other])
+    problem = replace(make_problem((90,)), columns=columns)
+    divided = problem.divide(A, columns)
+    assert project(np.roll(divided, -problem.states, axis=0), problem.y) is None
+    found = solve(problem, A)
+    simulated = found.coefficients @ problem.divide(A, columns)
+    assert simulated == pytest.approx(problem.y - found.residual, abs=1e-4 * np.abs(problem.y).max())
