@@ -36,6 +36,10 @@ from islands.simulation.predictors import find_divergence_bound
 _TARGET = 0
 _PREVIOUS = 1
 
+#: Binary digits of an error. Structures that are equal but for rounding have equal errors, so that rounding
+#: does not decide between them.
+_BITS = 33
+
 _ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error exceeds the abandon threshold of the island")
 _DIVERGED = EvaluationOutcome(Status.DIVERGED, "the simulation left the divergence bound in an interval")
 
@@ -307,14 +311,16 @@ class Evaluator:
 
     def _evaluate_structures(self, numbers: NDArray[np.int64], allowed: NDArray[np.float64]) -> None:
         """Estimate and simulate the models of some structures."""
-        structures, limits = self._structures, allowed * self._predicted
+        structures, limits = self._structures, allowed * (1.0 + 2.0**-_BITS) * self._predicted
         for part, given in self._make_batches(structures.select(numbers)):
             places, (count, most) = numbers[part], given.terms.shape
             results = kernel.empty_results(count, most)
             self._run_kernel(given, limits, results)
             structures.theta[places, :most], structures.status[places] = results.theta, results.status
             structures.fitness[places] = np.where(
-                results.status == kernel.ABANDONED, allowed[given.lengths], results.error / self._predicted
+                results.status == kernel.ABANDONED,
+                allowed[given.lengths],
+                _remove_rounding(results.error / self._predicted),
             )
 
     def _run_kernel(
@@ -355,3 +361,10 @@ class Evaluator:
             context = self.context
             complete_pairs(*given, context.target, context.nodes, context.pairs, context.rows)
             yield part, given
+
+
+def _remove_rounding(errors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return errors with `_BITS` binary digits, whatever their unit."""
+    mantissa, exponent = np.frexp(errors)
+    found: NDArray[np.float64] = np.ldexp(np.rint(mantissa * 2.0**_BITS), exponent - _BITS)
+    return found

@@ -17,6 +17,11 @@ DEPENDENT = 1e-10
 #: Error reduction ratios with a smaller relative difference are equal: rounding must not decide between them.
 TIE = 1e-9
 
+#: Rounding error of the inner products, relative to the norms. The orthogonalisation against a candidate that
+#: depends on others nearly divides it by the norm that is left. A ratio has no digit left if the candidates
+#: before it explain the target, and few if they nearly explain the candidate.
+_ROUNDING = 1e-14
+
 #: What the error reduction ratio refers to: rules of `prune`, `prune_increments` and `prune_single`.
 OUTPUT, INCREMENT, OUTPUT_SINGLE = 0, 1, 2
 
@@ -32,11 +37,12 @@ def select(
 ):
     """Select candidates one after the other and return their number.
 
-    Candidates whose error reduction ratios differ by rounding tie, and the first one is selected.
+    Error reduction ratios that differ by their rounding errors tie, and the first candidate is selected.
     """
     energy = gram[candidates, candidates]
     if not (energy > 0.0 and np.isfinite(energy)):
         return 0
+    norm = np.sqrt(energy)
     scale = np.empty(candidates)
     left = np.empty(candidates)
     correlation = np.empty(candidates)
@@ -47,17 +53,21 @@ def select(
         left[j] = 1.0 if usable else 0.0
         correlation[j] = gram[j, candidates] * scale[j] if usable else 0.0
     rows = np.empty((limit, candidates))
-    selected = 0
+    selected, rounding = 0, _ROUNDING
     while selected < limit:
-        best, ratio = -1, tolerance
+        best, ratio, largest = -1, tolerance, tolerance
         for j in range(candidates):
             if left[j] > DEPENDENT:
                 share = correlation[j] * correlation[j] / left[j] / energy
-                if share > ratio * (1.0 + TIE if best >= 0 else 1.0):
+                product, error = abs(correlation[j]) / norm, max(TIE, rounding / left[j])
+                least = max(0.0, product - rounding) ** 2 / left[j] * (1.0 - error)
+                if least > largest or (best < 0 and share > tolerance):
                     best, ratio = j, share
+                    largest = (product + rounding) ** 2 / left[j] * (1.0 + error)
         if best < 0:
             break
         pivot = np.sqrt(left[best])
+        rounding = max(rounding, _ROUNDING / pivot)
         gain = correlation[best] / pivot
         for j in range(candidates):
             if left[j] > 0.0:

@@ -182,3 +182,23 @@ def test_pruning_of_increments_equals_gram_schmidt_in_the_null_space(seed, const
     kept = np.full(6, -7)
     count = prune_increments(gram, 6, reduction, 2, tolerance, kept)
     assert kept[:count].tolist() == sorted(expected)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rounding_selects_no_candidate(seed):
+    """Scaled columns have other roundings: neither a target that is explained nor a remainder decides.
+
+    Two of the first four candidates, which depend on each other nearly, explain the target.
+    """
+    generator = np.random.default_rng(seed)
+    base = generator.normal(size=(6, 40))
+    near = base[0] + 1e-4 * np.outer(range(4), base[1])
+    psi = np.vstack([near, generator.normal(size=(12, 4)) @ base[2:]])
+    target = 100.0 * base[0] + base[1]
+    scales = 10.0 ** generator.integers(-9, 10, len(psi)) / 3.0
+    orders = []
+    for factors in (np.ones(len(psi)), scales):
+        order, err = np.full(6, -1), np.empty(6)
+        select(gram_of(psi * factors[:, None], target), len(psi), 0.0, 6, order, err)
+        orders.append(order.tolist())
+    assert orders[0] == orders[1]
