@@ -25,7 +25,7 @@ from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.linear_comparison import fit_linear_comparison, is_linear
 from islands.validation.prediction_bands import calibrate_bands
-from islands.validation.recommendation import Recommendation, recommend, recommend_fittest
+from islands.validation.recommendation import Recommendation, measure_size, recommend, recommend_fittest
 
 #: Name of the step that makes the ensemble and the prediction bands.
 BANDS = "prediction bands"
@@ -155,7 +155,7 @@ class SearchResult:
         if self.settings.get("select") == "fitness":  # a setting of evolution only
             mode = FITNESS_MODES[self.settings["fitness"]]
             return recommend_fittest(self.models, mode, self.requires_property_1, unit)
-        sizes = [entry.model.size for entry in self.models]
+        sizes = [measure_size(entry.model) for entry in self.models]
         return recommend(sizes, self.models, self.requires_property_1, unit)
 
     @property

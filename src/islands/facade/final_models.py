@@ -279,7 +279,7 @@ def _estimate_models(
     fitted = [
         each
         for each in found
-        if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
+        if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms + any(offsets)
     ]
     keep = _choose_filter(settings)
     if settings.estimator:

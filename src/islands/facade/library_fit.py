@@ -328,7 +328,8 @@ def _estimate(
                 )
             if isinstance(estimated, EvaluationOutcome):
                 found[place] = estimated
-            elif estimated.model.size <= settings.max_terms:
+            # The constant that an offset requires belongs to the unit, not to the law.
+            elif estimated.model.size <= settings.max_terms + any(offsets):
                 found[place] = assess(estimated.model, split, interval, warm_up, constraints, criterion)
 
     sizes = map_over_record(estimate_size, by_size, split.estimation.samples)

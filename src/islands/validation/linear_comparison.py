@@ -9,7 +9,7 @@ from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.validation.assessment import Assessment, assess
-from islands.validation.recommendation import recommend
+from islands.validation.recommendation import measure_size, recommend
 
 #: Largest lag of an input and of the output, and largest number of terms.
 _LAGS, _MAX_TERMS = 4, 40
@@ -48,4 +48,5 @@ def fit_linear_comparison(split: Split, delays: Sequence[int], shooting: int) ->
     bounded = [each for each in found if each.outcomes["validation"]["free_run"]]
     if not bounded:
         return None
-    return bounded[recommend([each.model.size for each in bounded], bounded, hysteresis=False).rank - 1]
+    sizes = [measure_size(each.model) for each in bounded]
+    return bounded[recommend(sizes, bounded, hysteresis=False).rank - 1]

@@ -23,6 +23,9 @@ from math import inf, isinf, isnan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.expressions.tree import Constant
+from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import LARGEST_ESTIMATION_RATIO
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
@@ -69,6 +72,9 @@ _BESIDES_ERROR = (PROPERTY_1, ESTIMATION_ERROR, *_OF_EQUALS)
 
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
+
+
+_ONE = Constant(1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,8 +131,18 @@ class _Funnel:
             self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
+def measure_size(model: DynamicModel) -> float:
+    """Return the number of terms by which models are compared; a constant is half a term.
+
+    The zero of a unit decides whether a law has a constant: in another unit, the law with one more term is
+    still larger, and without an offset the law without a constant is smaller.
+    """
+    has_constant = isinstance(model, Model) and any(item.expression == _ONE for item in model.regressors)
+    return model.size - 0.5 * has_constant
+
+
 def recommend(
-    sizes: Sequence[int], assessments: Sequence[Assessment], hysteresis: bool, unit: str = ""
+    sizes: Sequence[float], assessments: Sequence[Assessment], hysteresis: bool, unit: str = ""
 ) -> Recommendation:
     """Choose the smallest model that is as good as the best one.
 
@@ -144,8 +160,8 @@ def recommend(
 
     Parameters
     ----------
-    sizes : sequence of int
-        Numbers of terms, in the order of the ranks.
+    sizes : sequence of float
+        Numbers of terms as of `measure_size`, in the order of the ranks.
     assessments : sequence of Assessment
         Assessments on the same estimation data and validation data, best first.
     hysteresis : bool

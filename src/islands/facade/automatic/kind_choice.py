@@ -20,7 +20,7 @@ from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
 from islands.progress import Steps, StoppedError
 from islands.validation.assessment import Assessment, average_errors
-from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
+from islands.validation.recommendation import describe_exclusion, list_rivals, measure_size, recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
 #: models keep that property.
@@ -265,7 +265,7 @@ def _select_kind(
             f"{list_others(errors, close[0])}"
         )
     kinds, models = list(compared), list(compared.values())
-    sizes = [each.model.size for each in models]
+    sizes = [measure_size(each.model) for each in models]
     best = recommend(sizes, models, False)
     kind = kinds[best.rank - 1]
     is_least = errors[kind] == least or best.rank == best.reference

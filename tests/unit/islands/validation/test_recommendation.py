@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from islands.expressions.parsing import parse
+from islands.models.narx import make_model
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
@@ -15,6 +17,7 @@ from islands.validation.physics import ClusterSum, ExcursionTest, ExtremeTest, H
 from islands.validation.recommendation import (
     Exclusion,
     compare_blocks,
+    measure_size,
     recommend,
     recommend_fittest,
 )
@@ -350,3 +353,11 @@ def test_an_output_that_moves_on_at_held_inputs_is_not_said_to_be_bounded(ranges
     reason = recommend([2], [entry.assessment()], hysteresis=False).reasons[1]
     assert re.match(f".*{words}", reason)
     assert ("bounded" in reason) == words.startswith("bounded")
+
+
+def test_a_constant_counts_less_than_another_term():
+    """The zero of a unit decides whether a law has a constant."""
+    texts = ["y(k-1)"], ["y(k-1)", "1"], ["y(k-1)", "u(k-1)"]
+    models = [make_model([(parse(text), 0.5) for text in each]) for each in texts]
+    sizes = [measure_size(model) for model in models]
+    assert sizes == sorted(set(sizes))

@@ -141,3 +141,11 @@ def test_evolution_finds_the_law_at_a_large_offset():
     changes = {"generations": 2, "population": 20, "max_terms": 5, "library_lags": 2, "refine": False}
     found = islands.identify(Dataset(U + 1e5, y + 1e5, 0.1), preset="narx", **changes)
     assert error(found, 4) < 1e-8
+
+
+def test_the_constant_of_an_offset_is_no_term_of_the_law():
+    """A law of two terms has two terms in every unit: the zero of the unit adds the constant."""
+    y = simulate(lambda y, u, k: 0.8 * y[k - 1] + 0.3 * u[k - 1])
+    found = islands.fit(Dataset(U + 1e4, y - 1e4, 0.1), library="polynomial", degree=1, lags=2, max_terms=2)
+    assert set(found.best.model.parameter_names) == {"1", "y(k-1)", "u1(k-1)"}
+    assert found.best.metrics["validation"]["free_run"].rmse < 1e-8
