@@ -31,7 +31,7 @@ from islands.estimation.shooting_residual import (
 )
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
-from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 
 M = TypeVar("M", bound=AnyModel)
@@ -199,7 +199,8 @@ def begin_refinement(
         directions = scipy.linalg.block_diag(directions, scale * np.eye(free.changes))
     terms, values = theta.size, np.append(theta, np.zeros(len(directions) - theta.size))
     error = residual(values)
-    assert error is not None, "the initial simulation did not diverge"
+    if error is None:
+        return EvaluationOutcome(Status.DIVERGED, "the free run with estimated initial outputs diverges")
     minimisation = Minimisation(
         *(residual, values, error, directions, _MIN_GAIN),
         lambda values: constrained.has_signs(values[:terms]),

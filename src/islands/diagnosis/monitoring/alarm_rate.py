@@ -33,16 +33,16 @@ def parse_alarm_rate(text: str, interval: float) -> float:
         The text is no rate, or the rate is not between 0 and 1 per record.
     """
     match = _RATE.fullmatch(text.strip().lower())
+    number, every, unit = match.groups() if match else ("", "", "")
     known = ("record", *SECONDS)
     try:
-        assert match is not None
-        count, every, unit = float(match[1]), float(match[2] or 1.0), match[3]
-        per_record = count / every / (1.0 if unit == "record" else SECONDS[unit] / interval)
-    except (AssertionError, KeyError, ValueError, ZeroDivisionError):
+        count = float(number) / float(every or 1.0)
+        per_record = count / (1.0 if unit == "record" else SECONDS[unit] / interval)
+    except (KeyError, ValueError, ZeroDivisionError):
         raise SettingsError(
             f"{text!r} is no rate of false alarms: write NUMBER per UNIT, such as 1 per month or 1 per 720 "
             f"records; the units are {', '.join(known)}"
-            f"{suggest(match[3], known) if match else ''}"
+            f"{suggest(unit, known) if match else ''}"
         ) from None
     if not 0.0 < per_record < 1.0:
         raise SettingsError(
