@@ -97,7 +97,7 @@ def fit(
         Dead times by which the library reads the inputs later, in samples of the record: one, or one for each
         input. None estimates them with the library ``auto``, and is none with others.
     max_terms : int
-        Size of the largest model.
+        Size of the largest model, apart from a constant that an offset of the signals requires.
     constraints : str, optional
         ``hysteresis``, ``none`` or statements such as ``odd; gain = 2.5``; None takes the default of the
         library. Those of latent models are ``gain``, ``fixed-point`` and ``odd``.
