@@ -224,7 +224,7 @@ def recommend_fittest(
 
 
 def list_rivals(
-    found: Recommendation, sizes: Sequence[int], assessments: Sequence[Assessment]
+    found: Recommendation, sizes: Sequence[float], assessments: Sequence[Assessment]
 ) -> tuple[Exclusion, ...]:
     """Return the excluded models that would be preferred without the reason that excludes them.
 
@@ -359,7 +359,7 @@ def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> 
 
 
 def _describe_choice(
-    found: Recommendation, sizes: Sequence[int], assessments: Sequence[Assessment], unit: str
+    found: Recommendation, sizes: Sequence[float], assessments: Sequence[Assessment], unit: str
 ) -> str:
     """State the criterion, the errors, and the excluded models that the criterion would prefer."""
     chosen, best = (assessments[rank - 1] for rank in (found.rank, found.reference or found.rank))
