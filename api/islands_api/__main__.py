@@ -77,10 +77,12 @@ def check_safe(settings: ServiceSettings, store: Store) -> None:
     """
     make_verifier(settings)
     if settings.keys_needed and not settings.oidc_issuer and not store.keys.any_valid():
+        needs, other = f"{settings.host} can be reached by other machines", "serve on 127.0.0.1"
+        if settings.on_loopback:
+            needs, other = "every request needs a key (require_keys)", "serve without --require-keys"
         raise SettingsError(
-            f"{settings.host} can be reached by other machines, and there is no key: create one with "
-            "'islands keys create --scope read --scope write', name a file with one in "
-            "ISLANDS_ADMIN_KEY_FILE, or serve on 127.0.0.1"
+            f"{needs}, and there is no key: create one with 'islands keys create --scope read --scope write', "
+            f"name a file with one in ISLANDS_ADMIN_KEY_FILE, or {other}"
         )
     if (settings.tls_certificate is None) != (settings.tls_key is None):
         raise SettingsError("TLS needs both a certificate and a key: give --tls-certificate and --tls-key")

@@ -8,6 +8,7 @@ import fcntl
 import os
 import secrets
 import signal
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -67,6 +68,10 @@ _WAITS_FOR_DISK = "D"
 
 class DataDirLockedError(IslandsError):
     """Another ``islands serve`` has locked the data folder."""
+
+
+class DataDirSharedError(IslandsError):
+    """Other users may enter the data folder, and this process cannot change that."""
 
 
 @dataclass(slots=True, eq=False)
@@ -152,15 +157,39 @@ class Role:
     failures: int = 0
 
 
-@contextmanager
-def folder_lock(folder: Path) -> Iterator[None]:
-    """Lock a data folder. The operating system releases the lock when the process ends.
+def make_private(folder: Path) -> None:
+    """Make a data folder if it does not exist, and let no other user enter it.
 
     Raises
     ------
-    DataDirLockedError
+    DataDirSharedError
+        The folder belongs to another user, or is one for the files of all users.
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    mode = stat.S_IMODE(folder.stat().st_mode)
+    if not mode & 0o077:
+        return
+    shared = DataDirSharedError(
+        f"{folder} is open to other users (mode {mode:04o}), and contains uploads, results and keys: give a "
+        "folder of your own as --data-dir"
+    )
+    if mode & stat.S_ISVTX:
+        raise shared
+    try:
+        folder.chmod(mode & 0o700)
+    except PermissionError as error:
+        raise shared from error
+
+
+@contextmanager
+def folder_lock(folder: Path) -> Iterator[None]:
+    """Make a data folder private and lock it. The operating system releases the lock when the process ends.
+
+    Raises
+    ------
+    DataDirSharedError, DataDirLockedError
+    """
+    make_private(folder)
     with (folder / "lock").open("a+") as stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

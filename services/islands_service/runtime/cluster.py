@@ -16,6 +16,8 @@ from threading import current_thread, main_thread
 
 import ray
 from filelock import FileLock, Timeout
+from ray._common.network_utils import is_localhost
+from ray._private import ray_constants
 from ray._private.node import Node
 from ray.exceptions import (
     LocalRayletDiedError,
@@ -95,6 +97,8 @@ def cluster(address: str | None = None, cpus: int | None = None, jobs: int = 1) 
             "this process is already connected to Ray: disconnect first, or give the address of that cluster"
         )
     logging.getLogger("ray").setLevel(logging.CRITICAL)
+    # Otherwise Ray replaces a loopback address by that of a network interface, and listens on all of them.
+    ray_constants.ENABLE_RAY_CLUSTER = address is not None and not is_localhost(address.rpartition(":")[0])
     handler = signal.getsignal(signal.SIGTERM)
     handled = callable(handler) and current_thread() is main_thread()
     with ExitStack() as stack:
@@ -224,7 +228,7 @@ def _without_unused_processes() -> Iterator[None]:
 
 @contextmanager
 def _local_ray(cpus: int, jobs: int) -> Iterator[None]:
-    # Ray's processes listen on all interfaces: the token keeps other users out.
+    # Ray's processes listen on the loopback interface: the token keeps other users of this machine out.
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
     parent = Path(tempfile.gettempdir())
     if len(os.fsencode(parent)) > _MAX_PARENT_LENGTH:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.supervisor import DataDirLockedError, folder_lock
+from islands_service.supervisor import DataDirLockedError, DataDirSharedError, folder_lock
 from support.processes import alive, eventually
 
 pytestmark = pytest.mark.ci
@@ -394,6 +394,23 @@ def test_full_heartbeat_pipe_does_not_block_a_role(supervised: Start) -> None:
     finally:
         os.kill(running.process.pid, signal.SIGCONT)
     running.started(1, "work")
+
+
+def test_folder_that_other_users_may_enter_is_made_private(tmp_path):
+    """The database in it has the mode of an ordinary file."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    folder.chmod(0o755)
+    with folder_lock(folder):
+        assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_folder_for_the_files_of_all_users_is_refused(tmp_path):
+    tmp_path.chmod(0o1777)
+    with pytest.raises(DataDirSharedError, match=r"mode 1777.*--data-dir"), folder_lock(tmp_path):
+        pass
+    assert tmp_path.stat().st_mode & 0o1777 == 0o1777
+    tmp_path.chmod(0o700)
 
 
 def test_data_folder_is_locked_by_one_service(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import typer
 from islands.errors import SettingsError
 from islands_service.domain.job import Requester
 from islands_service.settings import service_settings
+from islands_service.supervisor import make_private
 
 if TYPE_CHECKING:
     from islands_service.store import Store
@@ -59,5 +60,5 @@ def open_store(data_dir: Path | None, database: str | None) -> "Store":
     from islands_service.store import Store  # noqa: PLC0415
 
     settings = service_settings(data_dir=data_dir, database=database)
-    settings.data_dir.mkdir(parents=True, exist_ok=True, mode=0o700)
+    make_private(settings.data_dir)
     return Store(settings.url)

@@ -2,12 +2,18 @@
 
 import os
 import signal
+import struct
 import sys
+from ipaddress import ip_address
+from pathlib import Path
 
 import pytest
 
 from islands.progress import StoppedError
 from support.processes import descendants
+
+#: State of a socket in `/proc/net/tcp`: it listens.
+LISTENING = "0A"
 
 
 @pytest.mark.parametrize(
@@ -50,6 +56,48 @@ def test_local_ray_starts_no_autoscaler_log_monitor_or_dashboard(ray_address):
     assert "raylet" in lines
     for script in ("monitor.py", "log_monitor.py", "dashboard.py"):
         assert f"{script} " not in lines
+
+
+@pytest.mark.ci
+def test_all_ports_of_a_local_ray_listen_on_loopback(ray_address):
+    """Other machines reach neither its processes, nor its workers, nor the driver."""
+    from islands_service.runtime.cluster import cluster, ray
+
+    with cluster(ray_address):
+        worker = ray.remote(lambda: os.getpid()).options(num_cpus=0.1)
+        assert ray.get(worker.remote()) in descendants(os.getpid())
+        found = listening_addresses({os.getpid(), *descendants(os.getpid())})
+    assert len(found) >= 6  # driver, control store, two of the raylet, agent, worker
+    assert {address.is_loopback for address in found} == {True}
+
+
+def listening_addresses(pids):
+    """Return the addresses at which some processes listen for TCP."""
+    sockets = {
+        os.readlink(link)
+        for pid in pids
+        for link in Path(f"/proc/{pid}/fd").glob("*")
+        if link.is_symlink()  # others were closed in the meantime
+    }
+    lines = [
+        line.split()
+        for name in ("tcp", "tcp6")
+        for line in Path(f"/proc/net/{name}").read_text().splitlines()
+    ]
+    return [
+        parse_address(line[1].partition(":")[0])
+        for line in lines
+        if line[3] == LISTENING and f"socket:[{line[9]}]" in sockets
+    ]
+
+
+def parse_address(digits):
+    """Return an address of `/proc/net/tcp`, which consists of words of the machine's byte order."""
+    words = struct.pack(
+        f"={len(digits) // 8}I", *(int(digits[at : at + 8], 16) for at in range(0, len(digits), 8))
+    )
+    address = ip_address(words)
+    return getattr(address, "ipv4_mapped", None) or address
 
 
 def end_by_rays_handler(**_options):
