@@ -1,5 +1,6 @@
 """Uploads in progress: number, quota, time and files are bounded before and while the body arrives."""
 
+import asyncio
 import json
 import resource
 import socket
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from islands_service.intake.inspection_limits import count_slots
+from support.bad_records import write_hdf5_bomb, write_mat_bomb, write_parquet_bomb
 from support.processes import eventually
 from support.service import csv, problem_of
 
@@ -204,3 +207,33 @@ def test_the_file_of_a_request_is_in_the_data_folder_only(service):
         assert set(spooled()) == {*before, *receiving(service)}
         assert not [path for path in service.settings.blobs.glob("*") if path.is_file()]
     eventually(lambda: not receiving(service))
+
+
+def test_a_small_record_does_not_wait_for_large_ones_of_others(service):
+    """Their inspections may take two minutes each."""
+    state, headers = service.app.state.islands, service.key()
+    largest = count_slots(state.settings.max_unpacked)
+
+    async def upload_beside_large_ones():
+        async with state.inspection_slots.hold("a", largest), state.inspection_slots.hold("b", largest):
+            return await asyncio.to_thread(
+                service.client.post,
+                *("/v1/datasets",),
+                files={"file": ("a.csv", csv())},
+                headers=headers,
+                timeout=20.0,
+            )
+
+    assert asyncio.run(upload_beside_large_ones()).status_code == 201
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("write", [write_hdf5_bomb, write_mat_bomb, write_parquet_bomb])
+def test_a_small_file_that_unpacks_to_a_gigabyte_is_refused_in_every_format(service, tmp_path, write):
+    """Its reader has memory in proportion to the bytes of the file."""
+    path = write(tmp_path)
+    assert path.stat().st_size < 2_000_000
+    answer = service.upload(path.read_bytes(), path.name, service.key())
+    detail = problem_of(answer, 422, "invalid-record")
+    assert f"{path.name} cannot be read within" in detail
+    assert "unpacks to more than this service accepts" in detail

@@ -1,5 +1,8 @@
 """Record files with one defect, and the messages of their errors."""
 
+import zlib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -41,3 +44,42 @@ def archived(tmp_path, inputs=("u",), output="y", **arrays):
     with pytest.raises(RecordError) as caught:
         read_record(tmp_path / "bad.npz", inputs, output)
     return str(caught.value)
+
+
+#: Samples of each of two columns of zeros.
+_BOMB_SAMPLES = 1 << 26
+
+
+def write_hdf5_bomb(folder: Path) -> Path:
+    """Write two columns of zeros, one compressed chunk many times."""
+    import h5py
+
+    path, part = folder / "bomb.h5", 1 << 20
+    chunk = zlib.compress(bytes(8 * part), 9)
+    with h5py.File(path, "w") as file:
+        for name in ("u", "y"):
+            column = file.create_dataset(
+                name, (_BOMB_SAMPLES,), "f8", chunks=(part,), compression="gzip", compression_opts=9
+            )
+            for start in range(0, _BOMB_SAMPLES, part):
+                column.id.write_direct_chunk((start,), chunk)
+    return path
+
+
+def write_mat_bomb(folder: Path) -> Path:
+    """Write two columns of zeros as a MAT-file of version 5."""
+    from scipy.io import savemat
+
+    path, zeros = folder / "bomb.mat", np.zeros(_BOMB_SAMPLES)
+    savemat(path, {"u": zeros, "y": zeros}, do_compression=True)
+    return path
+
+
+def write_parquet_bomb(folder: Path) -> Path:
+    """Write two columns of zeros, which Parquet stores as the number of their repetitions."""
+    import pyarrow
+    from pyarrow import parquet
+
+    path, zeros = folder / "bomb.parquet", np.zeros(_BOMB_SAMPLES)
+    parquet.write_table(pyarrow.table({"u": zeros, "y": zeros}), path, compression="zstd")
+    return path

@@ -23,6 +23,7 @@ from islands_api.web.recent_values import RecentValues
 from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
+from islands_service.intake.inspection_limits import count_slots
 from islands_service.outage_log import OutageLog
 from islands_service.outbound.checked_client import CheckedClient, make_checked_client
 from islands_service.settings import ServiceSettings
@@ -36,10 +37,10 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Maximum number of uploads that are inspected at once; each takes a core.
-MAX_CONCURRENT_INSPECTIONS = 2
+#: Number of the largest files that may be inspected at once, as far as there is room for one more.
+MAX_CONCURRENT_INSPECTIONS = 3
 
-#: Maximum number of uploads of one owner that are inspected at once: an inspection may take two minutes.
+#: Maximum number of uploads of one owner that are inspected at once: the owners share the cores.
 MAX_INSPECTIONS_PER_OWNER = 1
 
 #: Maximum number of simulations at once, and of one owner: each takes a core for milliseconds.
@@ -76,9 +77,7 @@ class AppState:
     executor: BlockingExecutor
     outbound: CheckedClient
     tokens: "TokenVerifier | None"
-    inspection_slots: OwnerSlots = field(
-        default_factory=lambda: OwnerSlots(MAX_CONCURRENT_INSPECTIONS, MAX_INSPECTIONS_PER_OWNER)
-    )
+    inspection_slots: OwnerSlots
     figure_slots: OwnerSlots = field(
         default_factory=lambda: OwnerSlots(MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_DRAWINGS)
     )
@@ -131,6 +130,9 @@ async def open_state(
         executor=executor,
         outbound=make_checked_client(settings),
         tokens=tokens,
+        inspection_slots=OwnerSlots(
+            MAX_CONCURRENT_INSPECTIONS * count_slots(settings.max_unpacked), MAX_INSPECTIONS_PER_OWNER
+        ),
     )
     try:
         yield state

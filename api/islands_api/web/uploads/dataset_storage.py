@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import ExitStack, asynccontextmanager
+from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
@@ -11,6 +12,7 @@ from islands_api.web.uploads.uploaded_file import find_stored_suffix, receive
 from islands_service.domain.uploaded_fmu import FMU_SUFFIX
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from islands_service.intake.fmu_inspection import inspect_fmu
+from islands_service.intake.inspection_limits import InspectionLimits, find_limits
 from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
 
@@ -38,14 +40,14 @@ async def read_again(
 
 @asynccontextmanager
 async def open_stored(state: AppState, owner: str, dataset: StoredDataset) -> AsyncIterator[Path]:
-    """Provide the file of a data set to a process that reads it, with a slot of its owner.
+    """Provide the file of a data set to a process that reads it, with slots of its owner.
 
     Raises
     ------
     BlobNotFoundError, ObjectStoreError, StorageFullError
     """
     with ExitStack() as files:
-        async with state.inspection_slots.hold(owner):
+        async with state.inspection_slots.hold(owner, find_limits(dataset.bytes, state.settings).slots):
             held = await state.run_blocking(files.enter_context, state.blobs.hold(dataset.blob))
             yield files.enter_context(link_blob(held, dataset.name))
 
@@ -74,10 +76,9 @@ async def store_dataset(
     ------
     RecordError, QuotaError, PayloadTooLargeError, StorageFullError, ObjectStoreError
     """
-    settings = state.settings
 
-    def inspect(path: Path) -> Awaitable[Mapping[str, Any]]:
-        return inspect_file(path, inspection, settings.inspection_memory, settings.inspection_seconds)
+    def inspect(path: Path, limits: InspectionLimits) -> Awaitable[Mapping[str, Any]]:
+        return inspect_file(path, inspection, limits.memory, state.settings.inspection_seconds)
 
     return await _store(state, caller, file, (name, find_stored_suffix(name)), compressed, inspect, source)
 
@@ -91,11 +92,10 @@ async def store_fmu(
     ------
     ModelError, SettingsError, QuotaError, PayloadTooLargeError, StorageFullError, ObjectStoreError
     """
-    settings = state.settings
 
-    async def inspect(path: Path) -> Mapping[str, Any]:
-        limits = settings.max_unpacked, settings.inspection_memory, settings.inspection_seconds
-        return {"fmu": await inspect_fmu(path, *limits)}
+    async def inspect(path: Path, limits: InspectionLimits) -> Mapping[str, Any]:
+        found = await inspect_fmu(path, limits.unpacked, limits.memory, state.settings.inspection_seconds)
+        return {"fmu": found}
 
     return await _store(state, caller, file, (name, FMU_SUFFIX), compressed, inspect)
 
@@ -106,19 +106,18 @@ async def _store(
     file: IO[bytes],
     named: tuple[str, str],
     compressed: bool,
-    inspect: Callable[[Path], Awaitable[Mapping[str, Any]]],
+    inspect: Callable[[Path, InspectionLimits], Awaitable[Mapping[str, Any]]],
     source: str | None = None,
 ) -> tuple[StoredDataset, bool]:
     settings, owner, by = state.settings, caller.owner, caller.requester
     name, suffix = named
+    limits = find_limits(file.seek(0, SEEK_END), settings)
+    file.seek(0)
     with state.blobs.receiving() as stream:
-        # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
-        async with state.inspection_slots.hold(owner):
-            size, blob = await state.run_blocking(
-                receive, file, stream, name, compressed, settings.max_unpacked
-            )
+        async with state.inspection_slots.hold(owner, limits.slots):
+            size, blob = await state.run_blocking(receive, file, stream, name, compressed, limits.unpacked)
             with link_blob(Path(stream.name), name) as path:
-                preview = await inspect(path)
+                preview = await inspect(path, limits)
             await state.run_blocking(
                 state.store.datasets.check_room,
                 owner,

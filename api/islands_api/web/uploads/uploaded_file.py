@@ -94,7 +94,8 @@ def receive(
             size += len(chunk)
             if size > max_bytes:
                 raise PayloadTooLargeError(
-                    f"{name} has more than {max_bytes / 1e6:.0f} MB after decompression, the maximum here"
+                    f"{name} has more than {max_bytes / 1e6:.0f} MB after decompression, the maximum here "
+                    "for a file of its size: send it uncompressed, or a part of the record"
                 )
             target.write(chunk)
             digest.update(chunk)

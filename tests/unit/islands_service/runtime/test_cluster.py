@@ -64,7 +64,7 @@ def test_all_ports_of_a_local_ray_listen_on_loopback(ray_address):
     from islands_service.runtime.cluster import cluster, ray
 
     with cluster(ray_address):
-        worker = ray.remote(lambda: os.getpid()).options(num_cpus=0.1)
+        worker = ray.remote(lambda: os.getpid()).options(num_cpus=0.1)  # noqa: PLW0108 - no built-in one
         assert ray.get(worker.remote()) in descendants(os.getpid())
         found = listening_addresses({os.getpid(), *descendants(os.getpid())})
     assert len(found) >= 6  # driver, control store, two of the raylet, agent, worker
@@ -74,7 +74,7 @@ def test_all_ports_of_a_local_ray_listen_on_loopback(ray_address):
 def listening_addresses(pids):
     """Return the addresses at which some processes listen for TCP."""
     sockets = {
-        os.readlink(link)
+        str(link.readlink())
         for pid in pids
         for link in Path(f"/proc/{pid}/fd").glob("*")
         if link.is_symlink()  # others were closed in the meantime

@@ -65,6 +65,8 @@ def _translated_errors(file: str) -> Iterator[None]:
         ) from error
     try:
         yield
+    except MemoryError:  # also one of Arrow: the file may be as it should be
+        raise
     except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{file} is damaged or not a Parquet file ({error}): write it again") from error
 

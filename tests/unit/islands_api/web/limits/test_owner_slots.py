@@ -30,9 +30,9 @@ class Requests:
         self.waiting: dict[asyncio.Task[None], str] = {}
         self.served: list[str] = []
 
-    async def _request(self, owner: str) -> None:
+    async def _request(self, owner: str, slots: int) -> None:
         task, ended = asyncio.current_task(), asyncio.Event()
-        async with self.slots.hold(owner):
+        async with self.slots.hold(owner, slots):
             self.waiting.pop(task)
             self.held[task] = owner, ended
             self.served.append(owner)
@@ -41,8 +41,8 @@ class Requests:
             finally:
                 del self.held[task]
 
-    async def arrive(self, owner: str) -> asyncio.Task[None]:
-        task = asyncio.create_task(self._request(owner))
+    async def arrive(self, owner: str, slots: int = 1) -> asyncio.Task[None]:
+        task = asyncio.create_task(self._request(owner, slots))
         self.waiting[task] = owner
         await self.settle()
         return task
@@ -119,6 +119,26 @@ def test_an_owner_holds_no_more_than_its_share():
         for owner in "aab":
             await requests.arrive(owner)
         assert requests.served == ["a", "b"]
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("large", [2, 5, 16])
+def test_small_requests_do_not_wait_for_the_end_of_large_ones(large):
+    """As many large ones are in progress as leave room for another one; it waits for one of their ends."""
+
+    async def run() -> None:
+        requests = Requests(3 * large, 1)
+        for owner in "abcd":
+            await requests.arrive(owner, large)
+        assert requests.served == ["a", "b"]
+        for _ in range(3):
+            await requests.arrive("e")
+        assert requests.served == ["a", "b", "e"]
+        for _ in range(6):
+            await requests.end(0)
+        assert sorted(requests.served) == ["a", "b", "c", "d", "e", "e", "e"]
+        assert not requests.waiting
 
     asyncio.run(run())
 
