@@ -82,21 +82,24 @@ class ServiceSettings(BaseSettings):
     lease
         Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
         one second.
+    turn
+        Time after which a running job lets those of other owners pass, if they have fewer running jobs: it
+        returns to the queue at its next checkpoint, and continues from there at the next turn of its owner.
     short_search
         Estimated time on one core up to which a search runs in the process of its coordinator, instead of on
         Ray. With 0 every search runs on Ray.
     checkpoint_every
         Least time between two checkpoints: about the work that a crash can lose.
     max_upload, max_unpacked
-        Largest upload, and largest size that it may unpack to.
+        Largest upload, and largest size that it may unpack to: 100 times its own, at least 64 MB.
     max_uploads, max_uploads_per_owner
         Uploads in progress, of all owners and of one. The data folder needs room for ``max_uploads`` files of
-        ``max_upload`` bytes and two of ``max_unpacked`` bytes.
+        ``max_upload`` bytes and three of ``max_unpacked`` bytes.
     body_timeout, body_rate
         Longest time without a byte of a request's body, and least bytes per second after that time; a rate of
         0 disables the latter.
     inspection_memory, inspection_seconds
-        Memory and time budget of the process that reads an uploaded file.
+        Memory and time budget of the process that reads an uploaded file; a small file has less memory.
     allow_fmus
         Whether clients may upload FMUs, and simulate them in previews and diagnoses: by default those of a
         service for one user, which needs no key. An FMU is native code; it runs in a process that can do
@@ -195,6 +198,7 @@ class ServiceSettings(BaseSettings):
         default_factory=lambda: min(count_cpus(), DEFAULT_COORDINATORS)
     )
     lease: Annotated[float, Field(ge=1.0)] = 5.0
+    turn: Positive = 30.0
     short_search: Annotated[float, Field(ge=0.0)] = 5.0
     checkpoint_every: Positive = 5.0
     max_upload: Count = 256_000_000

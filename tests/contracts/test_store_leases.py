@@ -374,3 +374,35 @@ def test_released_job_with_a_cancel_request_is_cancelled(store):
     assert job.finished is not None
     assert store.leases.claim("another", LONG) is None
     assert kinds(store, job.id) == ["queued", "running", "cancelling", "cancelled"]
+
+
+def test_a_job_lets_others_pass_until_no_owner_has_a_smaller_share(store):
+    """Whatever the number of jobs that wait."""
+    for _ in range(3):
+        submitted(store, ALICE)
+    mine = [claimed(store), claimed(store)]
+    assert not store.leases.is_turn_over(mine[0])
+    for _ in range(3):
+        submitted(store, BOB)
+    assert store.leases.is_turn_over(mine[0])
+    store.leases.release(mine[0], reason="others")
+    others = claimed(store)
+    assert others.job.owner == BOB
+    assert store.jobs.get(ALICE, mine[0].job.id).progress["note"] == "others"
+    assert not store.leases.is_turn_over(mine[1])
+    assert not store.leases.is_turn_over(others)
+    store.owners.change(BOB, {"weight": 300})
+    assert store.leases.is_turn_over(mine[1])
+
+
+def test_a_job_that_cannot_be_claimed_interrupts_no_other_one(store):
+    submitted(store, BOB)
+    postponed = claimed(store)
+    store.leases.postpone(postponed, "later", LONG)
+    submitted(store, ALICE)
+    mine = claimed(store)
+    assert mine.job.owner == ALICE
+    assert not store.leases.is_turn_over(mine)
+    submitted(store, BOB)
+    assert store.leases.is_turn_over(mine)
+    assert not store.leases.is_turn_over(mine, most_running=0)

@@ -373,9 +373,10 @@ class ProgressReporter:
         self._outage.succeed(job=self._run.job.id)
         self._free_run.confirm()
         self._stored_points = len(summed.history) - 1
+        self._schedule(started)
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)
-        self._schedule(started)
+            self._run.let_others_pass()
         return True
 
     def _schedule(self, started: float) -> None:

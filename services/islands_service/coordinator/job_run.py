@@ -36,6 +36,8 @@ class JobRun:
         Connects this process to the Ray cluster, unless it is connected.
     is_search_stopped : callable
         Returns whether the owner has asked that the search ends with its best models.
+    let_others_pass : callable
+        Called after each checkpoint. Raises the reason if the job should return to the queue now.
     """
 
     lease: Lease
@@ -47,6 +49,7 @@ class JobRun:
     notes: JobNotes
     connect: Callable[[], None]
     is_search_stopped: Stop = never_stop
+    let_others_pass: Callable[[], None] = lambda: None
 
     @property
     def job(self) -> Job:

@@ -64,8 +64,15 @@ RETRY_SECONDS = 0.5
 #: Seconds until a job is tried again that needs an object store which does not answer.
 OBJECT_STORE_PAUSE = 5.0
 
+#: Note of a job that has let others pass.
+OTHERS_PASS = "waits for its next turn: other owners share the service; it continues from its checkpoint"
+
 #: Seconds that the Ray head on this machine may take to start.
 RAY_STARTUP_TIMEOUT = 60.0
+
+
+class TurnOver(IslandsError):  # noqa: N818 - control flow, not an error
+    """Another owner waits that has a smaller share of the coordinators."""
 
 
 class Coordinator:
@@ -108,6 +115,10 @@ class Coordinator:
         self._claim_at = -inf
         self._cluster_outage = OutageLog("no cluster", "cluster back")
         self._store_outage = OutageLog("store unavailable", "store back")
+        self._quotas = {
+            "most_running": settings.max_running,
+            "most_islands": settings.max_running_islands,
+        }
         self._sweeper = Sweeper(settings, self._store, self._blobs, POLL_SECONDS)
 
     def run(self) -> None:
@@ -170,12 +181,7 @@ class Coordinator:
         if not self._store.database.has_changed() and now < self._claim_at:
             return None
         self._claim_at = now  # the next attempt if this one fails
-        lease = self._store.leases.claim(
-            self._name,
-            self._settings.lease,
-            most_running=self._settings.max_running,
-            most_islands=self._settings.max_running_islands,
-        )
+        lease = self._store.leases.claim(self._name, self._settings.lease, **self._quotas)
         self._claim_at = now + CLAIM_SECONDS
         return lease
 
@@ -236,6 +242,7 @@ class Coordinator:
                 notes=notes,
                 connect=connect,
                 is_search_stopped=heartbeat.is_search_stopped,
+                let_others_pass=partial(self._let_others_pass, lease, monotonic() + self._settings.turn),
             )
             return JOB_RUNNERS[lease.job.kind](run)
         except JobCancelled:
@@ -253,6 +260,11 @@ class Coordinator:
         heartbeat.check()
         # A job that runs for days writes a checkpoint every few seconds: delete replaced ones meanwhile.
         self._sweeper.sweep_if_due()
+
+    def _let_others_pass(self, lease: Lease, until: float) -> None:
+        """Raise `TurnOver` after a time at which another owner waits that has a smaller share."""
+        if monotonic() > until and self._store.leases.is_turn_over(lease, **self._quotas):
+            raise TurnOver(f"job {lease.job.id} lets a job of another owner pass")
 
     def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
         """Store the outcome of a job. Retry while the store is unavailable or full: the work is done."""
@@ -273,6 +285,9 @@ class Coordinator:
 
     def _release(self, lease: Lease, _error: Exception) -> None:
         self._give_back(self._store.leases.release, lease)
+
+    def _pass(self, lease: Lease, _error: Exception) -> None:
+        self._give_back(partial(self._store.leases.release, reason=OTHERS_PASS), lease)
 
     def _release_later(self, lease: Lease, error: Exception) -> None:
         """Release a job, and wait for the store before the next claim."""
@@ -406,6 +421,7 @@ INTERRUPTIONS = (
     Interruption(LeaseLostError, "lease-lost", WARNING, "lease lost", Coordinator._leave),
     Interruption(JobDeclinedError, "declined", WARNING, "job declined", Coordinator._decline),
     Interruption(TRANSIENT_ERRORS, "interrupted", ERROR, "job interrupted", Coordinator._postpone),
+    Interruption(TurnOver, "turn-over", INFO, "job lets others pass", Coordinator._pass),
     Interruption(CoordinatorStopping, "stopping", INFO, "job stopped", Coordinator._release),
     Interruption(
         *(ObjectStoreError, "object-store", WARNING, "object store unavailable"),

@@ -56,8 +56,8 @@ class CoordinatorMetrics(Collector):
         )
         self.given_back = Counter(
             "islands_attempts_given_back",
-            "Attempts without an outcome: lease-lost, stopping, declined, interrupted, store, object-store, "
-            "cluster.",
+            "Attempts without an outcome: lease-lost, stopping, turn-over, declined, interrupted, store, "
+            "object-store, cluster.",
             ["reason"],
             registry=self.registry,
         )

@@ -24,7 +24,7 @@ from islands_service.domain.job import (
 )
 from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.job_claims import claim_job
+from islands_service.store.job_rows.job_claims import claim_job, is_turn_over
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document
 from islands_service.store.job_rows.job_results import replace_artefacts, store_result, to_text
 from islands_service.store.job_rows.job_search import describe_result, find_error
@@ -77,6 +77,21 @@ class Leases:
         """
         asked = (coordinator, seconds, version, most_running, most_islands)
         return self._database.write(lambda connection: claim_job(connection, *asked))
+
+    def is_turn_over(
+        self,
+        lease: Lease,
+        version: str = ISLANDS_VERSION,
+        most_running: int | None = None,
+        most_islands: int | None = None,
+    ) -> bool:
+        """Return whether a job that can continue from its checkpoint should let another owner's job pass.
+
+        That is so if an owner has a job that this coordinator could claim, and fewer running jobs, each in
+        relation to its weight. The parameters are those of `claim`.
+        """
+        with self._database.read() as connection:
+            return is_turn_over(connection, lease.job.owner, version, most_running, most_islands)
 
     def renew(self, lease: Lease, seconds: float, ran: float = 0.0) -> Renewal:
         """Extend a lease, and count the run time of its job.
@@ -156,19 +171,21 @@ class Leases:
 
         self._database.write(operation)
 
-    def release(self, lease: Lease, attempted: bool = False) -> None:
+    def release(self, lease: Lease, attempted: bool = False, reason: str = "") -> None:
         """Return a job to the queue, to continue from its checkpoint, or cancel it if that was requested.
 
         Parameters
         ----------
         attempted : bool
             Whether this counts as an attempt, because the cause of the release may occur again.
+        reason : str
+            Shown to the owner as the note of the progress.
 
         Raises
         ------
         LeaseLostError
         """
-        self._database.write(lambda connection: _release(connection, lease, attempted))
+        self._database.write(lambda connection: _release(connection, lease, attempted, reason))
 
     def postpone(self, lease: Lease, reason: str, seconds: float, attempted: bool = True) -> None:
         """Return a job to the queue after a failure that may pass.

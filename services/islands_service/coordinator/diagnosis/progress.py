@@ -94,6 +94,7 @@ class DiagnosisProgress:
             self._checkpoints.supersede(checkpoint)
             self._stored, now = reached, monotonic()
             self._checkpoint_at = now + max(self._run.checkpoint_every, (now - began) / CHECKPOINT_SHARE)
+            self._run.let_others_pass()
 
     def _write_checkpoint(self) -> str | None:
         """Write a checkpoint; return its blob, or None if that is not possible now."""

@@ -54,7 +54,17 @@ _NEXT = func.coalesce(owners.c.virtual_time + literal(STRIDE) // owners.c.weight
 #: Virtual time of the queue.
 _NOW = func.coalesce(select(func.max(owners.c.virtual_time)).scalar_subquery(), 0)
 
+_WEIGHT = func.coalesce(owners.c.weight, DEFAULT_WEIGHT)
+
 _QUEUED = jobs.c.state == JobState.QUEUED
+
+#: Running jobs of an owner, and its weight.
+_SHARE = select(
+    func.count().label("running"),
+    func.coalesce(
+        select(owners.c.weight).where(owners.c.name == bindparam("owner")).scalar_subquery(), DEFAULT_WEIGHT
+    ).label("weight"),
+).where(jobs.c.owner == bindparam("owner"), jobs.c.state == JobState.RUNNING)
 
 
 def _select_waiting() -> CTE:
@@ -84,6 +94,8 @@ def _select_ranked() -> Select[Any]:
             waiting.c.owner.label("name"),
             _NEXT.label("next"),
             _NOW.label("now"),
+            _WEIGHT.label("weight"),
+            func.coalesce(running.c.count, 0).label("running"),
             islands.label("islands"),
             most_islands.label("most_islands"),
         )
@@ -101,9 +113,8 @@ def _select_backlogs() -> Select[Any]:
     waiting = (
         select(jobs.c.owner, func.count().label("count")).where(_QUEUED).group_by(jobs.c.owner).subquery()
     )
-    weight = func.coalesce(owners.c.weight, DEFAULT_WEIGHT)
     return select(
-        waiting.c.owner.label("name"), _NEXT.label("next"), _NOW.label("now"), weight, waiting.c.count
+        waiting.c.owner.label("name"), _NEXT.label("next"), _NOW.label("now"), _WEIGHT, waiting.c.count
     ).outerjoin(owners, owners.c.name == waiting.c.owner)
 
 
@@ -141,6 +152,18 @@ def has_room(turn: Row[Any], islands: int) -> bool:
     A job with more islands than the quota, which was lowered after the submission, runs alone.
     """
     return turn.most_islands is None or turn.islands == 0 or turn.islands + islands <= turn.most_islands
+
+
+def list_deprived(
+    connection: Connection, owner: str, most_running: int | None, most_islands: int | None
+) -> list[Row[Any]]:
+    """Return the owners with queued jobs that have fewer running jobs for their weight than an owner.
+
+    The quotas are those of `rank_owners`, and so are the order and the rows.
+    """
+    own = connection.execute(_SHARE, {"owner": owner}).one()
+    with rank_owners(connection, most_running, most_islands) as turns:
+        return [turn for turn in turns if turn.running * own.weight < own.running * turn.weight]
 
 
 def charge_owner(connection: Connection, turn: Row[Any]) -> None:

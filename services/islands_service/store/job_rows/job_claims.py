@@ -9,7 +9,7 @@ from sqlalchemy import Connection, Row, Select, String, and_, bindparam, func, o
 from islands_service.domain.job import JobState, Lease
 from islands_service.store.backends import dialect
 from islands_service.store.backends.dialect import now
-from islands_service.store.job_rows.fair_queue import charge_owner, has_room, rank_owners
+from islands_service.store.job_rows.fair_queue import charge_owner, has_room, list_deprived, rank_owners
 from islands_service.store.job_rows.job_events import append_event, job_from_row, read_document, update_job
 from islands_service.store.job_rows.monitor_records import IS_NEXT_RECORD
 from islands_service.store.tables import jobs
@@ -72,6 +72,17 @@ def claim_job(
                 else:
                     break
     return None
+
+
+def is_turn_over(
+    connection: Connection, owner: str, version: str, most_running: int | None, most_islands: int | None
+) -> bool:
+    """Return whether another owner has a job that can be claimed; see `Leases.is_turn_over`."""
+    return any(
+        (found := _select_queued(connection, turn.name, version, locked=False)) is not None
+        and has_room(turn, found.islands)
+        for turn in list_deprived(connection, owner, most_running, most_islands)
+    )
 
 
 def _select_lost(connection: Connection, coordinator: str, seconds: float) -> Row[Any] | None:

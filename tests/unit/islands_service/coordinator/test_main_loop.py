@@ -45,7 +45,7 @@ from support.coordinators import (
 )
 from support.processes import eventually
 from support.service import held
-from support.stores import ALICE, child
+from support.stores import ALICE, BOB, child
 
 Found = tuple[list[Any], list[Any]]
 
@@ -248,6 +248,32 @@ def test_coordinator_keeps_the_quotas_of_its_settings(
         Coordinator(changed, name, StopRequest())._claim_next()
     assert [name for name, _ in claims] == ["one", "three"]
     assert {claimed for _, claimed in claims} == {job.id, second.id}
+
+
+@pytest.mark.ci
+def test_jobs_of_two_owners_take_turns_and_each_has_the_result_of_one_process(
+    store: Store, job: Job, settings: ServiceSettings, undisturbed: Found
+) -> None:
+    """One coordinator is enough, whatever the duration of the job that came first."""
+    mine = store.datasets.get(ALICE, job.datasets[0])
+    content = mine.name, mine.suffix, mine.blob, mine.bytes, mine.preview
+    dataset, _ = store.datasets.add(BOB, *content)
+    other = store.jobs.submit(Submission(BOB, {**job.spec, "dataset": dataset.id}))[0]
+    shared = settings.model_copy(update={"turn": 0.2, "checkpoint_every": 1e-9})
+    stopping = StopRequest()
+    thread = Thread(target=SerialCoordinator(shared, "me", stopping).run)
+    with structlog.testing.capture_logs() as logs:
+        thread.start()
+        try:
+            eventually(lambda: store.jobs.get(BOB, other.id).finished is not None, seconds=120.0)
+            wait_until_finished(store, job)
+        finally:
+            stopping.request()
+            thread.join(30.0)
+    for done in (store.jobs.get(ALICE, job.id), store.jobs.get(BOB, other.id)):
+        assert (done.state, done.attempt) == (JobState.SUCCEEDED, 1)
+        assert [model.document for model in store.results.models(done.id)] == undisturbed[0]
+    assert [each["event"] for each in logs].count("job lets others pass") > 1
 
 
 @pytest.mark.ci
