@@ -35,6 +35,7 @@ def main() -> int:
         settings = service_settings()
         configure_logs(settings.log_format, "api")
         store = Store(settings.url)
+        store.database.reserve.fill()
         install_admin_key(settings, store)
         check_safe(settings, store)
         open_blobs(settings).check_settings()

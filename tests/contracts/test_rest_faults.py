@@ -64,6 +64,23 @@ def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
         assert not list(service.settings.blobs.glob("*.part"))
 
 
+@pytest.mark.ci
+def test_a_client_frees_space_of_a_full_disk(disk, serve):
+    """Deletions, cancellations and revocations use a reserve, and leave it for the next ones."""
+    with serve(disk) as service:
+        service.store.database.reserve.fill()
+        dataset = service.upload(csv()).json()["id"]
+        filled(disk)
+        accepted = []
+        while (answer := service.submit(**spec(dataset, name="x" * 200, seed=len(accepted)))).is_success:
+            accepted.append(f"/v1/jobs/{answer.json()['id']}")
+        problem_of(answer, 507, "storage-full")
+        for job in accepted:
+            assert service.client.post(f"{job}/cancel").json()["state"] == "cancelled"
+            assert service.client.delete(job).status_code == 204
+        assert service.client.delete(f"/v1/datasets/{dataset}").status_code == 204
+
+
 @pytest.mark.nightly
 def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
     with serve(disk) as service:

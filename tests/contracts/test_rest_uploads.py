@@ -214,7 +214,7 @@ def test_a_small_record_does_not_wait_for_large_ones_of_others(service):
     state, headers = service.app.state.islands, service.key()
     largest = count_slots(state.settings.max_unpacked)
 
-    async def upload_beside_large_ones():
+    async def upload_during_large_ones():
         async with state.inspection_slots.hold("a", largest), state.inspection_slots.hold("b", largest):
             return await asyncio.to_thread(
                 service.client.post,
@@ -224,7 +224,7 @@ def test_a_small_record_does_not_wait_for_large_ones_of_others(service):
                 timeout=20.0,
             )
 
-    assert asyncio.run(upload_beside_large_ones()).status_code == 201
+    assert asyncio.run(upload_during_large_ones()).status_code == 201
 
 
 @pytest.mark.ci

@@ -150,6 +150,12 @@ class Heartbeat:
         """Mark the computation as complete: from now on neither a cancellation nor a limit ends the job."""
         self._completed = True
 
+    def pause(self, seconds: float) -> None:
+        """Wait, or until the coordinator stops. The time does not count as run time."""
+        began = monotonic()
+        self._stopping.wait(seconds)
+        self._counted_until += monotonic() - began
+
     def observe_islands(self, placed: int, waiting: int) -> None:
         """Exclude from the run time the time in which all islands wait for a CPU of the cluster.
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from math import isfinite
 from sys import maxsize
-from time import monotonic, sleep
+from time import monotonic
 from typing import Any
 
 from islands.data.coupled_record import couple, split_coupled
@@ -346,11 +346,14 @@ class ProgressReporter:
     def flush(self) -> None:
         """Store the last state. Retry while the store is unavailable, unless the job is cancelled."""
         self._stage |= {"phase": STORING, "seconds_left": None}
-        while self._last is not None and not self._report(*self._last, False) and not self._stop():
-            sleep(REPORT_EVERY)
+        while self._last is not None and (error := self._report(*self._last, False)) is not None:
+            self._stop()
+            self._run.pause(error)
 
-    def _report(self, state: SearchState, settings: Settings, searching: bool = True) -> bool:
-        """Store the progress of the search, or after it; return whether the store accepted it."""
+    def _report(
+        self, state: SearchState, settings: Settings, searching: bool = True
+    ) -> StoreError | ClusterError | None:
+        """Store the progress of the search, or after it; return the error if the store refuses it."""
         started = monotonic()
         summed = sum_searches(state)
         points, after = self._points(summed)
@@ -369,15 +372,16 @@ class ProgressReporter:
             if report.checkpoint is not None:
                 self._checkpoints.remember(report.checkpoint)
             self._schedule(started)
-            return False
+            return error
         self._outage.succeed(job=self._run.job.id)
         self._free_run.confirm()
         self._stored_points = len(summed.history) - 1
         self._schedule(started)
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)
-            self._run.let_others_pass()
-        return True
+            if searching:
+                self._run.let_others_pass()
+        return None
 
     def _schedule(self, started: float) -> None:
         """Set the times of the next report and, if one was due, of the next checkpoint."""

@@ -8,7 +8,7 @@ import structlog
 
 from islands_service.domain.job import Lease, ProgressReport
 from islands_service.store import Store
-from islands_service.store.database import StoreError
+from islands_service.store.database import StorageFullError, StoreError
 
 log = structlog.get_logger()
 
@@ -17,6 +17,13 @@ SHOWN_SECONDS = 60.0
 
 #: Beginning of the message that actors wait for CPUs; see `islands_service.runtime.actor_pool`.
 WAITING = "waiting for capacity"
+
+#: Phase and note of a job whose result does not fit on the disk.
+WAITING_FOR_DISK = "waiting for disk space"
+DISK_NOTE = (
+    "the result is stored as soon as the disk of the service has room: delete jobs or data sets, or tell the "
+    "operator; this time does not count as run time"
+)
 
 
 class JobNotes:
@@ -31,7 +38,7 @@ class JobNotes:
     def __init__(self, lease: Lease, store: Store) -> None:
         self._lease, self._store = lease, store
         self._progress: Mapping[str, Any] = lease.job.progress or {}
-        self._message, self._until = "", 0.0
+        self._message, self._until, self._waits = "", 0.0, False
 
     def add(self, message: str, _fraction: float | None = None, /) -> None:
         """Log a message and store it; a progress callback."""
@@ -45,6 +52,16 @@ class JobNotes:
         self._progress = {name: value for name, value in self._progress.items() if name != "note"}
         self._try_report({"phase": phase})
 
+    def wait_for_store(self, error: Exception) -> None:
+        """Store once that the result is computed and waits for room on a full disk, as far as that works."""
+        if self._waits or not isinstance(error, StorageFullError):
+            return
+        try:
+            self.report({"phase": WAITING_FOR_DISK, "note": DISK_NOTE}, urgent=True)
+            self._waits = True
+        except StoreError as refusal:
+            log.warning("report failed", job=self._lease.job.id, reason=str(refusal))
+
     def _try_report(self, changes: Mapping[str, Any]) -> None:
         """Store the last progress with changes, unless the store is unavailable."""
         try:
@@ -53,7 +70,7 @@ class JobNotes:
             # The next report of the search contains the message.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
 
-    def report(self, changes: Mapping[str, Any]) -> None:
+    def report(self, changes: Mapping[str, Any], urgent: bool = False) -> None:
         """Store the last progress with changes, and without its time left, which is that of the last report.
 
         Raises
@@ -61,7 +78,7 @@ class JobNotes:
         StoreError
         """
         reached = {name: value for name, value in self._progress.items() if name != "seconds_left"}
-        self._store.leases.report(self._lease, ProgressReport({**reached, **changes}))
+        self._store.leases.report(self._lease, ProgressReport({**reached, **changes}), urgent)
 
     def complete(self, progress: Mapping[str, Any]) -> dict[str, Any]:
         """Return a new progress of the job with the last message, unless that is old."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from time import sleep
 from typing import TYPE_CHECKING
 
 from islands.progress import Stop, never_stop
@@ -13,6 +14,9 @@ from islands_service.store.datasets import StoredDataset
 
 if TYPE_CHECKING:
     from islands.evolution.engine import Engine
+
+#: Seconds between two attempts to write to a store that is unavailable or full.
+RETRY_SECONDS = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +42,8 @@ class JobRun:
         Returns whether the owner has asked that the search ends with its best models.
     let_others_pass : callable
         Called after each checkpoint. Raises the reason if the job should return to the queue now.
+    pause : callable
+        Waits after the store has refused the result, before it is tried again.
     """
 
     lease: Lease
@@ -50,6 +56,7 @@ class JobRun:
     connect: Callable[[], None]
     is_search_stopped: Stop = never_stop
     let_others_pass: Callable[[], None] = lambda: None
+    pause: Callable[[Exception], None] = lambda _error: sleep(RETRY_SECONDS)
 
     @property
     def job(self) -> Job:

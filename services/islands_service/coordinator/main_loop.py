@@ -8,7 +8,7 @@ from functools import partial
 from logging import ERROR, INFO, WARNING
 from math import inf
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import structlog
 
@@ -23,7 +23,7 @@ from islands_service.coordinator.job_failures import (
     make_problem_document,
 )
 from islands_service.coordinator.job_notes import JobNotes
-from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.job_run import RETRY_SECONDS, JobRun
 from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
@@ -58,9 +58,6 @@ CLAIM_SECONDS = 1.0
 #: Seconds without a job after which a process that has run jobs ends. Kernels, libraries and Ray keep 150 MB.
 IDLE_SECONDS = 10.0
 
-#: Seconds between two attempts to reach an unavailable store.
-RETRY_SECONDS = 0.5
-
 #: Seconds until a job is tried again that needs an object store which does not answer.
 OBJECT_STORE_PAUSE = 5.0
 
@@ -69,6 +66,13 @@ OTHERS_PASS = "waits for its next turn: other owners share the service; it conti
 
 #: Seconds that the Ray head on this machine may take to start.
 RAY_STARTUP_TIMEOUT = 60.0
+
+
+class QuotaDefaults(TypedDict):
+    """Quotas of running jobs, and of their islands, of an owner for which none were set."""
+
+    most_running: int | None
+    most_islands: int | None
 
 
 class TurnOver(IslandsError):  # noqa: N818 - control flow, not an error
@@ -115,10 +119,9 @@ class Coordinator:
         self._claim_at = -inf
         self._cluster_outage = OutageLog("no cluster", "cluster back")
         self._store_outage = OutageLog("store unavailable", "store back")
-        self._quotas = {
-            "most_running": settings.max_running,
-            "most_islands": settings.max_running_islands,
-        }
+        self._quotas = QuotaDefaults(
+            most_running=settings.max_running, most_islands=settings.max_running_islands
+        )
         self._sweeper = Sweeper(settings, self._store, self._blobs, POLL_SECONDS)
 
     def run(self) -> None:
@@ -208,8 +211,9 @@ class Coordinator:
                     self._abandon,
                     self._settings.max_run_seconds,
                 ) as heartbeat:
-                    outcome = self._run_job(lease, heartbeat)
-                    self._finish(lease, outcome, heartbeat)
+                    notes = JobNotes(lease, self._store)
+                    outcome = self._run_job(lease, heartbeat, notes)
+                    self._finish(lease, outcome, heartbeat, notes)
                 self._metrics.finished.labels(lease.job.kind, outcome.state).inc()
                 log.info("job finished", state=outcome.state, seconds=round(monotonic() - started, 3))
             except Exception as error:
@@ -223,10 +227,9 @@ class Coordinator:
             finally:
                 self._ran_at = monotonic()
 
-    def _run_job(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
+    def _run_job(self, lease: Lease, heartbeat: Heartbeat, notes: JobNotes) -> JobOutcome:
         try:
             heartbeat.check()
-            notes = JobNotes(lease, self._store)
             if not self._prepared:
                 notes.begin("loading the library")
             self._prepare()
@@ -242,6 +245,7 @@ class Coordinator:
                 notes=notes,
                 connect=connect,
                 is_search_stopped=heartbeat.is_search_stopped,
+                pause=partial(self._pause, notes, heartbeat),
                 let_others_pass=partial(self._let_others_pass, lease, monotonic() + self._settings.turn),
             )
             return JOB_RUNNERS[lease.job.kind](run)
@@ -266,7 +270,12 @@ class Coordinator:
         if monotonic() > until and self._store.leases.is_turn_over(lease, **self._quotas):
             raise TurnOver(f"job {lease.job.id} lets a job of another owner pass")
 
-    def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
+    def _pause(self, notes: JobNotes, heartbeat: Heartbeat, error: Exception) -> None:
+        """Wait after the store has refused the result of a job, and say so."""
+        notes.wait_for_store(error)
+        heartbeat.pause(RETRY_SECONDS)
+
+    def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat, notes: JobNotes) -> None:
         """Store the outcome of a job. Retry while the store is unavailable or full: the work is done."""
         heartbeat.complete()
         outage = OutageLog("cannot finish yet", "job can be finished")
@@ -276,7 +285,7 @@ class Coordinator:
             except StoreError as error:
                 outage.fail(error)
                 heartbeat.check()
-                self._stopping.wait(RETRY_SECONDS)
+                self._pause(notes, heartbeat, error)
             else:
                 return outage.succeed()
 

@@ -70,6 +70,7 @@ class Sweeper:
         return True
 
     def _sweep(self) -> None:
+        self._store.database.reserve.fill()
         retention = self._store.retention
         if self._settings.retention:
             retention.delete_expired(self._settings.retention)

@@ -11,7 +11,7 @@ from islands_service.settings import ServiceSettings
 #: Largest ratio of unpacked to received bytes. Text of measured values has 3 to 30, constant columns more.
 EXPANSION = 100
 
-#: Bytes that every file may unpack to, and that a slot of inspections stands for.
+#: Bytes that every file may unpack to: the unit of the slots of inspections.
 SLOT_BYTES = 64_000_000
 
 #: Bytes of address space of the interpreter and the libraries of a reader.

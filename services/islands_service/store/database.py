@@ -22,6 +22,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 from islands.errors import IslandsError
 from islands_service.store.backends import dialect
 from islands_service.store.backends.connections import make_engine
+from islands_service.store.backends.disk_reserve import DiskReserve
 
 T = TypeVar("T")
 
@@ -86,6 +87,7 @@ class Database:
     def __init__(self, url: str) -> None:
         self.url = url
         self.engine = make_engine(url)
+        self.reserve = DiskReserve(url)
         self._writing = self.engine.execution_options(writes=True)
         self._patient = self.engine.execution_options(patient=True)
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
@@ -125,11 +127,17 @@ class Database:
         with translate_db_errors(), self.engine.begin() as connection:
             yield connection
 
-    def write(self, operation: Callable[[Connection], T]) -> T:
+    def write(self, operation: Callable[[Connection], T], urgent: bool = False) -> T:
         """Run an operation in a transaction; return its value once the transaction is durable.
 
         An error of the operation is raised here, and rolls back only the work of this operation. The
         operation must have no effect but that on the database, since it is repeated if another one fails.
+
+        Parameters
+        ----------
+        urgent : bool
+            Whether the operation may use the reserve of a full disk: it deletes or ends something, or states
+            that a job waits for the disk.
 
         Raises
         ------
@@ -140,6 +148,15 @@ class Database:
         StoreError
             The database is closed.
         """
+        try:
+            return self._write(operation)
+        except StorageFullError:
+            if not urgent:
+                raise
+        with self.reserve.release():
+            return self._write(operation)
+
+    def _write(self, operation: Callable[[Connection], T]) -> T:
         done: Future[T] = Future()
         with self._lock:
             self._check_open()

@@ -245,7 +245,7 @@ class Datasets:
             delete_unused_datasets(connection, owner)
             record_change(connection, Action.DELETE_DATASET, owner, dataset, by)
 
-        self._database.write(operation)
+        self._database.write(operation, urgent=True)
 
 
 def dataset_id(blob: str, suffix: str, reading: Mapping[str, Any] | None = None) -> str:

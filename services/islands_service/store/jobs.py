@@ -271,7 +271,7 @@ class Jobs:
             record_change(connection, action, row.owner, job, by)
             return job_from_row(row)
 
-        return self._database.write(operation)
+        return self._database.write(operation, urgent=True)
 
     def stop(self, owner: str, job: str, by: Requester | None = None) -> Job:
         """Request that the search of a job ends with its best models; a repeated request has no effect.
@@ -357,7 +357,7 @@ class Jobs:
             delete_job(connection, current)
             record_change(connection, Action.DELETE, owner, job, by)
 
-        self._database.write(operation)
+        self._database.write(operation, urgent=True)
 
     def versions(self, of: Sequence[str]) -> dict[str, int]:
         """Return the versions of jobs. One query finds the changes for all watching clients."""

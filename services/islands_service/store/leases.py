@@ -147,14 +147,19 @@ class Leases:
             found = connection.execute(query).one_or_none()
         return (False, False) if found is None else (bool(found[0]), bool(found[1]))
 
-    def report(self, lease: Lease, report: ProgressReport) -> Job:
+    def report(self, lease: Lease, report: ProgressReport, urgent: bool = False) -> Job:
         """Store progress, history points and checkpoint of a job: all together or none of them.
+
+        Parameters
+        ----------
+        urgent : bool
+            See `Database.write`.
 
         Raises
         ------
         LeaseLostError
         """
-        return self._database.write(lambda connection: _report(connection, lease, report))
+        return self._database.write(lambda connection: _report(connection, lease, report), urgent)
 
     def count_attempt(self, lease: Lease, change: int) -> None:
         """Change the number of attempts of a job without a checkpoint. This is no event.

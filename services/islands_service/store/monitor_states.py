@@ -224,7 +224,7 @@ class Monitors:
                 cancel_job(connection, job)
             record_change(connection, Action.DELETE_MONITOR, owner, monitor, by)
 
-        self._database.write(operation)
+        self._database.write(operation, urgent=True)
 
     def statistics(self) -> MonitorStatistics:
         """Return statistics of the monitors of all owners."""

@@ -51,7 +51,7 @@ class Retention:
             connection.execute(delete(retired_keys).where(retired_keys.c.finished < now() - seconds))
             delete_unused_datasets(connection)
 
-        self._database.write(operation)
+        self._database.write(operation, urgent=True)
         return deleted
 
     def expire_datasets(self, seconds: int) -> int:
@@ -102,13 +102,13 @@ class Retention:
             for first in range(0, len(names), DATASETS_AT_ONCE):
                 some = datasets.c.id.in_(names[first : first + DATASETS_AT_ONCE])
                 order = update(datasets).where(*of_owner, *conditions, some).values(values)
-                changed += self._database.write(partial(_change_datasets, order, owner))
+                changed += self._database.write(partial(_change_datasets, order, owner), urgent=True)
             return changed
 
         change(restarted, idle_since=None)
         change(started, idle_since=now())
         if seconds:
-            self._database.write(partial(delete_unused_datasets, owner=owner))
+            self._database.write(partial(delete_unused_datasets, owner=owner), urgent=True)
         return change(waiting, datasets.c.idle_since < now() - seconds, deleted=now())
 
     def delete_old_audit(self, seconds: float) -> None:
@@ -123,7 +123,9 @@ class Retention:
         # The condition is repeated: a job may be resumed after it was selected.
         some = delete(key.table).where(old, key.in_(select(key).where(old).limit(at_once))).returning(key)
         deleted = 0
-        while found := len(self._database.write(lambda connection: connection.execute(some).all())):
+        while found := len(
+            self._database.write(lambda connection: connection.execute(some).all(), urgent=True)
+        ):
             deleted += found
             if found < at_once:
                 break

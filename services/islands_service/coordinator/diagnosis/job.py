@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from time import sleep
 from typing import TypeVar
 
 from islands.diagnosis.interim_findings import InterimFindings
@@ -35,9 +34,6 @@ from islands_service.store.database import StoreError
 
 A = TypeVar("A")
 R = TypeVar("R")
-
-#: Seconds between two attempts to store what a diagnosis has found.
-_RETRY_SECONDS = 1.0
 
 
 def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobOutcome:
@@ -113,7 +109,7 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         made |= _make_artefacts(found, steps)
         for name, data in made.items():
             if data is not None:
-                artefacts[name] = _keep(data, run.blobs, run.check)
+                artefacts[name] = _keep(data, run.blobs, run.check, run.pause)
         ended = JobState.SUCCEEDED
     except JobCancelled:
         so_far = interim.make_diagnosis(spec.seed)
@@ -146,7 +142,7 @@ def _map_on_ray(run: JobRun) -> ParallelMap:
     return map_on_ray
 
 
-def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
+def _keep(data: bytes, blobs: Blobs, check: Callable[[], None], pause: Callable[[StoreError], None]) -> str:
     """Store a blob. Retry while the store is unavailable: the work is done."""
     outage = OutageLog("cannot store yet", "stored")
     while True:
@@ -155,7 +151,7 @@ def _keep(data: bytes, blobs: Blobs, check: Callable[[], None]) -> str:
         except StoreError as error:
             outage.fail(error)
             check()
-            sleep(_RETRY_SECONDS)
+            pause(error)
         else:
             outage.succeed()
             return blob

@@ -156,7 +156,7 @@ class Deliveries:
             late = update(deliveries).where(unfinished, changed > now() + 1.0)
             connection.execute(late.values(next_at=now()))
 
-        self._database.write(operation)
+        self._database.write(operation, urgent=True)
 
 
 def delivery_from_row(row: Row[Any]) -> Delivery:

@@ -201,7 +201,7 @@ class Keys:
             record_change(connection, Action.REVOKE_KEY, row.owner, key, by)
             return _make_key(row)
 
-        return self._database.write(operation)
+        return self._database.write(operation, urgent=True)
 
     def any_valid(self) -> bool:
         """Return whether at least one key is valid."""

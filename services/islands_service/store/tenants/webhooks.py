@@ -111,7 +111,7 @@ class Webhooks:
             connection.execute(delete(webhooks).where(webhooks.c.id == webhook))
             record_change(connection, Action.DELETE_WEBHOOK, owner, webhook, by)
 
-        self._database.write(operation)
+        self._database.write(operation, urgent=True)
 
     def deliveries(self, owner: str, webhook: str, most: int = 100) -> tuple[Delivery, ...]:
         """Return the last deliveries of a webhook, newest first.

@@ -6,7 +6,7 @@ import signal
 import time
 from collections.abc import Callable
 from threading import Thread
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 import structlog
@@ -120,12 +120,15 @@ def test_job_with_a_lost_lease_is_left_to_its_new_owner(
 class Full(SerialCoordinator):
     """A coordinator whose store is full for some attempts to store an outcome."""
 
+    phases: ClassVar[list[str]] = []
+
     def run(self) -> None:
         finish = self._store.leases.finish
         self.tries = 0
 
         def full(lease: Lease, outcome: JobOutcome) -> None:
             self.tries += 1
+            self.phases.append((self._store.jobs.get(ALICE, lease.job.id).progress or {}).get("phase", ""))
             if self.tries == 2:
                 self._store.jobs.cancel(ALICE, lease.job.id)
             if self.tries < 8:
@@ -139,14 +142,20 @@ class Full(SerialCoordinator):
 def test_outcome_is_stored_as_soon_as_the_disk_has_space(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The job is not run again: it is one attempt, and a cancel request in the meantime is too late."""
+    """The job is not run again: it is one attempt, and a cancel request in the meantime is too late.
+
+    Its phase is that of the wait, which is no run time.
+    """
     replace_runner(monkeypatch, lambda _run: DONE)
-    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.1)
+    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.2)
+    began = time.monotonic()
     with structlog.testing.capture_logs() as logs:
         coordinator(Full)
         ended = wait_until_finished(store, job)
         eventually(lambda: any(entry["event"] == "job finished" for entry in logs))
     assert (ended.state, ended.attempt, ended.summary) == (JobState.SUCCEEDED, 1, {"done": True})
+    assert set(Full.phases[1:]) == {"waiting for disk space"}
+    assert ended.run_seconds < 0.5 * (time.monotonic() - began)
     logged = [entry["event"] for entry in logs if "finish" in entry["event"]]
     assert logged == ["cannot finish yet", "job can be finished", "job finished"]
 

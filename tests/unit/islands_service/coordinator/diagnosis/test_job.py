@@ -200,8 +200,7 @@ def test_failed_reports_do_not_affect_the_result(store: Store, blobs: Blobs, sub
     assert phases(store, job) == []
 
 
-def test_finished_work_waits_for_an_object_store_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(diagnosis_job, "_RETRY_SECONDS", 0.0)
+def test_finished_work_waits_for_an_object_store_that_is_away() -> None:
     failures = [ObjectStoreError("away")] * 3
 
     class Away:
@@ -211,7 +210,7 @@ def test_finished_work_waits_for_an_object_store_that_is_away(monkeypatch: pytes
             return data.decode()
 
     with structlog.testing.capture_logs() as logs:
-        assert diagnosis_job._keep(b"report", Away(), lambda: None) == "report"  # type: ignore[arg-type]
+        assert diagnosis_job._keep(b"report", Away(), lambda: None, lambda _: None) == "report"  # type: ignore[arg-type]
     assert [entry["event"] for entry in logs] == ["cannot store yet", "stored"]
 
     def cancel() -> None:
@@ -219,4 +218,4 @@ def test_finished_work_waits_for_an_object_store_that_is_away(monkeypatch: pytes
 
     failures.append(ObjectStoreError("away"))
     with pytest.raises(JobCancelled):
-        diagnosis_job._keep(b"report", Away(), cancel)  # type: ignore[arg-type]
+        diagnosis_job._keep(b"report", Away(), cancel, lambda _: None)  # type: ignore[arg-type]
