@@ -18,6 +18,7 @@ from sqlalchemy import (
 )
 
 from islands_service.domain.owner import DEFAULT_WEIGHT, QUOTA_NAMES
+from islands_service.store.backends.compressed_text import CompressedText
 
 #: Constraints are named, because a migration cannot change an unnamed one.
 metadata = MetaData(
@@ -134,7 +135,7 @@ events = Table(
     _job(),
     Column("number", BigInteger, primary_key=True),
     Column("kind", String(16), nullable=False),
-    Column("data", Text, nullable=False),
+    Column("data", CompressedText, nullable=False),
     Column("at", Float, nullable=False),
 )
 
@@ -149,15 +150,15 @@ points = Table(
     Column("islands", Text, nullable=False),
 )
 
-results = Table("results", metadata, _job(), Column("document", Text, nullable=False))
+results = Table("results", metadata, _job(), Column("document", CompressedText, nullable=False))
 
 models = Table(
     "models",
     metadata,
     _job(),
     Column("rank", Integer, primary_key=True),
-    Column("document", Text, nullable=False),
-    Column("file", Text, nullable=False),
+    Column("document", CompressedText, nullable=False),
+    Column("file", CompressedText, nullable=False),
 )
 
 #: Blobs derived from a result, such as figures, by name.
