@@ -2,7 +2,10 @@
 
 import shutil
 import sqlite3
+import tempfile
 from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -10,7 +13,8 @@ from islands_service.domain.job import ProgressReport
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError
-from support.disks import filled
+from support.databases import server
+from support.disks import filled, mounted
 from support.processes import eventually, kill
 from support.stores import (
     ALICE,
@@ -265,3 +269,20 @@ def test_full_disk_refuses_new_blobs_and_keeps_existing_ones(disk):
     large = blobs.write(bytes(150_000))
     assert {blob for blob, _ in blobs.all()} == {kept, small, large}
     assert blobs.read(kept) == b"kept" * 1000
+
+
+@pytest.mark.nightly
+def test_full_disk_of_postgresql_loses_no_job_and_the_store_recovers(monkeypatch):
+    with TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)  # the account of the server has to enter it
+        with mounted(Path(folder) / "disk", 150_000_000, mode="0777") as full:
+            monkeypatch.setattr(tempfile, "tempdir", str(full))
+            with server(max_wal_size="48MB") as running, Store(running.url) as store:
+                jobs = [submitted(store) for _ in range(3)]
+                filler = filled(full)
+                assert "make room" in str(until_full(store, jobs))
+                assert store.jobs.get(ALICE, jobs[1].id) == jobs[1]
+                filler.unlink()
+                jobs.append(submitted(store, spec={"text": "x" * 20_000}))
+                kept = {each.id for each in store.jobs.page(ALICE, limit=200).jobs}
+                assert kept == {each.id for each in jobs}
