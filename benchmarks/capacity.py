@@ -39,7 +39,7 @@ class ManyJobs:
     memory_actor: float = _option(300, "MB of an actor, measured: a process and its caches")
     record_kb: float = _option(4_500, "kB of the record of a job and of its reading, measured")
     result_kb: float = _option(150, "kB of blobs that a finished job keeps, measured")
-    database_kb: float = _option(130, "kB of a finished job in the database, measured")
+    database_kb: float = _option(120, "kB of a finished job in the database, measured")
     checkpoint_kb: float = _option(150, "kB of checkpoints of a running job, measured")
     retention: float = _option(90, "days that a finished job is kept (ISLANDS_RETENTION)")
     requests: float = _option(10, "requests of a job in addition to those of its duration: upload to report")
