@@ -83,8 +83,9 @@ class ServiceSettings(BaseSettings):
         Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
         one second.
     turn
-        Time after which a running job lets those of other owners pass, if they have fewer running jobs: it
-        returns to the queue at its next checkpoint, and continues from there at the next turn of its owner.
+        Time from the first checkpoint of a running job after which it lets those of other owners pass, if
+        they have fewer running jobs: it returns to the queue at its next checkpoint, and continues from there
+        at the next turn of its owner.
     short_search
         Estimated time on one core up to which a search runs in the process of its coordinator, instead of on
         Ray. With 0 every search runs on Ray.

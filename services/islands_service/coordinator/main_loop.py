@@ -27,6 +27,7 @@ from islands_service.coordinator.job_run import RETRY_SECONDS, JobRun
 from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
+from islands_service.coordinator.turn import Turn, TurnOver
 from islands_service.domain.job import (
     Job,
     JobOutcome,
@@ -73,10 +74,6 @@ class QuotaDefaults(TypedDict):
 
     most_running: int | None
     most_islands: int | None
-
-
-class TurnOver(IslandsError):  # noqa: N818 - control flow, not an error
-    """Another owner waits that has a smaller share of the coordinators."""
 
 
 class Coordinator:
@@ -246,7 +243,9 @@ class Coordinator:
                 connect=connect,
                 is_search_stopped=heartbeat.is_search_stopped,
                 pause=partial(self._pause, notes, heartbeat),
-                let_others_pass=partial(self._let_others_pass, lease, monotonic() + self._settings.turn),
+                let_others_pass=Turn(
+                    self._settings.turn, partial(self._store.leases.is_turn_over, lease, **self._quotas)
+                ).end_if_over,
             )
             return JOB_RUNNERS[lease.job.kind](run)
         except JobCancelled:
@@ -264,11 +263,6 @@ class Coordinator:
         heartbeat.check()
         # A job that runs for days writes a checkpoint every few seconds: delete replaced ones meanwhile.
         self._sweeper.sweep_if_due()
-
-    def _let_others_pass(self, lease: Lease, until: float) -> None:
-        """Raise `TurnOver` after a time at which another owner waits that has a smaller share."""
-        if monotonic() > until and self._store.leases.is_turn_over(lease, **self._quotas):
-            raise TurnOver(f"job {lease.job.id} lets a job of another owner pass")
 
     def _pause(self, notes: JobNotes, heartbeat: Heartbeat, error: Exception) -> None:
         """Wait after the store has refused the result of a job, and say so."""

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import pytest
 import structlog
 
+from islands_service.coordinator import identification_job
 from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.coordinator.job_run import JobRun
@@ -261,14 +262,20 @@ def test_coordinator_keeps_the_quotas_of_its_settings(
 
 @pytest.mark.ci
 def test_jobs_of_two_owners_take_turns_and_each_has_the_result_of_one_process(
-    store: Store, job: Job, settings: ServiceSettings, undisturbed: Found
+    store: Store,
+    job: Job,
+    settings: ServiceSettings,
+    undisturbed: Found,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One coordinator is enough, whatever the duration of the job that came first."""
     mine = store.datasets.get(ALICE, job.datasets[0])
     content = mine.name, mine.suffix, mine.blob, mine.bytes, mine.preview
     dataset, _ = store.datasets.add(BOB, *content)
     other = store.jobs.submit(Submission(BOB, {**job.spec, "dataset": dataset.id}))[0]
-    shared = settings.model_copy(update={"turn": 0.2, "checkpoint_every": 1e-9})
+    monkeypatch.setattr(identification_job, "CHECKPOINT_SHARE", 1e9)  # a checkpoint each epoch
+    monkeypatch.setattr(identification_job, "REPORT_EVERY", 0.0)
+    shared = settings.model_copy(update={"turn": 1e-9, "checkpoint_every": 1e-9})
     stopping = StopRequest()
     thread = Thread(target=SerialCoordinator(shared, "me", stopping).run)
     with structlog.testing.capture_logs() as logs:
