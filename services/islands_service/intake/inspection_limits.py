@@ -14,8 +14,8 @@ EXPANSION = 100
 #: Bytes that every file may unpack to: the unit of the slots of inspections.
 SLOT_BYTES = 64_000_000
 
-#: Bytes of address space of the interpreter and the libraries of a reader.
-_LIBRARIES = 1_500_000_000
+#: Least address space of a reader in bytes: its libraries, and 18 for each byte of a text of `SLOT_BYTES`.
+_LEAST_MEMORY = 1_500_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ def find_limits(received: int, settings: ServiceSettings) -> InspectionLimits:
     """Return the limits of a file by the number of its bytes as they were received."""
     most = settings.max_unpacked
     unpacked = min(max(SLOT_BYTES, EXPANSION * received), most)
-    memory = min(_LIBRARIES + settings.inspection_memory * unpacked // most, settings.inspection_memory)
+    memory = min(_LEAST_MEMORY + settings.inspection_memory * unpacked // most, settings.inspection_memory)
     return InspectionLimits(unpacked, memory, count_slots(unpacked))
 
 

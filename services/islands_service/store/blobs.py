@@ -151,7 +151,15 @@ class Blobs:
             os.fsync(written.fileno())
         path = self._at(blob)
         path.parent.mkdir(exist_ok=True, mode=0o700)
-        Path(stream.name).replace(path)
+        try:
+            known = path.stat().st_size == Path(stream.name).stat().st_size
+            if known:
+                # A confined process that is about to open this file may not open another one in its place.
+                os.utime(path)
+        except FileNotFoundError:
+            known = False
+        if not known:
+            Path(stream.name).replace(path)
         for folder in (path.parent, self._folder):
             _sync(folder)
 

@@ -47,8 +47,14 @@ def test_blob_is_visible_to_other_instances_on_the_folder(blobs, folder):
 
 
 def test_the_same_bytes_are_one_file(blobs, folder):
-    assert blobs.write(b"a") == blobs.write(b"a")
-    assert len(files(folder)) == 1
+    """A process that may open only this file is not disturbed, and a sweep finds it as young as a new one."""
+    path = blobs.path(blobs.write(b"a"))
+    before = path.stat().st_ino
+    aged(path)
+    assert blobs.path(blobs.write(b"a")) == path
+    assert files(folder) == [path]
+    assert path.stat().st_ino == before
+    assert path.stat().st_mtime > time.time() - 60.0
 
 
 def test_concurrent_writes_of_the_same_bytes_make_one_blob(blobs, folder):
