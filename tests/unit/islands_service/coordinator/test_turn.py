@@ -6,7 +6,7 @@ from islands_service.coordinator import turn as turn_module
 from islands_service.coordinator.turn import Turn, TurnOver
 
 
-def test_a_turn_lasts_from_the_first_checkpoint_on_and_ends_only_while_others_wait(monkeypatch):
+def test_a_turn_begins_with_a_checkpoint_and_ends_if_others_wait(monkeypatch):
     """The start of a job takes a minute on a busy machine, and is repeated in each turn."""
     clock, waiting = [0.0], []
     monkeypatch.setattr(turn_module, "monotonic", lambda: clock[0])
