@@ -7,7 +7,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.data.missing_outputs import skip_missing_outputs
 from islands.inspection.channel import Channel, channels
-from islands.inspection.dead_time import estimate_dead_time
+from islands.inspection.dead_time import estimate_dead_times
 from islands.inspection.drift import measure_drift
 from islands.inspection.excitation import measure_excitation
 from islands.inspection.fact import Fact
@@ -78,7 +78,7 @@ def measure_facts(record: Dataset) -> RecordFacts:
         for channel in channels(part):
             found += _describe_channel(channel, part)
         varying = [place for place in range(min(part.inputs, MOST_INPUTS)) if np.ptp(part.u[:, place]) > 0.0]
-        found += [estimate_dead_time(part, place) for place in varying]
+        found += estimate_dead_times(part, varying)
         found += [check_rest(part), *(check_loop(part, place) for place in varying)]
         found += [measure_drift(complete), recommend_rate(part)]
     return RecordFacts(tuple(sorted(found, key=lambda fact: FACTS.index(fact.name))))

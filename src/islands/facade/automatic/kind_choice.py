@@ -14,7 +14,7 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import BANDS, SearchResult
-from islands.facade.automatic.kind_trials import NO_DEAD_TIME, ROUNDING, KindTrials, percent, try_kinds
+from islands.facade.automatic.kind_trials import ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.library_fit import CERTIFICATES, LibraryFit
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
@@ -25,6 +25,8 @@ from islands.validation.recommendation import describe_exclusion, list_rivals, m
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
 #: models keep that property.
 _CLOSE = 1.25
+
+NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
 
 #: Name of the step that compares the fits of the kinds.
 CHOICE = "choice of the kind of record"
@@ -125,7 +127,8 @@ def choose_kind(
 
     The recommended models of the kinds are compared as `recommend` compares the models of a search: the
     smallest without a significantly larger error counts, of equal sizes that of the first kind. Hysteresis is
-    chosen within 25 % of the least error if the output rests while the inputs rest.
+    chosen within 25 % of the least error if the output rests while the inputs rest. If dead times were
+    estimated, models of the chosen kind without them are compared with those that have them in the same way.
 
     Parameters
     ----------
@@ -156,22 +159,72 @@ def choose_kind(
         nothing: Mapping[str, float] = MappingProxyType({})
         return Choice(kind, tuple(delays or ()), (sentence, NO_DEAD_TIME), nothing, nothing), {}
     trials = try_kinds(record, libraries, delays, steps)
-    fits = _fit_promising(trials, libraries, fit_kind, steps)
+    promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
+    # One kind alone needs no comparison.
+    fitted = {kind: libraries[kind].with_delays(trials.delays) for kind in promising[len(promising) == 1 :]}
+    fits = _fit_each(fitted, {}, fit_kind, steps)
     bounded = {kind: each for kind, each in fits.items() if _is_bounded(each.found.recommended)}
-    count = lcm(*(each.average for each in bounded.values()))
-    compared = {
-        kind: average_errors(each.found.recommended, count // each.average) for kind, each in bounded.items()
-    }
-    errors = {kind: measure_share(model, record) for kind, model in compared.items()}
+    compared, errors, count = _measure_alike(record, bounded)
     kind, reason = _select_kind(record, libraries, trials, compared, errors, count)
+    used, sentence = trials.delays, NO_DEAD_TIME
+    if delays is not None:
+        sentence = f"The dead times are as given: {list(used)}."
+    elif used:
+        used, sentence = _compare_delays(record, libraries[kind], kind, used, fits, fit_kind, steps)
     choice = Choice(
         kind,
-        trials.delays,
-        (f"{_describe(libraries[kind], kind)}, {reason}.", trials.sentence),
+        used,
+        (f"{_describe(libraries[kind], kind)}, {reason}.", sentence),
         MappingProxyType(errors),
         MappingProxyType({kind: error for kind, error in trials.errors.items() if isfinite(error)}),
     )
     return choice, fits
+
+
+def _compare_delays(
+    record: Dataset,
+    library: TrialLibrary,
+    kind: str,
+    delays: tuple[int, ...],
+    fits: dict[str, LibraryFit],
+    fit_kind: FitKind,
+    steps: Steps,
+) -> tuple[tuple[int, ...], str]:
+    """Return the estimated dead times, or none, and why; the fit with them becomes that of the kind."""
+    without = f"{kind} without dead time"
+    libraries = {without: library, kind: library.with_delays(delays)}
+    tried = _fit_each(libraries, fits, fit_kind, steps)
+    bounded = {
+        name: tried[name]
+        for name in libraries
+        if name in tried and _is_bounded(tried[name].found.recommended)
+    }
+    best, reason = kind, "no model has a finite error without it"
+    if bounded:
+        models, errors, _ = _measure_alike(record, bounded)
+        best = list(models)[
+            recommend([each.model.size for each in models.values()], list(models.values()), False).rank - 1
+        ]
+        reason = (
+            "the free-run RMSE of the recommended model on the validation data is "
+            f"{percent(errors[best])} of the output range of the estimation data{list_others(errors, best)}"
+        )
+    if best in tried:
+        fits[kind] = tried[best]
+    verb = "is added to the lags" if best == kind else "is not used"
+    samples = ", ".join(map(str, delays))
+    return libraries[best].delays, f"A dead time of {samples} samples {verb}, because {reason}."
+
+
+def _measure_alike(
+    record: Dataset, fits: Mapping[str, LibraryFit]
+) -> tuple[dict[str, Assessment], dict[str, float], int]:
+    """Return the recommended models of fits and their errors in means of equal length, and that length."""
+    count = lcm(*(each.average for each in fits.values()))
+    models = {
+        name: average_errors(each.found.recommended, count // each.average) for name, each in fits.items()
+    }
+    return models, {name: measure_share(model, record) for name, model in models.items()}, count
 
 
 def _drop_repeated(libraries: Mapping[str, TrialLibrary]) -> Mapping[str, TrialLibrary]:
@@ -180,30 +233,26 @@ def _drop_repeated(libraries: Mapping[str, TrialLibrary]) -> Mapping[str, TrialL
     return {kind: library for kind, library in libraries.items() if first[library] == kind}
 
 
-def _fit_promising(
-    trials: KindTrials,
-    libraries: Mapping[str, TrialLibrary],
-    fit_kind: FitKind,
-    steps: Steps,
+def _fit_each(
+    libraries: Mapping[str, TrialLibrary], fits: Mapping[str, LibraryFit], fit_kind: FitKind, steps: Steps
 ) -> dict[str, LibraryFit]:
-    """Return the fit of every promising kind; none if there is nothing to compare."""
-    promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
-    fits: dict[str, LibraryFit] = {}
-    if len(promising) > 1:
-        for kind in promising:
-            try:
-                steps(f"preset auto: fit of {kind}", None)
-                fits[kind] = fit_kind(libraries[kind].with_delays(trials.delays))
-                if fits[kind].steps.left_out:
-                    raise StoppedError(f"preset auto: fit of {kind}")
-            except StoppedError as stopped:
-                if not fits:
-                    raise
-                missing = [f"fit of {each}" for each in promising if each not in fits]
-                found = [each.incomplete for each in fits.values()]
-                raise StoppedChoiceError(stopped.step, _take_best(found, missing)) from stopped
-            except (SettingsError, RecordError, ModelError):
-                continue  # Another kind may have a model. If none has, the search reports what is wrong.
+    """Return the known fits and those of further libraries that have a model."""
+    fits = dict(fits)
+    missing = [name for name in libraries if name not in fits]
+    for place, name in enumerate(missing):
+        try:
+            steps(f"preset auto: fit of {name}", None)
+            fits[name] = fit_kind(libraries[name])
+            if fits[name].steps.left_out:
+                raise StoppedError(f"preset auto: fit of {name}")
+        except StoppedError as stopped:
+            if not fits:
+                raise
+            left_out = [f"fit of {each}" for each in missing[place:] if each not in fits]
+            found = [each.incomplete for each in fits.values()]
+            raise StoppedChoiceError(stopped.step, _take_best(found, left_out)) from stopped
+        except (SettingsError, RecordError, ModelError):
+            continue  # Another library may have a model. If none has, the search reports what is wrong.
     return fits
 
 

@@ -12,7 +12,7 @@ from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.facade.trials.held_out_error import hold_out, measure_library, measure_output_error
 from islands.facade.trials.library import TrialLibrary
-from islands.inspection.dead_time import estimate_dead_time
+from islands.inspection.dead_time import estimate_dead_times
 from islands.progress import Steps
 
 #: Kinds up to this factor of the least error are compared with larger models.
@@ -21,13 +21,8 @@ PROMISING = 3.0
 #: Error as a fraction of the output range that is a rounding error.
 ROUNDING = 1e-6
 
-#: Largest error with dead times relative to that without.
-_LARGEST_RATIO = 0.9
-
 #: Smallest dead time in samples that is tried. Lags of the library cover shorter ones.
 _LEAST_DELAY = 2
-
-NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +33,12 @@ class KindTrials:
     ----------
     delays : tuple of int
         Dead time of each input in samples of the record; empty if there is none.
-    sentence : str
-        What is known about the dead times.
     errors : mapping
         Free-run error of the small models of each kind, as a fraction of the output range; infinite if no
         model could be simulated.
     """
 
     delays: tuple[int, ...]
-    sentence: str
     errors: Mapping[str, float]
 
     @property
@@ -62,7 +54,7 @@ def try_kinds(
     delays: Sequence[int] | None,
     steps: Steps,
 ) -> KindTrials:
-    """Compare small models of every kind, with dead times if they reduce the error of the simplest kind.
+    """Compare small models of every kind, with the dead times that the record shows.
 
     Parameters
     ----------
@@ -84,37 +76,29 @@ def try_kinds(
         steps(f"preset auto: trial of {kind}", None)
         return summarise(measure_library(splits, libraries[kind].with_delays(delays), steps))
 
-    simplest, *others = libraries
-    chosen = tuple(delays or ())
-    errors = {simplest: measure(simplest, chosen)}
-    sentence = f"The dead times are as given: {list(chosen)}."
     if delays is None:
         steps("preset auto: dead times", None)
-        estimated = _estimate_delays(record)
-        sentence = NO_DEAD_TIME
-        if any(estimated):
-            delayed = measure(simplest, estimated)
-            gain = f"the error of {simplest} models from {percent(errors[simplest])} to {percent(delayed)}"
-            samples = ", ".join(map(str, estimated))
-            sentence = f"A dead time of {samples} samples is not used: it changes {gain}."
-            if delayed <= _LARGEST_RATIO * errors[simplest]:
-                chosen, errors[simplest] = estimated, delayed
-                sentence = f"A dead time of {samples} samples is added to the lags: it reduces {gain}."
-    errors |= {kind: measure(kind, chosen) for kind in others}
+        delays = _estimate_delays(record)
+    chosen = tuple(delays) if any(delays) else ()
+    errors = {kind: measure(kind, chosen) for kind in libraries}
+    simplest = next(iter(libraries))
     if libraries[simplest].has_simulations and errors[simplest] > PROMISING * min(errors.values()):
         # Measurement noise may hide slow modes from the one-step-ahead error of the small models.
         steps("preset auto: trial of linear models of the free run", None)
         library = libraries[simplest].with_delays(chosen)
         errors[simplest] = min(errors[simplest], summarise(measure_output_error(splits, library)))
-    return KindTrials(chosen, sentence, MappingProxyType(errors))
+    return KindTrials(chosen, MappingProxyType(errors))
 
 
 def _estimate_delays(record: Dataset) -> tuple[int, ...]:
-    """Return by how many samples the response to each input is late; 0 where it is not known to be."""
+    """Return by how many samples the response to each input is late; 0 where it is not known to be.
+
+    These are the first samples in which a response is improbable. A later one has lags of the library.
+    """
     late = []
-    for place, name in enumerate(record.input_names):
-        onset = None if parse_channel_name(name).at_once else estimate_dead_time(record, place).value
-        delay = 0 if onset is None else int(onset) - 1
+    for name, fact in zip(record.input_names, estimate_dead_times(record, range(record.inputs)), strict=True):
+        is_late = fact.interval is not None and not parse_channel_name(name).at_once
+        delay = int(fact.interval[0]) - 1 if is_late and fact.interval else 0
         late.append(delay if delay >= _LEAST_DELAY else 0)
     return tuple(late)
 

