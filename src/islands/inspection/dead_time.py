@@ -43,13 +43,10 @@ def estimate_dead_times(record: Dataset, places: Sequence[int]) -> list[Fact]:
         no response is visible.
     """
     record = skip_missing_outputs(record)
-    varying = [place for place in places if np.ptp(record.u[:, place]) > 0.0]
+    varying = [place for place in places if np.ptp(record.u[:, place]) > 0.0 and np.ptp(record.y) > 0.0]
     weighed: dict[int, LagProbabilities | None] = {}
-    if np.ptp(record.y) > 0.0:
-        for group in _group(record, varying):
-            weighed |= dict(zip(group, _weigh(record, group), strict=True))
-    else:
-        return [_describe_silence(record, place) for place in places]
+    for group in _group(record, varying):
+        weighed |= dict(zip(group, _weigh(record, group), strict=True))
     return [
         _describe(record, place, weighed[place]) if place in weighed else _describe_silence(record, place)
         for place in places
@@ -61,9 +58,10 @@ def _group(record: Dataset, places: Sequence[int]) -> list[list[int]]:
     left, groups = list(places), []
     if len(left) <= TOGETHER:
         return [left] if left else []
-    correlation = np.abs(np.corrcoef(record.u.T))
+    correlation = dict(zip(left, np.abs(np.corrcoef(record.u.T[left])), strict=True))
     while left:
-        group = sorted(left, key=lambda place: (place != left[0], -correlation[left[0], place]))[:TOGETHER]
+        near = dict(zip(places, correlation[left[0]], strict=True))
+        group = sorted(left, key=lambda place: (place != left[0], -near[place]))[:TOGETHER]
         groups.append(group)
         left = [place for place in left if place not in group]
     return groups

@@ -148,6 +148,8 @@ def _choose_parts(record: Dataset) -> Dataset:
 
 
 def _standardise(signals: Array) -> Array:
+    largest = np.abs(signals).max(axis=-1, keepdims=True)
+    signals = signals / np.where(largest > 0.0, largest, 1.0)
     centred = signals - signals.mean(axis=-1, keepdims=True)
     size = centred.std(axis=-1, keepdims=True)
     scaled: Array = centred / np.where(size > 0.0, size, 1.0)
