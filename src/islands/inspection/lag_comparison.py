@@ -583,7 +583,7 @@ class _Comparison:
             gains = np.where(better[:, None], new_gains, gains)
             squares = np.where(better, new_squares, squares)
             damping = np.where(better, damping / 10.0, damping * 10.0)
-            # A model that gains little of what it lacks will not be probable.
+            # A model whose gain is small relative to its deficit remains improbable.
             if (np.where(better, gain < _LEAST_GAIN * (1.0 + lack), damping > _LARGEST_DAMPING)).all():
                 break
         return _Fits(lags, constants, gains, squares)

@@ -151,7 +151,7 @@ def test_a_lag_that_is_probably_wrong_is_stated_as_an_interval():
 
 
 @pytest.mark.nightly
-def test_values_of_slow_periodic_and_correlated_inputs_are_right_as_often_as_stated():
+def test_stated_probability_is_the_share_of_right_values_for_slow_inputs():
     """The records of `benchmarks/dead_times.py`, which has the table for 200."""
     stated = []
     for seed in range(40):
