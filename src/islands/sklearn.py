@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
+from islands.data.masked_values import fill_masked
 from islands.distribution import describe_missing_extra
 from islands.errors import IslandsError, SettingsError, suggest
 from islands.facade.fit import fit
@@ -133,7 +134,13 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             The data or a parameter cannot be used.
         """
         u, output = validate_data(
-            self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2, estimator=self
+            self,
+            fill_masked(X),
+            fill_masked(y),
+            dtype=np.float64,
+            y_numeric=True,
+            ensure_min_samples=2,
+            estimator=self,
         )
         if self.start not in STARTS:
             raise ValueError(
@@ -175,12 +182,14 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             X or ``initial`` cannot be used.
         """
         check_is_fitted(self)
-        u = validate_data(self, X, dtype=np.float64, reset=False)
+        u = validate_data(self, fill_masked(X), dtype=np.float64, reset=False)
         lag = self.model_.maximum_lag
         if initial is None:
             before, known = self._state
         else:
-            known = check_array(initial, ensure_2d=False, dtype=np.float64, input_name="initial").ravel()
+            known = check_array(
+                fill_masked(initial), ensure_2d=False, dtype=np.float64, input_name="initial"
+            ).ravel()
             if not lag <= len(known) <= len(u):
                 raise ValueError(f"initial has from {lag} to {len(u)} outputs, got {len(known)}")
             before = u[:0]
@@ -198,7 +207,7 @@ class IslandsRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """Return R2 of the simulation; -inf if it diverges."""
         if np.isnan(self.predict(X)).any():
             return -inf
-        return float(super().score(X, y, sample_weight))
+        return float(super().score(X, fill_masked(y), sample_weight))
 
     def _search(self, record: Dataset, seed: int) -> Any:
         further = dict(self.settings or {})

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.channel_names import describe_contradiction
+from islands.data.masked_values import fill_masked
 from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import RecordError, SettingsError, check_seconds, check_sequences, check_type
 
@@ -197,7 +198,7 @@ class Dataset:
 
 def _to_numbers(values: object, name: str) -> NDArray[np.float64]:
     try:
-        return np.array(values, dtype=np.float64, order="C", ndmin=1)
+        return np.array(fill_masked(values), dtype=np.float64, order="C", ndmin=1)
     except (TypeError, ValueError) as error:
         raise RecordError(f"the {name} are not an array of numbers: {error}") from error
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.data.dataset import Dataset, join
+from islands.data.masked_values import fill_masked
 from islands.errors import RecordError, SettingsError
 from islands.io.memory_columns import MemoryColumns, read_columns_in_memory
 from islands.io.records.column_names import (
@@ -248,7 +249,7 @@ def _join_output(
 
 def _to_array(data: Any, name: str) -> NDArray[Any]:
     try:
-        return np.asarray(data)
+        return np.asarray(fill_masked(data))
     except ValueError as error:
         raise RecordError(f"the {name} are not an array: every row needs the same length") from error
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.masked_values import fill_masked
 from islands.errors import RecordError
 from islands.io.records.column_names import looks_like_time, seconds_per_unit
 from islands.io.records.formats.text.time_stamps import kind_of, parse_stamps
@@ -64,7 +65,7 @@ def read_columns_in_memory(data: Any) -> MemoryColumns | None:
     if hasattr(data, "to_dataset"):
         return _read_data_array(data)
     if isinstance(data, Mapping):
-        return MemoryColumns({str(name): partial(np.asarray, values) for name, values in data.items()})
+        return MemoryColumns({str(name): partial(_load_array, values) for name, values in data.items()})
     # Importing narwhals takes some milliseconds, and arrays do not need it.
     import narwhals.stable.v2 as nw  # noqa: PLC0415
 
@@ -82,6 +83,10 @@ def read_columns_in_memory(data: Any) -> MemoryColumns | None:
         raise RecordError(f"two columns have the same name: rename one ({error})") from error
     index = nw.maybe_get_index(frame)
     return MemoryColumns(loads, _find_time(frame, index))
+
+
+def _load_array(values: Any) -> NDArray[Any]:
+    return np.asarray(fill_masked(values))
 
 
 def _load_series(series: Any) -> NDArray[Any]:

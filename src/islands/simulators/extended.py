@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.masked_values import fill_masked
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, ForceLaw, Site, apply_map
@@ -258,7 +259,7 @@ class ExtendedSimulator:
             for key, values in points.items()
         ]
         with np.errstate(over="ignore", invalid="ignore"):
-            found = np.ascontiguousarray(self.simulator.simulate_batch(runs, self.context))
+            found = np.ascontiguousarray(fill_masked(self.simulator.simulate_batch(runs, self.context)))
         return dict(zip(points, found, strict=True))
 
     def _apply_output_maps(self, outputs: Sequence[Signal], points: Signal) -> Signal:

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from islands.data.masked_values import fill_masked
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Site
 from islands.effects.interface.force import add_output_forces
@@ -94,7 +95,7 @@ class PythonFunctionSimulator(Simulator):
         keywords = {name: float(value) for name, value in zip(self.given, values, strict=True)}
         # A copy, since the function could write into its argument.
         try:
-            y = np.asarray(self.function(x.copy(), context.dt, **keywords))
+            y = np.asarray(fill_masked(self.function(x.copy(), context.dt, **keywords)))
             if np.iscomplexobj(y):
                 raise TypeError("its output is complex")
             y = np.asarray(y, dtype=np.float64)

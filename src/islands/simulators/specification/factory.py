@@ -12,6 +12,7 @@ import numpy as np
 from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset, same_dt
 from islands.data.magnitudes import check_magnitudes
+from islands.data.masked_values import fill_masked
 from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.data.segments import fill_gaps
 from islands.data.split import estimation_part
@@ -176,7 +177,7 @@ def make_linear(spec: LinearSpec, record: Dataset, _columns: Mapping[str, Any]) 
 def make_recorded_output(spec: ColumnSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
     """Take a column of a record as the output of a simulation."""
     name = spec.column
-    output = np.asarray(lookup(columns, name, "column"), dtype=np.float64)
+    output = np.asarray(fill_masked(lookup(columns, name, "column")), dtype=np.float64)
     if output.shape != record.y.shape:
         raise RecordError(
             f"column {name} has the shape {output.shape}, the measured output {record.y.shape}: give a "

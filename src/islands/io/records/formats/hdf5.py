@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.masked_values import fill_masked
 from islands.errors import RecordError
 from islands.io.records.column_names import append_unit
 from islands.io.records.formats.columnar import ColumnarFile
@@ -21,6 +22,9 @@ from islands.io.records.validation import MIN_SAMPLES
 
 _MAX_DEPTH = 32
 
+#: Attributes with the numbers that mark a missing value, by the conventions of netCDF.
+_MISSING = ("_FillValue", "missing_value")
+
 #: Attributes with the unit of a dataset.
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 
@@ -30,7 +34,7 @@ def read_hdf5(path: Path, options: ReadingOptions = DEFAULT_READING) -> Columnar
 
     The columns are the datasets of a group, or the fields of a dataset of records. A dataset with two
     dimensions gives a column for each channel: ``x_1``, ``x_2``, ... The unit of a dataset is its attribute
-    ``unit`` or ``units``.
+    ``unit`` or ``units``; a number that its attribute ``_FillValue`` or ``missing_value`` states is missing.
 
     Raises
     ------
@@ -135,7 +139,11 @@ def _read(path: Path, group: str, key: str, read_records: Callable[[], NDArray[A
     with h5py.File(path, "r", locking=False) as file:
         dataset = file[group][key]
         check_dataset_size(dataset, key, path)
-        return np.asarray(dataset[()])
+        values = np.asarray(dataset[()])
+        marks = [np.ravel(dataset.attrs[name]) for name in _MISSING if name in dataset.attrs]
+        if not marks or values.dtype.kind not in "fiu":
+            return values
+        return np.asarray(fill_masked(np.ma.array(values, mask=np.isin(values, np.concatenate(marks)))))
 
 
 def _read_records(path: Path, name: str) -> NDArray[Any] | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.masked_values import fill_masked
 from islands.distribution import describe_missing_extra
 from islands.errors import RecordError
 from islands.io.records.column_names import append_unit
@@ -122,7 +123,12 @@ def _read_channel(file: Any, path: Path, number: int, place: int, name: str) -> 
     with _translated_errors(path.name):
         _check_size(file, path, number, name)
         _check_places(file, path, number, place)
-        return np.asarray(file.get(group=number, index=place).samples)
+        # The library leaves invalid samples out by default, so that the channels have other lengths.
+        signal = file.get(group=number, index=place, ignore_invalidation_bits=True)
+        invalid = signal.invalidation_bits
+        if invalid is None:
+            return np.asarray(signal.samples)
+        return np.asarray(fill_masked(np.ma.array(signal.samples, mask=invalid)))
 
 
 def _check_size(file: Any, path: Path, number: int, name: str) -> None:

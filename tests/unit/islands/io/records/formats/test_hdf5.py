@@ -55,6 +55,16 @@ def test_a_unit_is_an_attribute_and_a_matrix_has_numbered_channels(hdf5):
     assert read_record(path, ["u"], "z_2").input_units == ("V",)
 
 
+def test_a_stated_fill_value_is_missing(hdf5):
+    def write(file):
+        fill(file)
+        file["y"][[20, 41]] = 9.96921e36
+        file["y"].attrs["_FillValue"] = 9.96921e36
+
+    record = read_record(hdf5(write), ["u"], "y", outliers="keep")
+    assert np.flatnonzero(np.isnan(record.y)).tolist() == [20, 41]
+
+
 def test_a_dataset_of_records_is_a_table(hdf5):
     records = np.array(list(zip(*COLUMNS.values(), strict=True)), dtype=[(name, "f8") for name in COLUMNS])
     path = hdf5(lambda file: file.create_dataset("runs/log", data=records))

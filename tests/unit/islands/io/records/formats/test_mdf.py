@@ -33,6 +33,20 @@ def test_a_channel_group_is_read_with_its_times_and_units(tmp_path):
         read_record(path, ["u"], "y")
 
 
+def test_a_sample_that_the_file_calls_invalid_is_missing(tmp_path):
+    from asammdf import MDF, Signal
+
+    path, invalid = tmp_path / "r.mf4", np.isin(K, (20, 41))
+    y = np.where(invalid, 1e6, K % 11)
+    with MDF(version="4.10") as file:
+        file.append(
+            [Signal(K % 7 - 3.0, K / 100, name="u"), Signal(y, K / 100, name="y", invalidation_bits=invalid)]
+        )
+        file.save(path)
+    record = read_record(path, ["u"], "y", outliers="keep")
+    assert np.flatnonzero(np.isnan(record.y)).tolist() == [20, 41]
+
+
 def save(path):
     from asammdf import MDF, Signal
 
