@@ -5,7 +5,7 @@ import pytest
 
 import islands
 
-K = np.arange(60)
+K = np.arange(240)
 U, Y = np.sin(K / 3.0), np.cos(K / 5.0)
 MASK = np.isin(K, (20, 41))
 HIDDEN = np.ma.array(np.where(MASK, 0.0, Y), mask=MASK)
@@ -41,6 +41,7 @@ def test_a_masked_input_is_refused_as_a_missing_one(u):
         islands.Dataset(u, U, 0.1)
 
 
+@pytest.mark.ci  # the diagnosis is imported in a second
 def test_a_simulation_with_masked_samples_is_refused_as_one_with_nan():
     def simulate(u, dt, gain=1.0):
         return np.ma.masked_greater(gain * u + dt, 0.9)
@@ -52,7 +53,7 @@ def test_a_simulation_with_masked_samples_is_refused_as_one_with_nan():
         islands.diagnose(record, "column:run", columns={"run": HIDDEN})
 
 
-@pytest.mark.ci  # scikit-learn is imported in a second
+@pytest.mark.ci  # scikit-learn is imported in some seconds
 def test_the_estimator_of_scikit_learn_refuses_masked_values():
     from islands.sklearn import IslandsRegressor
 
