@@ -6,8 +6,10 @@ All criteria are strict: an output that is only fast, nonlinear or noisy has no 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from islands.data.segments import fill_gaps
@@ -31,29 +33,32 @@ _MOST_REPEATED = 0.05
 #: Distinct values of an output, at least: codes of an output with a few levels are levels.
 _LEAST_LEVELS = 10
 
-#: Samples of the median from which a spike deviates, and of the longest spike.
-_WINDOW, _LONGEST_SPIKE = 7, 3
+#: Lags of the linear prediction; part of the samples it is fitted without, those farthest from their
+#: neighbours; and part of the variance that it explains, at least: otherwise no sample is unexpected.
+_LAGS, _FARTHEST, _EXPLAINED = 3, 0.05, 0.5
 
-#: Deviation of a spike from the median relative to the robust standard deviation, to the 99 % quantile of the
-#: deviations, and to the range of the central 98 % of the values, at least.
-_DEVIATION, _QUANTILE_RATIO, _RANGE_RATIO = 12.0, 5.0, 0.1
+#: Samples on either side that confirm an excursion, and of the longest excursion.
+_AROUND, _LONGEST = 2, 5
 
-#: Largest part of the samples that are spikes.
-_MOST_SPIKES = 0.01
+#: Part of the errors of the prediction that are larger than usual, and of the samples that are excursions, at
+#: most.
+_LARGE, _MOST_EXCURSIONS = 0.1, 0.02
 
-#: Lags of the linear prediction that confirms a spike, and the error of its prediction relative to the robust
-#: standard deviation and to the 99 % quantile of the errors, at least.
-_LAGS, _ERROR, _ERROR_RATIO = 3, 10.0, 4.0
+#: Tail index of normal noise near its 90 % quantile.
+_LIGHT_TAIL = 0.25
 
-#: Largest error of the prediction after a spike, which does not use the spike, relative to the spike: the
-#: system has not moved.
-_AFTER = 0.1
+#: Probability that the tail of the other excursions reaches the largest ones, at most.
+_REACHED = 1e-3
 
-#: Samples before a spike in which a movement of an input may cause it.
-_CAUSE = 30
+#: Samples whose neighbours are compared with those of an excursion, at most and at least.
+_DRAWN, _LEAST_DRAWN = 2000, 20
 
-#: Movements of an input, of at least half the size, that no spike follows: then the spike has another cause.
-_UNANSWERED = 5
+#: Samples before an excursion in which an input may cause it, and the probability that an input is as active
+#: there by chance, at most.
+_CAUSES, _BY_CHANCE = (2, 8, 32), 0.05
+
+#: Errors relative to the standard deviation of the output that count as none.
+_ROUNDING = 1e-9
 
 #: Rows that a description lists, at most.
 _LISTED = 6
@@ -122,7 +127,7 @@ def find_gross_errors(y: Signal, u: Signal) -> GrossErrors:
     y : ndarray, shape (samples,)
         Output; NaN marks a missing value.
     u : ndarray, shape (samples, inputs)
-        Inputs. A spike that follows a rare movement of an input is a response.
+        Inputs. An excursion that follows an unusual activity of an input is a response.
     """
     codes: dict[float, NDArray[np.int64]] = {}
     y = np.where(np.isfinite(y), y, np.nan)
@@ -159,97 +164,206 @@ def _find_code(y: Signal, is_measured: bool = True) -> float | None:
 
 
 def _find_spikes(y: Signal, u: Signal) -> NDArray[np.int64]:
-    """Return the samples of isolated spikes that neither the inputs nor a motion explain."""
-    is_candidate = _find_candidates(y)
-    if not is_candidate.any() or is_candidate.mean() > _MOST_SPIKES:
-        return np.zeros(0, np.int64)
-    places = np.flatnonzero(is_candidate)
-    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    prediction = _Prediction(y, u, is_candidate)
-    confirmed = [
-        run
-        for run in runs
-        if len(run) <= _LONGEST_SPIKE
-        and run[0] >= _LAGS
-        and prediction.contradicts(run)
-        and not _is_response(int(run[0]), u, places)
-    ]
-    return np.concatenate([np.zeros(0, np.int64), *confirmed])
+    """Return the samples of excursions that neither their neighbours nor the inputs explain.
 
-
-def _find_candidates(y: Signal) -> Mask:
-    """Return the samples that are far from the median of their neighbours."""
+    A linear prediction from past outputs and inputs describes the motion of the system. A physical event
+    changes the state: the samples after it are displaced, by a fraction of the event that the record may
+    show nowhere else. A gross error is in the measurement alone: one prediction fails, and the samples after
+    it go on as if it had not been (an additive and not an innovational outlier; Fox 1972). What is left of
+    it is also larger than the tail of all other excursions of the record reaches, and follows no activity of
+    an input.
+    """
+    none = np.zeros(0, np.int64)
     known = np.isfinite(y)
-    if np.count_nonzero(known) <= 2 * _WINDOW:
-        return np.zeros(y.size, np.bool_)
-    filled = np.interp(np.arange(y.size), np.flatnonzero(known), y[known])
-    padded = np.pad(filled, _WINDOW // 2, mode="reflect")
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, _WINDOW), axis=1)
-    deviation = np.abs(filled - medians)
-    low, high = np.quantile(y[known], [0.01, 0.99])
-    least = max(
-        _DEVIATION * 1.4826 * float(np.median(deviation)),
-        _QUANTILE_RATIO * float(np.quantile(deviation, 0.99)),
-        _RANGE_RATIO * float(high - low),
-    )
-    return known & (deviation > max(least, 1e-12 * float(np.abs(filled).max())))
+    if np.count_nonzero(known) <= _LEAST_DRAWN:
+        return none
+    prediction = _Prediction.fit(y, u, known)
+    if prediction is None:
+        return none
+    excursions: list[NDArray[np.int64]] = []
+    while found := _find_excursions(prediction):
+        excursions += [np.arange(first, first + length) for first, length in found]
+    caused = _find_caused(np.array([run[0] for run in excursions], np.int64), prediction.u)
+    return np.sort(np.concatenate([none, *(run for run in excursions if run[0] not in caused)]))
 
 
 class _Prediction:
-    """Linear prediction of the output from past outputs and from inputs, fitted without the candidates."""
+    """Linear prediction of the output from past outputs and from inputs.
 
-    def __init__(self, y: Signal, u: Signal, is_candidate: Mask) -> None:
-        sound = np.isfinite(y) & ~is_candidate
-        centre, scale = float(np.median(y[sound])), float(np.std(y[sound])) or 1.0
+    Attributes
+    ----------
+    y, u : ndarray
+        The signals, with a standard deviation of 1.
+    errors : ndarray, shape (samples,)
+        Errors of the prediction; NaN if a value is missing.
+    """
+
+    def __init__(self, y: Signal, u: Signal, weights: Signal, drive: Signal) -> None:
+        self.y, self.u, self._weights, self._drive = y, u, weights, drive
+        self.errors = np.full(y.size, np.nan)
+        self._update(_LAGS, y.size)
+
+    @classmethod
+    def fit(cls, y: Signal, u: Signal, known: Mask) -> "_Prediction | None":
+        """Fit the prediction without the samples that are farthest from their neighbours."""
+        filled = np.interp(np.arange(y.size), np.flatnonzero(known), y[known])
+        width = 2 * _LAGS + 1
+        neighbours = np.lib.stride_tricks.sliding_window_view(np.pad(filled, _LAGS, mode="reflect"), width)
+        distance = np.abs(filled - np.median(neighbours, axis=1))
+        if not distance.max() > _ROUNDING * np.abs(filled).max():
+            return None
+        usual = known & (distance <= np.quantile(distance[known], 1.0 - _FARTHEST))
+        y = (y - np.median(y[known])) / np.std(y[known])
         spread = np.std(u, axis=0)
-        self._y = (y - centre) / scale
-        self._u = (u - np.mean(u, axis=0)) / np.where(spread > 0.0, spread, 1.0)
-        targets = np.arange(_LAGS, y.size)
-        terms = self._terms(self._y, targets)
-        complete = sound[targets] & np.isfinite(terms).all(axis=1)
-        for lag in range(1, _LAGS + 1):
-            complete &= sound[targets - lag]
-        terms, target = terms[complete], self._y[targets][complete]
-        self._theta = np.linalg.lstsq(terms, target, rcond=1e-10)[0]
-        self._errors = np.abs(target - terms @ self._theta)
-
-    def _terms(self, y: Signal, samples: NDArray[np.int64]) -> Signal:
+        u = (u[:, spread > 0.0] - u.mean(axis=0)[spread > 0.0]) / spread[spread > 0.0]
+        samples = np.arange(_LAGS, y.size)
         past = [y[samples - lag] for lag in range(1, _LAGS + 1)]
-        inputs = [column[samples - lag] for column in self._u.T for lag in range(_LAGS + 1)]
-        return np.column_stack([np.ones(samples.size), *past, *inputs, *(each**2 for each in inputs)])
+        inputs = [column[samples - lag] for column in u.T for lag in range(_LAGS + 1)]
+        driving = np.column_stack([np.ones(samples.size), *inputs, *(each**2 for each in inputs)])
+        terms = np.column_stack([*past, driving])
+        rows = np.all([usual[samples - lag] for lag in range(_LAGS + 1)], axis=0)
+        if np.count_nonzero(rows) < 2 * terms.shape[1]:
+            return None
+        theta, target = np.linalg.lstsq(terms[rows], y[samples][rows], rcond=1e-10)[0], y[samples][rows]
+        if not np.mean((target - terms[rows] @ theta) ** 2) <= (1.0 - _EXPLAINED) * np.var(target):
+            return None
+        return cls(y, u, theta[:_LAGS], np.concatenate([np.zeros(_LAGS), driving @ theta[_LAGS:]]))
 
-    def contradicts(self, run: NDArray[np.int64]) -> bool:
-        """Return whether a run of samples is no motion: unpredicted, and without effect on what follows."""
-        if not self._errors.size:
-            return False
-        typical = float(np.quantile(self._errors, 0.99))
-        least = max(_ERROR * 1.4826 * float(np.median(self._errors)), _ERROR_RATIO * typical)
-        y, errors = self._y.copy(), []
-        for sample in range(int(run[0]), min(int(run[-1]) + 3, y.size)):
-            predicted = float((self._terms(y, np.array([sample])) @ self._theta)[0])
-            errors.append(abs(self._y[sample] - predicted))
-            if sample <= run[-1]:
-                y[sample] = predicted
-        during, after = errors[: len(run)], errors[len(run) :]
-        most = max(_AFTER * max(during), _ERROR_RATIO * typical)
-        return min(during) > least and not any(each > most for each in after)
+    def _update(self, first: int, last: int) -> None:
+        samples = np.arange(first, last)
+        past = np.column_stack([self.y[samples - lag] for lag in range(1, _LAGS + 1)])
+        self.errors[samples] = self.y[samples] - self._drive[samples] - past @ self._weights
+
+    def replace(self, first: int, length: int) -> None:
+        """Replace samples by their prediction."""
+        for sample in range(first, first + length):
+            self._update(sample, sample + 1)
+            self.y[sample] -= self.errors[sample]
+        self._update(first, min(first + length + _LAGS, self.y.size))
+
+    def leave_out(self, firsts: NDArray[np.int64], length: int) -> tuple[Signal, Signal]:
+        """Predict as if runs of samples were missing.
+
+        Returns
+        -------
+        size : ndarray, shape (runs,)
+            Least error within each run, which is 0 if a value is missing.
+        displacement : ndarray, shape (runs,)
+            Largest error around each run.
+        """
+        places = firsts[:, None] + np.arange(-_LAGS, length + _AROUND)
+        exists = places < self.y.size
+        places = np.minimum(places, self.y.size - 1)
+        measured = self.y[places]
+        used, errors = measured.copy(), np.empty((firsts.size, length + _AROUND))
+        for place in range(length + _AROUND):
+            at = _LAGS + place
+            predicted = self._drive[places[:, at]] + used[:, at - _LAGS : at][:, ::-1] @ self._weights
+            errors[:, place] = np.where(exists[:, at], np.abs(measured[:, at] - predicted), np.nan)
+            if place < length:
+                used[:, at] = predicted
+        size = errors[:, : length + 1].min(axis=1)
+        size = np.where(np.isfinite(size), errors[:, :length].min(axis=1), 0.0)
+        before = np.abs(self.errors[firsts[:, None] - np.arange(1, _AROUND + 1)])
+        around = np.concatenate([errors[:, length:], before], axis=1)
+        return size, np.where(np.isnan(around), 0.0, around).max(axis=1)
 
 
-def _is_response(sample: int, u: Signal, candidates: NDArray[np.int64]) -> bool:
-    """Return whether a candidate follows a movement of an input that is rare or that others follow, too."""
-    for column in u.T:
-        moved = np.abs(np.diff(column, prepend=column[0]))
-        movement = moved[max(0, sample - _CAUSE) : sample + 1].max()
-        if movement == 0.0:
-            continue
-        others = np.flatnonzero(moved >= 0.5 * movement)
-        following = np.searchsorted(candidates, others)
-        answered = following < candidates.size
-        answered[answered] = candidates[following[answered]] - others[answered] <= _CAUSE
-        unanswered = np.count_nonzero(~answered)
-        if unanswered < max(_UNANSWERED, int(np.count_nonzero(answered))):
-            return True
-    return False
+def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
+    """Return first sample and length of the runs that the samples around them contradict."""
+    errors = np.abs(prediction.errors)
+    known = np.isfinite(errors)
+    usual = max(float(np.quantile(errors[known], 1.0 - _LARGE)), _ROUNDING)
+    firsts = np.flatnonzero(known & (errors > usual))
+    lengths = range(1, _LONGEST + 1)
+    undone = np.max([np.subtract(*prediction.leave_out(firsts, length)) for length in lengths], axis=0)
+    isolated, free = [], known.copy()
+    for place in np.argsort(-undone, kind="stable")[: np.count_nonzero(undone > usual)]:
+        first = firsts[place]
+        # The errors after a large excursion are its response in the prediction.
+        if free[first]:
+            isolated.append(place)
+            free[max(first - _LONGEST, 0) : first + _LONGEST + _LAGS] = False
+    count, rest = _count_isolated(np.log(undone[isolated] / usual), errors.size)
+    free = known.copy()
+    free[-_LONGEST - _AROUND :] = False
+    for first in firsts[isolated[:count]]:
+        free[max(first - _LONGEST - _AROUND, 0) : first + _LONGEST + _LAGS] = False
+    drawn = np.flatnonzero(free)
+    if drawn.size < _LEAST_DRAWN:
+        return []
+    drawn = drawn[np.linspace(0, drawn.size - 1, min(_DRAWN, drawn.size)).astype(np.int64)]
+    displace = cache(lambda length: np.sort(prediction.leave_out(drawn, length)[1]))
+    found: list[tuple[int, int]] = []
+    for first in firsts[isolated[:count]]:
+        sizes, displacements = np.array(
+            [prediction.leave_out(np.array([first]), length) for length in lengths]
+        )[:, :, 0].T
+        best = int(np.argmax(sizes - displacements))
+        size, displacement = sizes[best], displacements[best]
+        ordinary = displace(lengths[best])
+        within = np.diff(np.searchsorted(ordinary, [0.5 * displacement, 2.0 * displacement]))[0]
+        # A physical event leaves any fraction of itself: its displacement is uniform up to its size.
+        is_error = (within + 1) / (ordinary.size + 1) > 1.5 * displacement / size
+        if size - displacement >= usual * np.exp(rest) and is_error:
+            found.append((int(first), lengths[best]))
+            prediction.replace(int(first), lengths[best])
+    return found
+
+
+def _count_isolated(logarithms: Signal, samples: int) -> tuple[int, float]:
+    """Return how many of the largest excursions the tail of the others does not reach, and its end.
+
+    In a tail of the index xi, the logarithm of the ratio of the j-th to the next value is exponential with
+    the mean xi / j (Renyi 1953). The index is estimated above and below the ratio (Hill 1975).
+
+    Parameters
+    ----------
+    logarithms : ndarray, shape (excursions,)
+        Logarithms of the excursions relative to the usual errors, the largest first.
+    samples : int
+        Samples of the record.
+    """
+    most = min(max(int(_MOST_EXCURSIONS * samples), 1), logarithms.size)
+    if most < 1:
+        return 0, 0.0
+    logarithms = np.append(logarithms, 0.0)
+    counts, sums = np.arange(1, most + 1), np.cumsum(logarithms)
+    above = sums[:most] / counts - logarithms[:most]
+    below = (sums[-1] - sums[:most]) / np.maximum(np.count_nonzero(logarithms) - counts, 1)
+    index = np.maximum(np.maximum(above, below), _LIGHT_TAIL)
+    chances = counts / index * (logarithms[1 : most + 1] - logarithms[:most])
+    count = int(counts[np.argmin(chances)]) if chances.min() < np.log(_REACHED) else 0
+    return count, float(logarithms[count])
+
+
+def _find_caused(firsts: NDArray[np.int64], u: Signal) -> set[int]:
+    """Return the excursions that follow an activity of an input more often than by chance.
+
+    The activity of an input is its distance from its median, or its movement.
+    """
+    caused: set[int] = set()
+    while (left := np.array([each for each in np.sort(firsts) if each not in caused])).size:
+        best, found = _BY_CHANCE, left[:0]
+        for column in u.T:
+            for activity in (np.abs(column - np.median(column)), np.abs(np.diff(column, prepend=column[0]))):
+                for length in _CAUSES:
+                    padded = np.concatenate([np.full(length, activity[0]), activity])
+                    highest = np.lib.stride_tricks.sliding_window_view(padded, length + 1).max(axis=1)
+                    ranks = 1.0 - np.searchsorted(np.sort(highest), highest[left]) / highest.size
+                    # Excursions within one window are not independent.
+                    alone = np.sort(ranks[np.diff(left, prepend=-length - 1) > length])
+                    counts = np.arange(1, alone.size + 1)
+                    # The binomial distribution, as an incomplete beta function.
+                    chances = scipy.special.betainc(counts, alone.size - counts + 1, alone)
+                    place = int(np.argmin(chances))
+                    chance = 2 * u.shape[1] * len(_CAUSES) * alone.size * chances[place]
+                    if chance < best:
+                        best, found = chance, left[ranks <= alone[place]]
+        if not found.size:
+            break
+        caused |= set(found.tolist())
+    return caused
 
 
 def _find_stuck(y: Signal, u: Signal) -> tuple[tuple[int, int], ...]:
