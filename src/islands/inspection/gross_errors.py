@@ -183,8 +183,7 @@ def _find_spikes(y: Signal, u: Signal) -> NDArray[np.int64]:
     excursions: list[NDArray[np.int64]] = []
     while found := _find_excursions(prediction):
         excursions += [np.arange(first, first + length) for first, length in found]
-    caused = _find_caused(np.array([run[0] for run in excursions], np.int64), prediction.u)
-    return np.sort(np.concatenate([none, *(run for run in excursions if run[0] not in caused)]))
+    return np.sort(np.concatenate([none, *excursions]))
 
 
 class _Prediction:
@@ -276,7 +275,11 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
     usual = max(float(np.quantile(errors[known], 1.0 - _LARGE)), _ROUNDING)
     firsts = np.flatnonzero(known & (errors > usual))
     lengths = range(1, _LONGEST + 1)
-    undone = np.max([np.subtract(*prediction.leave_out(firsts, length)) for length in lengths], axis=0)
+    tried = np.array([prediction.leave_out(firsts, length) for length in range(1, _LONGEST + 1)])
+    # An excursion ends where the samples after it go on as those before it.
+    best = np.argmin(tried[:, 1] / np.maximum(tried[:, 0], _ROUNDING), axis=0)
+    lengths, (sizes, displacements) = best + 1, tried[best, :, np.arange(firsts.size)].T
+    undone = sizes - displacements
     isolated, free = [], known.copy()
     for place in np.argsort(-undone, kind="stable")[: np.count_nonzero(undone > usual)]:
         first = firsts[place]
@@ -284,7 +287,7 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
         if free[first]:
             isolated.append(place)
             free[max(first - _LONGEST, 0) : first + _LONGEST + _LAGS] = False
-    count, rest = _count_isolated(np.log(undone[isolated] / usual), errors.size)
+    count = _count_isolated(np.log(undone[isolated] / usual), errors.size)
     free = known.copy()
     free[-_LONGEST - _AROUND :] = False
     for first in firsts[isolated[:count]]:
@@ -295,24 +298,22 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
     drawn = drawn[np.linspace(0, drawn.size - 1, min(_DRAWN, drawn.size)).astype(np.int64)]
     displace = cache(lambda length: np.sort(prediction.leave_out(drawn, length)[1]))
     found: list[tuple[int, int]] = []
-    for first in firsts[isolated[:count]]:
-        sizes, displacements = np.array(
-            [prediction.leave_out(np.array([first]), length) for length in lengths]
-        )[:, :, 0].T
-        best = int(np.argmax(sizes - displacements))
-        size, displacement = sizes[best], displacements[best]
-        ordinary = displace(lengths[best])
+    caused = _find_caused(firsts[isolated[:count]], prediction.u)
+    for place in isolated[:count]:
+        first, length, displacement = int(firsts[place]), int(lengths[place]), displacements[place]
+        ordinary = displace(length)
         within = np.diff(np.searchsorted(ordinary, [0.5 * displacement, 2.0 * displacement]))[0]
         # A physical event leaves any fraction of itself: its displacement is uniform up to its size.
-        is_error = (within + 1) / (ordinary.size + 1) > 1.5 * displacement / size
-        if size - displacement >= usual * np.exp(rest) and is_error:
-            found.append((int(first), lengths[best]))
-            prediction.replace(int(first), lengths[best])
+        is_error = (within + 1) / (ordinary.size + 1) > 1.5 * displacement / sizes[place]
+        if is_error and first not in caused:
+            found.append((first, length))
+    for first, length in found:
+        prediction.replace(first, length)
     return found
 
 
-def _count_isolated(logarithms: Signal, samples: int) -> tuple[int, float]:
-    """Return how many of the largest excursions the tail of the others does not reach, and its end.
+def _count_isolated(logarithms: Signal, samples: int) -> int:
+    """Return how many of the largest excursions the tail of the others does not reach.
 
     In a tail of the index xi, the logarithm of the ratio of the j-th to the next value is exponential with
     the mean xi / j (Renyi 1953). The index is estimated above and below the ratio (Hill 1975).
@@ -326,15 +327,14 @@ def _count_isolated(logarithms: Signal, samples: int) -> tuple[int, float]:
     """
     most = min(max(int(_MOST_EXCURSIONS * samples), 1), logarithms.size)
     if most < 1:
-        return 0, 0.0
+        return 0
     logarithms = np.append(logarithms, 0.0)
     counts, sums = np.arange(1, most + 1), np.cumsum(logarithms)
     above = sums[:most] / counts - logarithms[:most]
     below = (sums[-1] - sums[:most]) / np.maximum(np.count_nonzero(logarithms) - counts, 1)
     index = np.maximum(np.maximum(above, below), _LIGHT_TAIL)
     chances = counts / index * (logarithms[1 : most + 1] - logarithms[:most])
-    count = int(counts[np.argmin(chances)]) if chances.min() < np.log(_REACHED) else 0
-    return count, float(logarithms[count])
+    return int(counts[np.argmin(chances)]) if chances.min() < np.log(_REACHED) else 0
 
 
 def _find_caused(firsts: NDArray[np.int64], u: Signal) -> set[int]:

@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 from islands.inspection.gross_errors import find_gross_errors, find_input_codes
 from support.laws import LAWS
+from support.measured_events import ERRORS, EVENTS, SIGNALS
 from support.portfolio_records import KINDS
 
 SAMPLES = 1200
@@ -142,6 +143,26 @@ def test_almost_all_spikes_of_the_size_of_the_range_are_found():
         assert not set(samples.tolist()) - set(places.tolist())
         hits, count = hits + samples.size, count + 4
     assert hits >= 0.95 * count
+
+
+@pytest.mark.parametrize("name", EVENTS)
+def test_a_physical_event_is_no_error(name):
+    deleted = 0
+    for seed in range(3):
+        u, y = EVENTS[name](np.random.default_rng([seed, *map(ord, name)]))
+        deleted += found(y, u).samples.size > 0
+    assert deleted <= 1 - (name != "floods")
+
+
+@pytest.mark.parametrize("kind", ["single samples", "dropouts"])
+@pytest.mark.parametrize("name", SIGNALS)
+def test_gross_errors_are_found_in_signals_of_all_kinds(name, kind):
+    rng = np.random.default_rng([0, *map(ord, name + kind)])
+    u, y = SIGNALS[name](rng)
+    wrong, places = ERRORS[kind](y, rng)
+    samples = found(wrong, u).samples.tolist()
+    assert set(samples) <= set(places)
+    assert len(samples) >= 0.75 * len(places)
 
 
 def test_only_a_known_code_is_an_error_of_an_input():
