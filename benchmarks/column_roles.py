@@ -157,7 +157,11 @@ def fit(records: Sequence[RoleRecord]) -> None:
     """Print the weights that are most likely, with a penalty of their squares."""
     properties, is_input, weights = [], [], []
     for record in records:
-        names = [name for name, x in record.columns.items() if not column_roles.is_counter(name, x)]
+        names = [
+            name
+            for name, x in record.columns.items()
+            if not column_roles.is_counter(name, x) and not column_roles.is_numbering(name, x)
+        ]
         signals = np.array([record.columns[name] for name in names])
         found = estimate_direction(signals)
         table = measure_properties(signals, found.influence)

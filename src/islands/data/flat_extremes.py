@@ -115,6 +115,13 @@ def is_held(values: NDArray[np.float64], step: float) -> bool:
     return bool(at_extremes <= 0.9 * still.size or levels <= 0.02 * values.size)
 
 
+def count_levels(values: NDArray[np.float64]) -> int:
+    """Return how many levels a signal has; values that differ by rounding only are one level."""
+    levels = np.unique(values[np.isfinite(values)])
+    step = find_step(levels)
+    return levels.size if step is None else np.unique(np.round((levels - levels[0]) / step)).size
+
+
 def find_step(levels: NDArray[np.float64]) -> float | None:
     """Return the largest step of which all differences of some sorted levels are multiples.
 

@@ -16,20 +16,18 @@ from islands.inspection.column_influence import (
     ColumnInfluence,
     average_middle,
 )
-from islands.inspection.column_shape import is_label, is_product, is_total
+from islands.inspection.column_shape import describe_copy, is_label, is_product, is_total
 from islands.inspection.gross_errors import find_gross_errors
 
 #: Names that say that a column is an input or an output, by the first word of the name.
 _SURE = {
-    "input": re.compile(r"u\d*|in|inp|input|cmd|command|setpoint|sp"),
+    "input": re.compile(r"u\d*|in|inp|input|cmd|command"),
     "output": re.compile(r"y\d*|out|outp|output|response"),
 }
 
 #: Names that suggest it.
 _LIKELY = {
-    "input": re.compile(
-        r"v|volt.*|current|drive.*|valve.*|pump.*|heat.*|power|pwm|duty|force|torque|ref.*|ctrl.*"
-    ),
+    "input": re.compile(r"v|volt.*|current|drive.*|valve.*|pump.*|heat.*|power|pwm|duty|force|torque|ctrl.*"),
     "output": re.compile(
         r"temp.*|level|height|h|pos.*|disp.*|speed|vel.*|omega|acc.*|flow|press.*|strain|meas.*"
     ),
@@ -124,6 +122,12 @@ def choose_columns(
             if np.isfinite(values).mean() >= _LEAST_KNOWN * (name not in given)
             and (name in given or not is_counter(name, values))
         }
+        numberings = {name: values for name, values in signals.items() if is_numbering(name, values)}
+        signals = {
+            name: values for name, values in signals.items() if name in given or name not in numberings
+        }
+        if numberings and len(signals) < 2:
+            signals, numberings = signals | numberings, {}
         signals = {
             name: values
             for name, values in signals.items()
@@ -133,13 +137,17 @@ def choose_columns(
         signals = {name: values for name, values in signals.items() if name not in labels}
         if len(signals) < 2:
             return ColumnChoice((), "", None, _describe_too_few(tuple(signals)))
-        products = _find_products(signals, given)
-        kept = {name: values for name, values in signals.items() if name not in products}
-        choice = _choose(kept, given, tuple(inputs), output)
-        if products and not choice.output:  # the product of independent columns may be their response
-            kept, products = signals, {}
+        copies = _find_copies(signals, given)
+        kept = {name: values for name, values in signals.items() if name not in copies}
+        products = _find_products(kept, given)
+        kept = {name: values for name, values in kept.items() if name not in products}
+        choice = _choose(kept, given, tuple(inputs), output) if len(kept) > 1 else None
+        if choice is None or ((products or copies) and not choice.output):
+            # The product of independent columns, or a multiple of the only one, may be a response.
+            kept, products, copies = signals, {}, {}
             choice = _choose(kept, given, tuple(inputs), output)
     remarks = [f"{label} only numbers groups of values of {name}" for label, name in labels.items()]
+    remarks += [f"{name} is {kind} of {source}" for name, (kind, source) in copies.items()]
     remarks += [f"{name} is the product of {one} and {other}" for name, (one, other) in products.items()]
     if len(kept) > _MOST_COLUMNS:
         remarks.append(f"of {len(kept)} columns {_MOST_COLUMNS} are compared")
@@ -172,6 +180,24 @@ def _find_labels(signals: Mapping[str, NDArray[np.float64]], given: Collection[s
             known = _both_known(values, other)
             if name not in given and name != source and known.any() and is_label(values[known], other[known]):
                 found[name] = source
+                break
+    return found
+
+
+def _find_copies(
+    signals: Mapping[str, NDArray[np.float64]], given: Collection[str]
+) -> dict[str, tuple[str, str]]:
+    """Return the columns that are another one, or a linear function of it, with kind and name."""
+    found: dict[str, tuple[str, str]] = {}
+    ordered = sorted(signals, key=lambda name: name not in given)
+    for place, name in enumerate(ordered):
+        for source in ordered[:place]:
+            known = _both_known(signals[name], signals[source])
+            if name in given or source in found or not known.any():
+                continue
+            kind = describe_copy(signals[name][known], signals[source][known])
+            if kind:
+                found[name] = kind, source
                 break
     return found
 
@@ -474,7 +500,7 @@ def _mark_known(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDA
 
 
 def is_counter(name: str, values: NDArray[np.float64]) -> bool:
-    """Return whether a column counts samples, or numbers the parts of a file."""
+    """Return whether a column is constant or counts samples."""
     known = values[np.isfinite(values)]
     if known.size < 2 or np.ptp(known) == 0.0:
         return True
@@ -483,13 +509,21 @@ def is_counter(name: str, values: NDArray[np.float64]) -> bool:
     steps = np.diff(known)
     if np.mean(steps == np.median(steps)) > 0.98 and np.median(steps) != 0.0:
         return True
-    levels, changes = np.unique(known).size, np.count_nonzero(steps)
-    if np.any(known != np.round(known)) or np.any(steps[steps > 0.0] != 1.0):
-        return False
-    # Whole numbers that increase by one, and begin again, count samples or parts.
-    again = bool(np.all(known[1:][steps < 0.0] == known.min()))
-    if changes == steps.size:
-        return again
-    # Two levels that alternate are a command.
-    is_numbering = again and (levels > 2 or bool(np.all(steps >= 0.0)))
-    return is_numbering and levels <= _MOST_PARTS and bool(changes * _LEAST_PART <= known.size)
+    # Whole numbers that begin again after each sample count samples.
+    return bool(np.all(steps != 0.0)) and _increases_by_one(known)
+
+
+def is_numbering(name: str, values: NDArray[np.float64]) -> bool:
+    """Return whether a column may number the parts of a file; a test with several steps looks the same."""
+    known = values[np.isfinite(values)]
+    levels, changes = np.unique(known).size, np.count_nonzero(np.diff(known))
+    # Two levels are a command: a step, or a switch.
+    is_few = 2 < levels <= _MOST_PARTS and changes * _LEAST_PART <= known.size
+    return bool(is_few) and not find_role(name)[0] and _increases_by_one(known)
+
+
+def _increases_by_one(known: NDArray[np.float64]) -> bool:
+    """Return whether whole numbers increase by one, and begin again at the least."""
+    steps = np.diff(known)
+    is_whole = np.all(known == np.round(known)) and np.all(steps[steps > 0.0] == 1.0)
+    return bool(is_whole and np.all(known[1:][steps < 0.0] == known.min()))

@@ -129,6 +129,16 @@ def is_total(x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     return False
 
 
+def describe_copy(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
+    """Return whether x is a copy of y, or a scaled one, such as the same signal in another unit."""
+    if np.array_equal(x, y):
+        return "a copy"
+    centred, other = x - x.mean(), y - y.mean()
+    scale = float(np.dot(centred, other) / max(float(np.dot(other, other)), np.finfo(np.float64).tiny))
+    error = float(np.sqrt(np.mean((centred - scale * other) ** 2)))
+    return "a scaled copy" if error <= _COMPUTED * float(centred.std()) and error < np.inf else ""
+
+
 def is_product(x: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     """Return whether x is a multiple of the product of two columns, as a power that a logger computes.
 

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.flat_extremes import count_levels
 from islands.inspection.channel import Channel
 from islands.inspection.fact import Fact
 
@@ -92,7 +93,7 @@ def _measure_band(channel: Channel, record: Dataset) -> Fact:
 
 
 def _count_levels(channel: Channel) -> Fact:
-    levels = np.unique(channel.known).size
+    levels = count_levels(channel.known)
     if levels > _MOST_LEVELS:
         return Fact("levels", channel.name, None, "", None, None, f"{channel.name} has many amplitudes.")
     text = f"{channel.name} has {levels} levels"

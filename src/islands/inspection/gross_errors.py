@@ -212,8 +212,9 @@ class _Prediction:
         if not distance.max() > _ROUNDING * np.abs(filled).max():
             return None
         usual = known & (distance <= np.quantile(distance[known], 1.0 - _FARTHEST))
-        y = (y - np.median(y[known])) / np.std(y[known])
-        spread = np.std(u, axis=0)
+        # Squares of the largest numbers have no value.
+        y, u = y / np.abs(y[known]).max(), u / np.maximum(np.abs(u).max(axis=0), np.finfo(np.float64).tiny)
+        y, spread = (y - np.median(y[known])) / np.std(y[known]), np.std(u, axis=0)
         u = (u[:, spread > 0.0] - u.mean(axis=0)[spread > 0.0]) / spread[spread > 0.0]
         samples = np.arange(_LAGS, y.size)
         past = [y[samples - lag] for lag in range(1, _LAGS + 1)]

@@ -3,7 +3,7 @@ import pytest
 import scipy
 from column_roles import calibration_error
 
-from islands.inspection.column_roles import choose_columns, find_role, is_counter
+from islands.inspection.column_roles import choose_columns, find_role, is_counter, is_numbering
 from support.known_records import delay, lag, steps, white
 from support.role_records import KINDS, LOGGERS, make_logs, make_record, make_records
 
@@ -141,10 +141,45 @@ def test_counters_and_parts_of_a_file_are_no_signals():
     counters = {"k": k, "test": np.repeat(np.arange(3.0), 1000), "second": k % 60, "run": k // 100 % 10}
     choice = choose_columns(counters | make())
     assert (choice.inputs, choice.output) == (("a",), "b")
-    assert all(is_counter(name, values) for name, values in counters.items())
+    assert all(is_counter(name, values) or is_numbering(name, values) for name, values in counters.items())
     # A binary command and a staircase with other steps are signals.
-    assert not is_counter("a", np.repeat([0.0, 1.0, 0.0, 1.0], 50))
-    assert not is_counter("a", np.repeat([0.0, 2.0, 4.0, 0.0], 50))
+    for levels in ([0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 4.0, 0.0], [1.0, 1.0, 2.0, 2.0]):
+        command = np.repeat(levels, 50)
+        assert not is_counter("a", command)
+        assert not is_numbering("a", command)
+
+
+@pytest.mark.parametrize("levels", [[1, 2], [1, 1, 1, 2], [2, 1], [1, 2, 3, 4], [0, 1, 0]])
+def test_a_step_test_is_offered(levels):
+    u = np.repeat(levels, 600 // len(levels)).astype(float)
+    y = (
+        20.0
+        + scipy.signal.lfilter([0.0, 0.4], [1.0, -0.95], u - u[0])
+        + np.random.default_rng(0).normal(0, 0.02, u.size)
+    )
+    choice = choose_columns({"a": u, "b": y})
+    assert (choice.inputs, choice.output) == (("a",), "b")
+
+
+@pytest.mark.parametrize(
+    ("scale", "offset", "kind"), [(1, 0, "a copy"), (1e-3, 0, "a scaled copy"), (1.8, 32, "a scaled copy")]
+)
+@pytest.mark.parametrize("column", ["a", "b"])
+def test_a_copy_is_named_and_is_neither_input_nor_output(column, scale, offset, kind):
+    columns = make()
+    choice = choose_columns(columns | {"c": scale * columns[column] + offset})
+    assert (choice.inputs, choice.output) == (("a",), "b")
+    assert choice.reason.endswith(f"; c is {kind} of {column}.")
+
+
+def test_the_multiple_of_the_only_other_column_is_a_response():
+    u = steps(2000, 0, 20)
+    assert choose_columns({"u": u, "y": 2.0 * u}).output == "y"
+
+
+@pytest.mark.parametrize("name", ["setpoint", "sp", "target", "reference", "Sollwert", "ref_V"])
+def test_the_name_of_a_set_point_makes_no_input(name):
+    assert find_role(name) == ("", 0.0)
 
 
 def test_the_choice_of_the_user_stays():

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
+from islands.data.dataset import Dataset
 from islands.inspection.channel import Channel
+from islands.inspection.excitation import measure_excitation
 from islands.inspection.quantisation import find_quantisation
 from support.known_records import slow, white
 
@@ -42,6 +44,15 @@ def test_two_levels_are_no_lattice():
     fact = find(np.tile([0.0, 1.0], 50))
     assert fact.value is None
     assert fact.sentence == "y_V has two levels, 0 V and 1 V."
+
+
+def test_a_held_excitation_has_one_count_of_levels_and_no_converter():
+    force = 20.0 * np.random.default_rng(0).choice([0, 5, 19], 60).repeat(10)
+    channel = Channel("force_N", "N", force, is_output=False)
+    fact = find_quantisation(channel)
+    assert (fact.value, fact.sentence) == (None, "force_N is held at 3 levels from 0 N to 380 N.")
+    levels = measure_excitation(channel, Dataset(force, force, 1.0))[1]
+    assert levels.sentence == "force_N has 3 levels."
 
 
 def test_missing_values_are_left_out():
