@@ -18,7 +18,7 @@ _QUOTIENT = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+(?:/[^/\s]+)?)")
 #: Quantity, unit, and remarks of a logger in brackets: ``Temp, °C (LGR S/N: 10412233)``.
 _LISTED = re.compile(r"([^,]*[^,\s]),\s*([^,\s\[(]+)(\s*[\[(].*[\])])?")
 
-_BRACKETED = re.compile(r"(|.*\S)\s*[\[(（]([^\[\]()（）]*)[\])）]")
+_BRACKETED = re.compile(r"(|.*\S)\s*[\[(（]([^\[\]()（）]*(?:\([^\[\]()（）]*\))?)[\])）]")
 
 #: Exponents of ten of the SI prefixes.
 _PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
@@ -37,6 +37,26 @@ _TIME_STEM = re.compile(r"(?:t|(?i:.*(?:time|zeit|duration|dauer|delay|period|ag
 
 #: Units of time that divide the unit before them.
 _DIVISORS = frozenset({"s", "s2", "min", "h"})
+
+#: Units that divide the unit before them, by the quantity, with the letters of the quantity (ISO 80000):
+#: ``heat_kJ_kg`` is in kJ/kg, and ``cart_m_kg`` is a mass m in kg.
+_PER = {
+    "time": (re.compile(r"[munp]?s2?|min|h|d"), "tTh"),
+    "length": (re.compile(r"[munck]?m[23]?"), "Llhdsx"),
+    "volume": (re.compile(r"[mcd]?[lL]"), "V"),
+    "mass": (re.compile(r"[mk]?g"), "m"),
+    "temperature": (re.compile(r"K|degC|°C"), "T"),
+    "amount": (re.compile(r"m?mol"), "n"),
+}
+
+#: Two divisors without a mark between them, as in ``W_mK`` and ``J_kgK``.
+_TWO_DIVISORS = re.compile(r"(kg|mol|m2?)(K)")
+
+#: Force and length, which make a torque with and without a mark between them.
+_FORCE, _LENGTH, _TORQUE = re.compile(r"[mkM]?N"), re.compile(r"[mc]?m"), re.compile(r"[mukM]?N[mc]?m")
+
+#: Divisors and their dividend in a name, at most.
+_MOST_FACTORS = 4
 
 #: Quantities of one letter that are measured in a unit of time, although the letter is also a unit.
 _TIMES = ("t", "T", "h")
@@ -97,7 +117,9 @@ _WORDS = {
 }
 
 #: Spellings of the same symbol.
-_SPELLINGS = str.maketrans({"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm", "º": "°"})
+_SPELLINGS = str.maketrans("²³⁻¹", "23-1") | str.maketrans(
+    {"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm", "º": "°"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +148,10 @@ def parse_unit(name: str) -> str:
     """Return the unit in a column's name, empty if it has none: ``V`` for ``u_est_V``, ``u [V]`` and ``u/V``.
 
     The unit is the text in brackets, behind a slash, behind a comma (``Temp, °C``), after the last
-    underscore, or, if it begins with a degree sign, behind a blank (``Soll °C``). A time after another unit
-    divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
+    underscore, or, if it begins with a degree sign, behind a blank (``Soll °C``). A unit of time, length,
+    mass, temperature or amount after another unit divides it: ``omega_rad_s`` is in ``rad/s``,
+    ``solar_W_m2`` in ``W/m2``, ``c_J_kg_K`` in ``J/kg/K``. A length after a force makes a torque:
+    ``torque_N_m``. Text that is not a unit is a part of the name:
     ``oven_temperature``, ``speed (measured)``, ``level_min``.
     """
     return _split_unit(name)[1]
@@ -144,13 +168,42 @@ def _split_unit(name: str) -> tuple[str, str]:
     words, _, degrees = name.rpartition(" ")
     if words.strip() and degrees.startswith("°") and is_unit(degrees):
         return words.rstrip(), degrees
+    parts = name.split("_")
+    for count in range(min(len(parts) - 1, _MOST_FACTORS), 1, -1):
+        stem, unit = "_".join(parts[:-count]), _join_factors(parts[-count:])
+        if stem and unit:
+            return stem, unit
     stem, _, last = name.rpartition("_")
     if not (stem and is_unit(last)):
         return name, ""
-    above, _, unit = stem.rpartition("_")
-    if last in _DIVISORS and above and is_unit(unit):
-        return above, f"{unit}/{last}"
     return (name, "") if last in _LONG_TIMES and not _TIME_STEM.fullmatch(stem) else (stem, last)
+
+
+def _join_factors(factors: list[str]) -> str:
+    """Return the unit that the last words of a name make, empty if they make none."""
+    first, *others = factors
+    if "per" in others:
+        above, below = factors[: factors.index("per")], factors[factors.index("per") + 1 :]
+        is_quotient = len(above) == len(below) == 1 and is_unit(below[0]) and (first == "1" or is_unit(first))
+        return f"{first}/{below[0]}" if is_quotient else ""
+    if len(others) == 1 and _FORCE.fullmatch(first) and _LENGTH.fullmatch(others[0]):
+        return f"{first} {others[0]}"
+    divisors: list[str] = []
+    for each in others:
+        two = _TWO_DIVISORS.fullmatch(normalise_unit(each))
+        divisors += two.groups() if two else [each]
+    # Nothing is measured in a time per another unit.
+    is_dividend = first == "1" or (is_unit(first) and not _PER["time"][0].fullmatch(first))
+    if not is_dividend or any(_is_symbol(first, each) is not False for each in divisors):
+        return ""
+    return "/".join([first, *divisors])
+
+
+def _is_symbol(letter: str, unit: str) -> bool | None:
+    """Return whether a letter is that of the quantity of a divisor; None for a unit that divides no other."""
+    return next(
+        (letter in letters for units, letters in _PER.values() if units.fullmatch(normalise_unit(unit))), None
+    )
 
 
 def _match_quotient(name: str) -> re.Match[str] | None:
@@ -165,8 +218,9 @@ def _match_quotient(name: str) -> re.Match[str] | None:
 
 def is_unit(text: str) -> bool:
     """Return whether a text is a unit, or a product or quotient of units, such as ``m/s2``."""
-    factors = re.split(r"[/.*·]", normalise_unit(text).removeprefix("1/"))
-    return all(_UNIT.fullmatch(re.sub(r"\^?-?[0-9]$", "", factor)) for factor in factors)
+    factors = re.split(r"[/.*·( ]+", normalise_unit(text).removeprefix("1/").removesuffix(")"))
+    units = [re.sub(r"\^?-?[0-9]$", "", factor) for factor in factors]
+    return all(_UNIT.fullmatch(unit) or _TORQUE.fullmatch(unit) for unit in units)
 
 
 def normalise_unit(text: str) -> str:

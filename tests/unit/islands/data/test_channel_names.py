@@ -95,6 +95,41 @@ def test_long_times_are_units_of_times_and_of_rates(name, unit):
 
 
 @pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        *(("solar_W_m2", "W/m2"), ("torque_N_m", "N m"), ("heat_kJ_kg", "kJ/kg"), ("v_m_s", "m/s")),
+        *(("a_m_s2", "m/s2"), ("rho_kg_m3", "kg/m3"), ("lambda_W_mK", "W/m/K"), ("lambda_W_m_K", "W/m/K")),
+        *(
+            ("M_Nm", "Nm"),
+            ("load_kNm", "kNm"),
+            ("n_1_min", "1/min"),
+            ("q_l_min", "l/min"),
+            ("v_mm_per_s", "mm/s"),
+        ),
+        *(("c_J_kgK", "J/kg/K"), ("k_W_m2_K", "W/m2/K"), ("irradiance_W_m²", "W/m²"), ("q_µm_s", "µm/s")),
+        *(
+            ("sun [W/m²]", "W/m²"),
+            ("sun (W·m⁻²)", "W·m⁻²"),
+            ("U [W/(m² K)]", "W/(m² K)"),
+            ("x_1_per_s", "1/s"),
+        ),
+        *(("E_V_m", "V/m"), ("grad_K_m", "K/m"), ("rate_K_min", "K/min"), ("current_A_mm2", "A/mm2")),
+        *(
+            ("tank_h_m", "m"),
+            ("cart_m_kg", "kg"),
+            ("oven_T_degC", "degC"),
+            ("tank_V_l", "l"),
+            ("phase_A_V", "V"),
+        ),
+        *(("pipe_L_mm", "mm"), ("coil_T_K", "K"), ("step_per_V", "V"), ("u_s_V", "V")),
+    ],
+)
+def test_words_of_a_name_make_one_unit(name, unit):
+    assert parse_unit(name) == unit
+    assert is_unit(unit)
+
+
+@pytest.mark.parametrize(
     ("name", "stem", "unit"),
     [
         ("Temp, °C (LGR S/N: 10412233, LBL: room)", "Temp (LGR S/N: 10412233, LBL: room)", "°C"),
