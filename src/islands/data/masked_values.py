@@ -17,11 +17,11 @@ def fill_masked(values: Any) -> Any:
     """
     if isinstance(values, list | tuple) and any(isinstance(each, np.ma.MaskedArray) for each in values):
         values = np.ma.asarray(values)
-    if not isinstance(values, np.ma.MaskedArray):
-        return values
+    return _fill(values) if isinstance(values, np.ma.MaskedArray) else values
+
+
+def _fill(values: Any) -> Any:
     kind = values.dtype.kind
-    if kind in "fiub":
-        return values.astype(np.float64).filled(np.nan)
-    return (
-        values.filled(np.array("NaT", values.dtype)) if kind in "mM" else values.astype(object).filled(None)
-    )
+    if kind in "mM":
+        return values.filled(np.array("NaT", values.dtype))
+    return values.astype(np.float64).filled(np.nan) if kind in "fiub" else values.astype(object).filled(None)

@@ -132,6 +132,11 @@ def take_output(output: object) -> str | None:
     return _check_name(output, "output")
 
 
+def number_column(place: int) -> str:
+    """Return the name of a column of a file without a header."""
+    return f"c{place + 1}"
+
+
 def append_unit(name: str, unit: str) -> str:
     """Return a name with its unit in brackets, unless the name has one or the text is not a unit."""
     unit = spell_unit(unit.strip())

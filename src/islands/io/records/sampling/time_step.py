@@ -11,6 +11,7 @@ from islands.io.records.column_names import (
     TIME_UNITS,
     has_unit_of_time,
     looks_like_time,
+    number_column,
     seconds_per_unit,
     time_column,
 )
@@ -19,6 +20,9 @@ from islands.io.records.sampling.recording import Recording
 from islands.io.records.sampling.time_unit import TimeScale, find_time_unit
 from islands.io.records.sampling.uniform_grid import AGREEMENT, agrees_with_step, uniform_step
 from islands.io.records.table import Columns, RowRange, Table
+
+#: Deviation of rounded stamps from a uniform grid, relative to a step, at most.
+_JITTER = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +55,9 @@ def find_time_column(table: Table, file: str, taken: Collection[str] = (), struc
     """Return the name of the time column of a table, None if it has none.
 
     Without a column that is named as the time or has time stamps (`time_column`), it is the first column if
-    it has a unit of time and increases: oscilloscopes name it after the source of the channels.
+    it has a unit of time and increases: oscilloscopes name it after the source of the channels. The first
+    column of a file without a header is the time in seconds if it increases uniformly, and not by one as a
+    number of samples.
 
     Parameters
     ----------
@@ -68,13 +74,18 @@ def find_time_column(table: Table, file: str, taken: Collection[str] = (), struc
     if found is not None or not table.names:
         return found
     first = table.names[0]
-    if first in taken or not has_unit_of_time(first):
+    is_unnamed = first == number_column(0)
+    if first in taken or not (is_unnamed or has_unit_of_time(first)):
         return None
     try:
-        steps = np.diff(table.read((first,), None).numbers[first])
+        stamps = table.read((first,), None).numbers[first]
     except RecordError:
         return None  # it is not numbers
-    return first if steps.size and bool((steps > 0.0).all()) else None
+    if stamps.size < 2 or not bool((np.diff(stamps) > 0.0).all()):
+        return None
+    step = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    jitter = float(np.abs(stamps - stamps[0] - step * np.arange(stamps.size)).max())
+    return first if not is_unnamed or (step != 1.0 and jitter <= _JITTER * step) else None
 
 
 def find_sampling(source: TimeSource, columns: Columns) -> tuple[float, float | None]:

@@ -96,6 +96,20 @@ def test_the_law_is_found_in_a_record_with_gross_errors(tmp_path, values):
 
 
 @pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("step", [0.02, 1.0 / 30.0])
+def test_the_uniform_first_column_of_a_file_without_a_header_is_the_time(tmp_path, step):
+    path = tmp_path / "r.csv"
+    np.savetxt(path, np.column_stack([step * np.arange(len(U)), U, Y]), delimiter=",", fmt="%.3f")
+    assert read_record(path, ["c2"], "c3", header=False).dt == pytest.approx(step, rel=1e-3)
+
+
+def test_a_number_of_samples_is_no_time(tmp_path):
+    path = tmp_path / "r.csv"
+    np.savetxt(path, np.column_stack([np.arange(len(U)), U, Y]), delimiter=",", fmt="%g")
+    with pytest.raises(islands.RecordError, match="sampling time"):
+        read_record(path, ["c2"], "c3", header=False)
+
+
 def test_an_input_that_is_a_signal_is_read_at_the_samples_of_a_slow_output(tmp_path, held):
     """The output of a simulation is compared with a sample; its mean to the next sample is late."""
     rng = np.random.default_rng(3)

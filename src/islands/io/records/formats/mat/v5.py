@@ -19,6 +19,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.io.records.column_names import append_unit
 from islands.io.records.formats.mat.workspace import DAMAGED, Variable
 from islands.io.records.size_limits import DENSEST, MOST_COLUMNS, MOST_SAMPLES
 
@@ -28,6 +29,9 @@ _MAX_DEPTH = 32  # nested structures
 
 _MATRIX = 14  # element type of a variable
 _COMPRESSED = 15  # element type of a compressed variable
+
+#: Element types of characters.
+_UTF8, _UTF16 = 16, 17
 
 #: Element types of numbers, and NumPy's names for them.
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -97,7 +101,7 @@ def _iterate_variables(file: _Span) -> Iterator[Variable]:
 
 def _flatten(name: str, matrix: _Matrix, load: Callable[[], _Span], depth: int) -> Iterator[Variable]:
     """Yield a variable, or the fields of a structure."""
-    if matrix.kind != "struct" or matrix.shape != (1, 1):
+    if matrix.kind != "struct" or not math.prod(matrix.shape):
         yield Variable(name, matrix.kind, matrix.shape, partial(_read_numbers, load))
         return
     if depth > _MAX_DEPTH:
@@ -108,8 +112,44 @@ def _flatten(name: str, matrix: _Matrix, load: Callable[[], _Span], depth: int) 
     if len(table) > width * MOST_COLUMNS:
         raise ValueError(f"a structure has more than {MOST_COLUMNS} fields")
     fields = [table[start : start + width].partition("\0")[0] for start in range(0, len(table), width)]
+    if {"Name", "Data"} <= set(fields):
+        yield from _list_channels(name, fields, [span for _, span in parts])
+        return
+    if matrix.shape != (1, 1):
+        yield Variable(name, matrix.kind, matrix.shape, partial(_read_numbers, load))
+        return
     for field, (_, span) in zip(fields, parts, strict=True):
         yield from _flatten(f"{name}.{field}", _read_header(span), partial(_identity, span), depth + 1)
+
+
+def _list_channels(name: str, fields: list[str], spans: list[_Span]) -> Iterator[Variable]:
+    """Yield the channels of an array of structures that have a name and data each.
+
+    dSPACE ControlDesk writes a capture as a structure of the time axis ``X`` and the channels ``Y``, which
+    have the paths of their blocks as names.
+    """
+    capture, _, axis = name.rpartition(".")
+    seen: dict[str, int] = {}
+    for start in range(0, len(spans), len(fields)):
+        element = dict(zip(fields, spans[start : start + len(fields)], strict=True))
+        label = "time" if axis == "X" else _read_text(element["Name"]).replace('"', "").replace(".", "/")
+        label = append_unit(label, _read_text(element["Unit"]) if "Unit" in element else "")
+        seen[label] = seen.get(label, 0) + 1
+        label += f" ({seen[label]})" if seen[label] > 1 else ""
+        data = _read_header(element["Data"])
+        load = partial(_read_numbers, partial(_identity, element["Data"]))
+        yield Variable(f"{capture or axis}.{label}", data.kind, data.shape, load)
+
+
+def _read_text(span: _Span) -> str:
+    """Return the text of a variable of characters, empty for another one."""
+    matrix = _read_header(span)
+    kind, characters = next(matrix.parts, (0, None))
+    if matrix.kind != "char" or characters is None:
+        return ""
+    order = "le" if span.order == "<" else "be"
+    coding = {_UTF8: "utf-8", _UTF16: f"utf-16-{order}", 4: f"utf-16-{order}"}.get(kind, "latin-1")
+    return span.content[characters.start : characters.stop].decode(coding, "replace")
 
 
 def _read_numbers(load: Callable[[], _Span]) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from itertools import chain, islice
 
 from islands.data.channel_names import is_unit, spell_unit
 from islands.errors import RecordError, name_option
-from islands.io.records.column_names import append_unit
+from islands.io.records.column_names import append_unit, number_column
 from islands.io.records.formats.text.missing_words import EMPTY, is_missing, parse_words
 from islands.io.records.formats.text.number_format import is_number
 from islands.io.records.formats.text.quantities import split_quantity
@@ -189,7 +189,7 @@ def _find_without_header(
         )
     separator, samples = found
     width = len(_split(lines[samples], separator))
-    names = given or tuple(f"c{number + 1}" for number in range(width))
+    names = given or tuple(map(number_column, range(width)))
     if len(names) != width:
         raise RecordError(
             f"{file}, line {samples + 1} has {width} columns, and {name_option('names')} gives "

@@ -210,6 +210,21 @@ def test_an_array_of_structures_is_refused_with_advice(save, version):
     assert "run1 = runs(1)" in message
 
 
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_capture_of_controldesk_has_the_channels_by_their_names(tmp_path, compressed):
+    axis = np.zeros((1, 1), dtype=[(field, object) for field in ("Name", "Data", "Unit")])
+    axis[0, 0] = "", T[None], "s"
+    channels = np.zeros((1, 2), dtype=[(field, object) for field in ("Name", "Data", "Unit", "XIndex")])
+    channels[0, 0] = '"Model Root"/DAC/voltage', U[None], "V", 1.0
+    channels[0, 1] = '"Model Root"/Enc.1/Größe\\Out1', Y[None], "", 1.0
+    capture = {"X": axis, "Y": channels, "RTProgram": "plant.sdf", "Capture": {"Length": 0.5}}
+    scipy.io.savemat(tmp_path / "run_1.mat", {"run_1": capture}, do_compression=compressed)
+    inputs = ["run_1.Model Root/DAC/voltage [V]"]
+    record = read_record(tmp_path / "run_1.mat", inputs, "run_1.Model Root/Enc/1/Größe\\Out1")
+    assert (record.u[:, 0].tolist(), record.y.tolist()) == (U.tolist(), Y.tolist())
+    assert (record.dt, record.input_units) == (pytest.approx(0.01), ("V",))
+
+
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
 def test_an_empty_matrix_is_refused_with_its_shape(save, version):
     message = refusal(save(version, u=np.empty((0, 0)), y=Y, Ts=0.1))
