@@ -95,7 +95,6 @@ def test_the_law_is_found_in_a_record_with_gross_errors(tmp_path, values):
     assert "3 isolated spikes" in str(result) or "3 times -9999" in str(result)
 
 
-@pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("step", [0.02, 1.0 / 30.0])
 def test_the_uniform_first_column_of_a_file_without_a_header_is_the_time(tmp_path, step):
     path = tmp_path / "r.csv"
@@ -110,6 +109,7 @@ def test_a_number_of_samples_is_no_time(tmp_path):
         read_record(path, ["c2"], "c3", header=False)
 
 
+@pytest.mark.parametrize("held", [False, True])
 def test_an_input_that_is_a_signal_is_read_at_the_samples_of_a_slow_output(tmp_path, held):
     """The output of a simulation is compared with a sample; its mean to the next sample is late."""
     rng = np.random.default_rng(3)
