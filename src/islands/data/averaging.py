@@ -64,6 +64,7 @@ def average_samples(record: Dataset, count: int) -> Dataset:
         start=record.start + 0.5 * (count - 1) * record.dt,
         sha256="",
         held_out=0,
+        left_out=(),
     )
 
 

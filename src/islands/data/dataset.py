@@ -48,6 +48,8 @@ class Dataset:
     held_out : int
         Number of samples at the end, in whole segments, that a diagnosis holds out; 0 for a quarter of the
         samples.
+    left_out : tuple of (int, float)
+        Samples of the output that are missing since they are gross errors, with their measured values.
 
     Raises
     ------
@@ -70,6 +72,7 @@ class Dataset:
     reading: tuple[str, ...] = ()
     preprocessing: Preprocessing | None = None
     held_out: int = 0
+    left_out: tuple[tuple[int, float], ...] = ()
 
     def __post_init__(self) -> None:
         u, y = _to_numbers(self.u, "inputs"), _to_numbers(self.y, "output")
@@ -193,6 +196,7 @@ class Dataset:
             segments=tuple(length for length, _ in kept),
             recordings=tuple(name for _, name in kept),
             start=self.start + first * self.dt,
+            left_out=tuple((place - first, value) for place, value in self.left_out if first <= place < last),
         )
 
 
@@ -275,6 +279,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
                 f"recordings were sampled at {first.dt:.10g} s and {other.dt:.10g} s: resample one of them"
             )
     names = _name_recordings(recordings)
+    begins = np.cumsum([0, *map(len, recordings)]).tolist()
     return replace(
         first,
         u=np.concatenate([recording.u for recording in recordings]),
@@ -284,6 +289,11 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
         sha256="",
         held_out=0,
         reading=_join_reading(recordings, names),
+        left_out=tuple(
+            (begin + place, value)
+            for begin, recording in zip(begins, recordings, strict=False)
+            for place, value in recording.left_out
+        ),
     )
 
 

@@ -133,6 +133,7 @@ def _subtract(record: Dataset, found: Preprocessing) -> Dataset:
         u=record.u - np.array(found.input_offsets),
         y=record.y - found.output_offset,
         preprocessing=found,
+        left_out=tuple((place, value - found.output_offset) for place, value in record.left_out),
     )
 
 
@@ -176,7 +177,7 @@ def _filter(record: Dataset, cutoff: float, order: int) -> Dataset:
     sections = butter(order, cutoff, fs=1.0 / record.dt, output="sos")
     filter_part = partial(sosfiltfilt, sections)
     columns = [_filter_signal(signal, record, filter_part) for signal in (*record.u.T, record.y)]
-    return replace(record, u=np.column_stack(columns[:-1]), y=columns[-1])
+    return replace(record, u=np.column_stack(columns[:-1]), y=columns[-1], left_out=())
 
 
 def _filter_signal(

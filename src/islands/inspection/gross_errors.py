@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from islands.data.segments import fill_gaps
@@ -169,9 +168,9 @@ def _find_spikes(y: Signal, u: Signal) -> NDArray[np.int64]:
     A linear prediction from past outputs and inputs describes the motion of the system. A physical event
     changes the state: the samples after it are displaced, by a fraction of the event that the record may
     show nowhere else. A gross error is in the measurement alone: one prediction fails, and the samples after
-    it go on as if it had not been (an additive and not an innovational outlier; Fox 1972). What is left of
-    it is also larger than the tail of all other excursions of the record reaches, and follows no activity of
-    an input.
+    it go on as if it had not been (an additive and not an innovational outlier; Fox 1972). It is also larger
+    than the jumps that last, and than the tail of all other excursions of the record reaches, and follows no
+    activity of an input.
     """
     none = np.zeros(0, np.int64)
     known = np.isfinite(y)
@@ -291,7 +290,8 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
     count = _count_isolated(np.log(undone[isolated] / usual), errors.size)
     free = known.copy()
     free[-_LONGEST - _AROUND :] = False
-    for first in firsts[isolated[:count]]:
+    least = min(undone[isolated[:count]], default=np.inf)
+    for first in firsts[undone >= least]:
         free[max(first - _LONGEST - _AROUND, 0) : first + _LONGEST + _LAGS] = False
     drawn = np.flatnonzero(free)
     if drawn.size < _LEAST_DRAWN:
@@ -306,7 +306,9 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
         within = np.diff(np.searchsorted(ordinary, [0.5 * displacement, 2.0 * displacement]))[0]
         # A physical event leaves any fraction of itself: its displacement is uniform up to its size.
         is_error = (within + 1) / (ordinary.size + 1) > 1.5 * displacement / sizes[place]
-        if is_error and first not in caused:
+        # Where more jumps last than excursions begin, an excursion may be two of them, there and back.
+        jumps = np.count_nonzero(errors[free] >= 0.5 * sizes[place])
+        if is_error and jumps <= count * (_LAGS + 1) and first not in caused:
             found.append((first, length))
     for first, length in found:
         prediction.replace(first, length)
@@ -343,6 +345,11 @@ def _find_caused(firsts: NDArray[np.int64], u: Signal) -> set[int]:
 
     The activity of an input is its distance from its median, or its movement.
     """
+    if not firsts.size:
+        return set()
+    # The import is as long as the reading of a small file.
+    from scipy.special import betainc  # noqa: PLC0415
+
     caused: set[int] = set()
     while (left := np.array([each for each in np.sort(firsts) if each not in caused])).size:
         best, found = _BY_CHANCE, left[:0]
@@ -356,7 +363,7 @@ def _find_caused(firsts: NDArray[np.int64], u: Signal) -> set[int]:
                     alone = np.sort(ranks[np.diff(left, prepend=-length - 1) > length])
                     counts = np.arange(1, alone.size + 1)
                     # The binomial distribution, as an incomplete beta function.
-                    chances = scipy.special.betainc(counts, alone.size - counts + 1, alone)
+                    chances = betainc(counts, alone.size - counts + 1, alone)
                     place = int(np.argmin(chances))
                     chance = 2 * u.shape[1] * len(_CAUSES) * alone.size * chances[place]
                     if chance < best:

@@ -15,6 +15,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.data.flat_extremes import find_limits
 from islands.data.split import measure_input_ranges
+from islands.errors import RecordError
 from islands.estimation.estimator_table import Criterion
 from islands.evolution.search_result import SearchResult, state_steps, without_optional_steps
 from islands.inspection.noise import measure_output_noise
@@ -32,6 +33,7 @@ from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
 from islands.progress import Steps
+from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
@@ -140,11 +142,36 @@ def _data_document(found: SearchResult) -> dict[str, Any]:
     parts = {"estimation": found.split.estimation, "validation": found.split.validation}
     return {
         "missing_outputs": int(np.isnan(found.record.y).sum()),
+        "left_out": _measure_left_out(found),
         "output_range": found.record.output_range,
         "output_limits": list(find_limits(found.record.y, found.record.bounds)),
         "noise": measure_output_noise(found.split.estimation),
         "inputs": {part: measure_input_ranges(record) for part, record in parts.items()},
     }
+
+
+def _measure_left_out(found: SearchResult) -> dict[str, Any] | None:
+    """Return the error of the recommended model over all samples without and with those that are left out.
+
+    None if no sample is left out, if the model has means of samples, or if its free run has no start or
+    diverges.
+    """
+    record, model = found.record, found.models[found.recommendation.rank - 1].model
+    if not record.left_out or found.average != 1:
+        return None
+    try:
+        run = free_run(model, record).y
+    except RecordError:  # an output is missing in a warm-up
+        return None
+    places, values = zip(*record.left_out, strict=True)
+    errors, others = record.y - run, np.array(values) - run[list(places)]
+    errors, others = errors[np.isfinite(errors)], others[np.isfinite(others)]
+    if not errors.size or not others.size:
+        return None
+    every = np.concatenate([errors, others])
+    with np.errstate(over="ignore"):
+        without, together = (float(np.sqrt(np.mean(each**2))) for each in (errors, every))
+    return {"samples": others.size, "rmse": without, "rmse_with": together}
 
 
 def content_sha256(record: Dataset) -> str:

@@ -99,6 +99,7 @@ def read_table(
     columns = table.read(tuple(dict.fromkeys((*chosen, *([clock] if clock else [])))), rows)
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))
+    measured = None if output is None else columns.numbers[output]
     columns, excluded = exclude_gross_errors(columns, sources, output, options)
     source = TimeSource(table, clock, dt, structure, options)
     required = [name for name in columns.numbers if not (missing_output and name == output)]
@@ -128,7 +129,11 @@ def read_table(
     record = _make_record(found, sources, output, structures, columns.units, file)
     if output is not None and (note := _describe_saturation(record)):
         record = replace(record, reading=(*record.reading, note))
-    return advance_inputs(record, _find_advanced(inputs, sources))
+    record = advance_inputs(record, _find_advanced(inputs, sources))
+    if measured is None or not excluded or len(measured) != record.samples:
+        return record
+    places = np.flatnonzero(np.isnan(record.y) & np.isfinite(measured)).tolist()
+    return replace(record, left_out=tuple((place, float(measured[place])) for place in places))
 
 
 def _read_rows(

@@ -717,6 +717,15 @@ def _describe_missing_outputs(facts: ResultFacts) -> str:
     )
 
 
+def _describe_left_out(facts: ResultFacts) -> str:
+    found = facts.data["left_out"]
+    without, together = (facts.write_amount(found[key]) for key in ("rmse", "rmse_with"))
+    return (
+        f"Gross errors: over the whole record, the free run has an RMSE of {without} without the "
+        f"{found['samples']} samples that are left out, and of {together} with them."
+    )
+
+
 def _describe_uncertainty(facts: ResultFacts) -> str:
     half = facts.write_amount(typical_half_width(facts.bands))
     text = f"Uncertainty: the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
@@ -1055,6 +1064,7 @@ MEASURES: Final[tuple[Statement[ResultFacts], ...]] = (
         _describe_recordings,
     ),
     Statement("missing-outputs", lambda facts: facts.data.get("missing_outputs"), _describe_missing_outputs),
+    Statement("left-out", lambda facts: facts.data.get("left_out"), _describe_left_out),
     Statement(
         "uncertainty",
         lambda facts: facts.bands and facts.document.get("ensemble") is not None,
