@@ -65,7 +65,14 @@ def test_a_result_has_every_field_of_the_contract(findings):
     ]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
     assert list(result["search"])[:5] == contract
-    assert set(result["data"]) == {"missing_outputs", "output_range", "output_limits", "noise", "inputs"}
+    assert set(result["data"]) == {
+        "left_out",
+        "missing_outputs",
+        "output_range",
+        "output_limits",
+        "noise",
+        "inputs",
+    }
     assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
     for model in result["models"]:
         assert list(model) == [

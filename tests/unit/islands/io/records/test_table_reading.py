@@ -98,7 +98,7 @@ def test_the_law_is_found_in_a_record_with_gross_errors(tmp_path, values):
 
 
 @pytest.mark.ci  # a search
-def test_a_result_states_the_errors_with_and_without_the_samples_that_are_left_out():
+def test_a_result_states_its_error_with_gross_errors_too():
     wrong = Y.copy()
     wrong[[150, 700]] = 60.0, -50.0
     record = islands.as_record(U, wrong, 0.5)
