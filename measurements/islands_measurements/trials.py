@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from islands.cli.console import output
-from islands.cli.engines import check_engine, ray_pool
+from islands.cli.engines import check_engine, open_pool
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import stop_requests
 from islands.errors import SettingsError, lookup
@@ -161,13 +161,13 @@ def _run_all(
     out: Path | None,
 ) -> None:
     """Run trials in parallel and report their outcomes; a stop request leaves out those not begun."""
-    check_engine("ray")
+    check_engine(None, address)
     compile_kernels()
     found: list[Outcome] = []
     with progress("trials") as show, stop_requests() as stop:
         steps = Steps(show, stop)
         check = partial(steps.check, "the first trial")
-        with suppress(StoppedError), ray_pool(workers, address, check) as parallel_map:
+        with suppress(StoppedError), open_pool(workers, address, check) as parallel_map:
             for outcome in parallel_map(run, planned):
                 found.append(outcome)
                 show(f"{len(found)} of {len(planned)}", len(found) / len(planned))

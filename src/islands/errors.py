@@ -71,6 +71,10 @@ class SettingsError(IslandsError):
     """A setting is unknown, out of range, or contradicts another setting."""
 
 
+class EngineError(IslandsError):
+    """What runs a computation on several cores or machines does not start, or cannot go on."""
+
+
 class ExtrapolationWarning(UserWarning):
     """An input of the validation data leaves the range of the estimation data."""
 

@@ -106,9 +106,7 @@ def test_a_simulation_is_diagnosed(folder):
     [
         (("serve",), "islands serve needs the extra 'service'"),
         (("keys", "list"), "islands keys needs the extra 'service'"),
-        pytest.param(
-            *(("trials", "--count", 1), "islands trials needs the extra 'ray'"), marks=pytest.mark.nightly
-        ),
+        (("trials", "--ray-address", "127.0.0.1:1"), "the engine ray needs the extra 'ray'"),
         (
             ("identify", "record.csv", *COLUMNS, *SEARCH, "--engine", "ray", "--out", "never"),
             "the engine ray needs the extra 'ray'",

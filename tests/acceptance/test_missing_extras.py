@@ -16,8 +16,9 @@ import pytest
 
 import islands
 from islands.cli.app import EXTRAS as COMMAND_EXTRAS
-from islands.cli.engines import serial_notice
+from islands.cli.engines import start_engine
 from islands.errors import IslandsError
+from islands.evolution.engine import SerialEngine
 from islands.facade.engine_choice import open_engine
 from islands.simulators.fmu.fmi_description import import_fmpy
 from islands_api.web.auth import make_verifier
@@ -153,8 +154,12 @@ def test_a_service_without_some_of_its_packages_names_them_and_does_not_start(
     assert not (tmp_path / "data").exists()
 
 
-def test_a_search_on_one_core_for_lack_of_ray_says_how_to_install_it():
-    assert INSTRUCTION.findall(serial_notice()) == ["ray"]
+def test_a_search_on_one_core_for_lack_of_ray_says_how_to_install_it(monkeypatch):
+    monkeypatch.setattr("islands.cli.engines.has_ray", lambda: False)
+    told = []
+    with start_engine(None, None, 2, told.append) as engine:
+        assert isinstance(engine, SerialEngine)
+    assert INSTRUCTION.findall(*told) == ["ray"]
 
 
 def test_every_message_names_an_extra_and_is_tested():

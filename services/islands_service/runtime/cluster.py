@@ -200,7 +200,16 @@ class _LocalNode(Node):  # type: ignore[misc]
     They are the autoscaler, the log monitor, which sends the output of actors to drivers that ask for it, and
     the server of the dashboard, which Ray starts even without a dashboard. Each of them imports for a second,
     and Ray waits for the last one.
+
+    A node that does not start ends the processes that it has started; Ray's would leave them to this process.
     """
+
+    def __init__(self, *arguments: object, **options: object) -> None:
+        try:
+            super().__init__(*arguments, **options)
+        except BaseException:
+            self.kill_all_processes(check_alive=False, wait=True)
+            raise
 
     def start_monitor(self) -> None:
         pass
@@ -230,14 +239,16 @@ def _without_unused_processes() -> Iterator[None]:
 def _local_ray(cpus: int, jobs: int) -> Iterator[None]:
     # Ray's processes listen on the loopback interface: the token keeps other users of this machine out.
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
-    parent = Path(tempfile.gettempdir())
-    if len(os.fsencode(parent)) > _MAX_PARENT_LENGTH:
-        parent = Path("/tmp")
-    _remove_stale_folders(parent)
-    folder = tempfile.mkdtemp(prefix=_PREFIX, dir=parent)
-    lock = FileLock(Path(folder) / _LOCK)
-    with lock:
+    with ExitStack() as stack:
         try:
+            parent = Path(tempfile.gettempdir())
+            if len(os.fsencode(parent)) > _MAX_PARENT_LENGTH:
+                parent = Path("/tmp")
+            _remove_stale_folders(parent)
+            folder = tempfile.mkdtemp(prefix=_PREFIX, dir=parent)
+            stack.enter_context(FileLock(Path(folder) / _LOCK))
+            stack.callback(shutil.rmtree, folder, ignore_errors=True)
+            stack.callback(ray.shutdown)
             with _without_unused_processes():
                 # Without "local" Ray would attach to any cluster on the machine.
                 ray.init(
@@ -253,10 +264,6 @@ def _local_ray(cpus: int, jobs: int) -> Iterator[None]:
                 )
         except Exception as error:  # Ray raises plain exceptions, too, for example after a timeout
             raise ClusterError(
-                f"Ray does not start on this machine ({error}): try --engine serial"
+                f"Ray does not start on this machine ({error}): end other programs, or do without Ray"
             ) from error
-        try:
-            yield
-        finally:
-            ray.shutdown()
-            shutil.rmtree(folder, ignore_errors=True)
+        yield

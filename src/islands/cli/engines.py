@@ -1,15 +1,17 @@
-"""Engines of a search on the command line: serial, or Ray, whose factory is an entry point."""
+"""Engines of a search on the command line: serial, or Ray, whose factories are entry points."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 
+from islands.cli.console import print_message
 from islands.distribution import describe_missing_extra
-from islands.errors import SettingsError
+from islands.errors import EngineError, SettingsError
 from islands.evolution.engine import Engine, SerialEngine
-from islands.facade.engine_choice import GROUP
+from islands.facade.engine_choice import Ray, open_engine
 from islands.parallel import ParallelMap
+from islands.processes.pool import process_pool
 from islands.progress import ProgressCallback
 
 #: Names of the engines.
@@ -19,42 +21,77 @@ ENGINES = ("serial", "ray")
 PARALLEL_MAPS = "islands.parallel_maps"
 
 
+@contextmanager
 def start_engine(
-    name: str, address: str | None, progress: ProgressCallback
-) -> AbstractContextManager[Engine]:
-    """Return an engine of `ENGINES` for a ``with`` block.
+    name: str | None, address: str | None, islands: int, progress: ProgressCallback
+) -> Iterator[Engine]:
+    """Start the engine of a search for a ``with`` block; all engines give the same result.
+
+    Without a name or an address, several islands run on Ray. Where it is not installed or does not start,
+    they run on one core, and a message says so.
 
     Parameters
     ----------
+    name : str or None
+        One of `ENGINES`.
     address : str or None
         ``HOST:PORT`` of a Ray cluster; None for this machine.
+    islands : int
+        Number of islands of the search. Ray starts in three seconds, and one island does not need it.
     progress : ProgressCallback
         Receives the messages of the engine.
+
+    Raises
+    ------
+    EngineError
+        Ray was chosen, by its name or by an address, and does not start.
     """
-    if name == "serial":
-        return nullcontext(SerialEngine())
-    (entry,) = entry_points(group=GROUP, name=name)
-    engine: AbstractContextManager[Engine] = entry.load()(address, progress)
-    return engine
+    is_chosen = name == "ray" or address is not None
+    with ExitStack() as stack:
+        engine: Engine = SerialEngine()
+        if is_chosen or (name is None and islands > 1):
+            try:
+                if not is_chosen and not has_ray():
+                    raise EngineError(describe_missing_extra("a search on all cores", "ray"))
+                engine = stack.enter_context(open_engine(Ray(address), progress))
+            except EngineError as error:
+                if is_chosen:
+                    raise
+                progress(f"engine: serial, on one core, with the same result; {error}")
+        yield engine
 
 
-def ray_pool(
-    workers: int | None, address: str | None, check: Callable[[], object]
-) -> AbstractContextManager[ParallelMap]:
-    """Return a parallel map on Ray for a ``with`` block.
+@contextmanager
+def open_pool(workers: int | None, address: str | None, check: Callable[[], object]) -> Iterator[ParallelMap]:
+    """Open a parallel map for a ``with`` block: on Ray, or on processes where it is absent or does not start.
 
     Parameters
     ----------
     workers : int or None
         Concurrent calls; None for one per core.
     address : str or None
-        ``HOST:PORT`` of a cluster; None starts a local Ray.
+        ``HOST:PORT`` of a Ray cluster; None for this machine.
     check : callable
         Called many times a second. If it raises an error, all calls are ended.
+
+    Raises
+    ------
+    EngineError
+        No cluster answers at the address.
     """
-    (entry,) = entry_points(group=PARALLEL_MAPS, name="ray")
-    pool: AbstractContextManager[ParallelMap] = entry.load()(workers, address, check)
-    return pool
+    with ExitStack() as stack:
+        parallel_map: ParallelMap | None = None
+        if address is not None or has_ray():
+            (entry,) = entry_points(group=PARALLEL_MAPS, name="ray")
+            try:
+                parallel_map = stack.enter_context(entry.load()(workers, address, check))
+            except EngineError as error:
+                if address is not None:
+                    raise
+                print_message(f"processes in place of Ray, with the same result; {error}")
+        if parallel_map is None:
+            parallel_map = stack.enter_context(process_pool(workers, start_after=0.0, check=check))
+        yield parallel_map
 
 
 def has_ray() -> bool:
@@ -62,27 +99,13 @@ def has_ray() -> bool:
     return find_spec("ray") is not None
 
 
-def check_engine(name: str) -> None:
-    """Check that the packages of an engine are installed, before the kernels are compiled.
+def check_engine(name: str | None, address: str | None) -> None:
+    """Check that the packages of a chosen engine are installed, before the kernels are compiled.
 
     Raises
     ------
     SettingsError
         They are not.
     """
-    if name == "ray" and not has_ray():
+    if (name == "ray" or address is not None) and not has_ray():
         raise SettingsError(describe_missing_extra("the engine ray", "ray"))
-
-
-def serial_notice() -> str:
-    """Return the notice of a command that runs several islands on one core, since Ray is not installed."""
-    return f"engine: serial, on one core; {describe_missing_extra('a search on all cores', 'ray')}"
-
-
-def default_engine(islands: int, address: str | None = None) -> str:
-    """Return the name of the engine of a search for which none is chosen; all give the same result.
-
-    It is Ray for several islands and with the address of a cluster. Ray starts in three seconds, and one
-    island does not need it. Without Ray, it is the serial engine unless an address is given.
-    """
-    return "ray" if address or (islands > 1 and has_ray()) else "serial"

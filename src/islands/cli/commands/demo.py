@@ -12,7 +12,7 @@ from rich.table import Table
 
 import islands
 from islands.cli.console import output, print_message
-from islands.cli.engines import default_engine, has_ray, serial_notice, start_engine
+from islands.cli.engines import start_engine
 from islands.cli.output_folder import RESULT_FILES, check_folder, keep_models, print_failures
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.search_progress import SearchDisplay
@@ -70,10 +70,8 @@ def demo(
     for part in SELECTING:
         write_record(records[part], out / f"{part}.csv")
     compile_kernels()
-    if not has_ray():
-        print_message(serial_notice())
     with ExitStack() as handlers:
-        with progress("demo") as show, start_engine(default_engine(ISLANDS), None, print_message) as engine:
+        with progress("demo") as show, start_engine(None, None, ISLANDS, print_message) as engine:
             # As in `islands.cli.runs.identify`.
             stop = handlers.enter_context(stop_requests())
             settings = resolve_settings(PRESET, {"islands": ISLANDS})

@@ -1,7 +1,6 @@
 """``islands reproduce``: the tables and figures of the paper, computed, next to the published numbers."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,13 +13,11 @@ from rich.table import Table
 from rich.text import Text
 
 from islands.cli.console import errors, output
-from islands.cli.engines import has_ray, ray_pool
+from islands.cli.engines import open_pool
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import INTERRUPTED, TERMINATED, stop_requests
 from islands.errors import SettingsError, lookup
-from islands.parallel import ParallelMap
-from islands.processes.pool import process_pool
 from islands.progress import Steps, StoppedError
 from islands.reproduction import appendix_a, case1, case2
 from islands.reproduction.page import write_reproduction
@@ -105,7 +102,7 @@ def _run(tasks: list[Task], folder: Path) -> dict[str, Document]:
     with progress("reproduce") as show, stop_requests() as stop:
         steps = Steps(show, stop)
         try:
-            with _open_pool(partial(steps.check, "the rest of the tasks")) as parallel_map:
+            with open_pool(None, None, partial(steps.check, "the rest of the tasks")) as parallel_map:
                 return run_tasks(tasks, folder, parallel_map, show)
         except StoppedError:
             pass
@@ -115,17 +112,6 @@ def _run(tasks: list[Task], folder: Path) -> dict[str, Document]:
         markup=False,
     )
     raise typer.Exit(INTERRUPTED if stop.number == SIGINT else TERMINATED)
-
-
-@contextmanager
-def _open_pool(check: Callable[[], object]) -> Iterator[ParallelMap]:
-    """Open a parallel map on the cores of this machine: on Ray if it is installed, else on processes."""
-    if has_ray():
-        with ray_pool(None, None, check) as parallel_map:
-            yield parallel_map
-    else:
-        with process_pool(start_after=0.0, check=check) as parallel_map:
-            yield parallel_map
 
 
 def _make_table(compared: ComparisonTable) -> Table:

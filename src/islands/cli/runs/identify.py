@@ -11,7 +11,7 @@ from typing import Any
 
 import islands
 from islands.cli.console import errors, output, print_message
-from islands.cli.engines import check_engine, default_engine, has_ray, serial_notice, start_engine
+from islands.cli.engines import check_engine, start_engine
 from islands.cli.output_folder import keep_models, print_failures, show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
@@ -68,7 +68,7 @@ class RunOptions:
     Attributes
     ----------
     engine : str, optional
-        Name of an engine; by default that of `default_engine`.
+        Name of an engine; the default is that of `start_engine`.
     address : str, optional
         Address of a Ray cluster.
     wall_time : float, optional
@@ -84,10 +84,6 @@ class RunOptions:
     wall_time: float | None
     verbose: bool
     figures: tuple[str, ...]
-
-    def engine_for(self, islands: int) -> str:
-        """Return the name of the engine."""
-        return self.engine or default_engine(islands, self.address)
 
 
 def run(
@@ -110,16 +106,14 @@ def run(
     """
     possible = _resolve_possible(job)
     data, held_out, test_data = _read_data(job, max(each.maximum_lag for each in possible))
-    chosen = run_options.engine_for(possible[0].islands)
-    check_engine(chosen)
+    chosen = run_options.engine, run_options.address
+    check_engine(*chosen)
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
-    if run_options.engine is None and possible[0].islands > 1 and not has_ray():
-        print_message(serial_notice())
     with ExitStack() as handlers:
         with (
             progress("identify") as show,
-            start_engine(chosen, run_options.address, print_message) as started,
+            start_engine(*chosen, possible[0].islands, print_message) as started,
         ):
             # After the start of Ray, which installs a handler for SIGTERM, and until the command ends: a
             # signal that arrives while Ray ends does not discard the result.

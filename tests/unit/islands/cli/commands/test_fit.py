@@ -34,7 +34,7 @@ def test_a_missing_extra_is_reported_before_kernels_are_compiled(tmp_path, monke
     [
         ("identify", ["--engine", "ray"], "ray"),
         ("diagnose", ["--simulation", "fmu:r.fmu"], "fmi"),
-        ("trials", ["--core", "second-order"], "ray"),
+        ("trials", ["--core", "second-order", "--ray-address", "127.0.0.1:1"], "ray"),
     ],
 )
 def test_a_missing_engine_or_simulator_is_reported_before_kernels_are_compiled(

@@ -69,7 +69,7 @@ def engines(monkeypatch):
         requested = []
 
         @contextmanager
-        def start(name, address, tell):
+        def start(name, address, _islands, tell):
             requested.append((name, address))
             tell("[an engine] message")
             yield engine

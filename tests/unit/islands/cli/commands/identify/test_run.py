@@ -89,7 +89,7 @@ def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_pat
     """Ray takes a second to end."""
 
     @contextmanager
-    def ending(_name, _address, _tell):
+    def ending(_name, _address, _islands, _tell):
         yield SerialEngine()
         signal.raise_signal(signal.SIGINT)
 
