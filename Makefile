@@ -18,10 +18,8 @@ help:
 # What runs: core, Ray, service. Other targets add their groups of packages when they are first called.
 setup: .venv/ready
 
-.venv/ready: requirements.lock pyproject.toml deploy/packages/install.py
-	@$(INSTALL) --extra ray --extra service --group build
-	@$(BIN)/python -m pip uninstall --quiet --quiet --disable-pip-version-check --yes islands # the former name of the distribution
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
+.venv/ready: requirements.lock pyproject.toml deploy/packages/install.py deploy/packages/compile_modules.py
+	@$(INSTALL) --extra ray --extra service --group build --project
 	@touch $@
 
 .venv/ready-%: .venv/ready

@@ -1,16 +1,18 @@
 """Install locked packages into a virtual environment, with verified hashes.
 
-    python3 deploy/packages/install.py .venv --extra service --group build
+    python3 deploy/packages/install.py .venv --extra service --group build --project
 
 Extras and groups are those of `pyproject.toml`. `requirements.lock` has the version and the hashes of each
 package, also of those that others require; a package that it does not name is refused. The environment is
 created if it does not exist. uv installs the packages; pip installs uv in its locked version, unless it is
 installed beside the running Python. With ``--pip``, pip installs all packages of the lock file instead.
+``--project`` adds the packages of this checkout, and the bytecode of the modules that their commands load.
 
 This program needs nothing but Python, since it runs before anything is installed.
 """
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -97,31 +99,27 @@ def main() -> None:
     parser.add_argument("--group", action="append", default=[], help="group of pyproject.toml")
     parser.add_argument("--tools", action="store_true", help="install the groups only")
     parser.add_argument("--pip", action="store_true", help="install all packages, by pip")
+    parser.add_argument("--project", action="store_true", help="install the sources, editable")
     arguments = parser.parse_args()
     if sys.version_info < PYTHON:
         sys.exit(f"islands needs Python 3.11 or newer, not {sys.version.split()[0]}: make PYTHON=python3.11")
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # of set-up, and not of each start
     python = create_environment(arguments.environment.absolute())
     if arguments.pip:
+        install = [python, "-m", "pip", "install", "--disable-pip-version-check"]
         # The lock file is complete. Without --no-deps pip refuses what [tool.uv] overrides.
-        options = ["--require-hashes", "--no-deps", "--disable-pip-version-check", "--no-compile"]
-        run([python, "-m", "pip", "install", *options, "--requirement", LOCK], "installing all packages")
-        return
-    chosen = [f"--group={PROJECT}:{name}" for name in arguments.group]
-    if not arguments.tools:
-        chosen += [f"--requirement={PROJECT}", *(f"--extra={name}" for name in arguments.extra)]
-    command = [
-        install_uv(python),
-        "pip",
-        "install",
-        "--python",
-        python,
-        "--require-hashes",
-        "--constraint",
-        LOCK,
-    ]
-    run(
-        [*command, *chosen], f"installing packages ({', '.join(arguments.extra + arguments.group) or 'core'})"
-    )
+        options = ["--require-hashes", "--no-deps", "--no-compile", "--requirement", LOCK]
+        run([*install, *options], "installing all packages")
+    else:
+        install = [install_uv(python), "pip", "install", "--python", python]
+        chosen = [f"--group={PROJECT}:{name}" for name in arguments.group]
+        if not arguments.tools:
+            chosen += [f"--requirement={PROJECT}", *(f"--extra={name}" for name in arguments.extra)]
+        title = f"installing packages ({', '.join(arguments.extra + arguments.group) or 'core'})"
+        run([*install, "--require-hashes", "--constraint", LOCK, *chosen], title)
+    if arguments.project:
+        run([*install, "--no-build-isolation", "--no-deps", "--editable", ROOT], "installing islands")
+        run([python, Path(__file__).with_name("compile_modules.py")], "compiling modules")
 
 
 if __name__ == "__main__":

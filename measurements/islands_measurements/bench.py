@@ -99,9 +99,10 @@ def _print_report(report: BenchmarkReport) -> None:
     _print_times(report)
     _print_searches(report)
     _print_goals(report)
+    machine = report.machine
     output.print(
-        f"workload {report.workload[:12]}, {report.machine.processor}, {report.machine.cores} cores, "
-        f"C: {report.machine.compiler or 'no compiler called cc'}",
+        f"workload {report.workload[:12]}, {machine.processor}, {machine.cores} cores, "
+        f"C: {machine.compiler or 'no compiler called cc'}, yardstick {machine.yardstick_s:.2f} s",
         markup=False,
     )
 

@@ -156,10 +156,10 @@ def test_a_service_without_some_of_its_packages_names_them_and_does_not_start(
 
 def test_a_search_on_one_core_for_lack_of_ray_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr("islands.cli.engines.has_ray", lambda: False)
-    told = []
-    with start_engine(None, None, 2, told.append) as engine:
+    messages = []
+    with start_engine(None, None, 2, messages.append) as engine:
         assert isinstance(engine, SerialEngine)
-    assert INSTRUCTION.findall(*told) == ["ray"]
+    assert INSTRUCTION.findall(*messages) == ["ray"]
 
 
 def test_every_message_names_an_extra_and_is_tested():

@@ -45,6 +45,6 @@ def report(**changes):
         case1_wall_s=9.5,
         parallel_efficiency_2=0.97,
         scalings=(*scalings, islands),
-        machine=Machine("a processor", 2, "Linux", "3.11", None, {"numpy": "2"}),
+        machine=Machine("a processor", 2, "Linux", "3.11", None, {"numpy": "2"}, 1.0),
     )
     return replace(made, **changes)

@@ -12,6 +12,7 @@ from islands.distribution import read_version
 from islands.export.fmu.compiler import find_compiler
 from islands_measurements.speed.clock import cpu
 from islands_measurements.speed.compiled_c import compile_model
+from islands_measurements.speed.yardstick import measure_yardstick
 
 #: Other packages whose versions influence the times.
 _PACKAGES = ("numpy", "numba", "llvmlite", "scipy")
@@ -32,6 +33,8 @@ class Machine:
         First line of the version text of the C compiler; None if there is no compiler.
     packages : dict of str to str
         Versions of the packages.
+    yardstick_s : float
+        Seconds of CPU of the loop of `measure_yardstick`.
     """
 
     processor: str
@@ -40,6 +43,7 @@ class Machine:
     python: str
     compiler: str | None
     packages: dict[str, str]
+    yardstick_s: float
 
 
 def this_machine() -> Machine:
@@ -51,6 +55,7 @@ def this_machine() -> Machine:
         platform.python_version(),
         _compiler(),
         {"islands": read_version(), **{name: version(name) for name in _PACKAGES}},
+        measure_yardstick(0.1),
     )
 
 

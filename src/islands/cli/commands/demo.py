@@ -1,7 +1,7 @@
 """``islands demo``: identification of the paper's case 1, compared with the paper's Table 1."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -69,9 +69,14 @@ def demo(
     out.mkdir(parents=True, exist_ok=True)
     for part in SELECTING:
         write_record(records[part], out / f"{part}.csv")
-    compile_kernels()
+    with _timed("kernels"):
+        compile_kernels()
     with ExitStack() as handlers:
-        with progress("demo") as show, start_engine(None, None, ISLANDS, print_message) as engine:
+        with (
+            _timed("search"),
+            progress("demo") as show,
+            start_engine(None, None, ISLANDS, print_message) as engine,
+        ):
             # As in `islands.cli.runs.identify`.
             stop = handlers.enter_context(stop_requests())
             settings = resolve_settings(PRESET, {"islands": ISLANDS})
@@ -94,14 +99,24 @@ def demo(
         with progress("demo") as show:
             show("figures", None)
             drawing = Steps(stop=stop)
-            result.save(out, drawing, ALL_FIGURES)
+            with _timed("figures"):
+                result.save(out, drawing, ALL_FIGURES)
             compared = Steps(show, stop)
-            models = compared.attempt(_COMPARISON, partial(_make_paper_models, records, compared)) or {}
+            with _timed("models of the paper"):
+                models = compared.attempt(_COMPARISON, partial(_make_paper_models, records, compared)) or {}
         print_failures({**drawing.not_computed, **compared.not_computed})
         output.print(f"{out}/: {RESULT_FILES}", markup=False)
         stop.end(out, (*result.left_out, *drawing.left_out, _COMPARISON), "repeat the command")
 
     _print_comparison(result, models, records)
+
+
+@contextmanager
+def _timed(phase: str) -> Iterator[None]:
+    """Print the wall time of a phase after it."""
+    began = perf_counter()
+    yield
+    print_message(f"{phase}: {perf_counter() - began:.0f} s")
 
 
 def _print_comparison(

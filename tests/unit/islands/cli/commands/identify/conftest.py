@@ -63,14 +63,14 @@ def interrupted(watched):
 
 @pytest.fixture
 def engines(monkeypatch):
-    """Return a function that replaces all engines by one and returns the requested names and addresses."""
+    """Return a function that replaces all engines by one and returns what was requested of `start_engine`."""
 
     def table(engine):
         requested = []
 
         @contextmanager
-        def start(name, address, _islands, tell):
-            requested.append((name, address))
+        def start(name, address, islands, tell):
+            requested.append((name, address, islands))
             tell("[an engine] message")
             yield engine
 

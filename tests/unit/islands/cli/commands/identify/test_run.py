@@ -290,14 +290,14 @@ def test_resume_rejects_record_and_settings(run, more):
 @pytest.mark.parametrize(
     ("number", "words", "expected"),
     [
-        (1, (), ("serial", None)),
-        (2, (), ("ray", None)),
-        (2, ("--engine", "serial"), ("serial", None)),
-        pytest.param(1, ("--engine", "ray"), ("ray", None), marks=pytest.mark.nightly),
-        (1, ("--ray-address", "there:6379"), ("ray", "there:6379")),
+        (1, (), (None, None, 1)),
+        (2, (), (None, None, 2)),
+        (2, ("--engine", "serial"), ("serial", None, 2)),
+        pytest.param(1, ("--engine", "ray"), ("ray", None, 1), marks=pytest.mark.nightly),
+        (1, ("--ray-address", "there:6379"), (None, "there:6379", 1)),
     ],
 )
-def test_ray_runs_several_islands_by_default(run, engines, number, words, expected):
+def test_engine_is_chosen_by_the_options_and_the_number_of_islands(run, engines, number, words, expected):
     requested = engines(SerialEngine())
     code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--islands", number, *words)
     # Messages of an engine are printed verbatim.
@@ -314,7 +314,7 @@ def test_islands_of_a_preset_select_the_engine(run, engines, monkeypatch):
     assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--out", "out")[0] == 0
     assert run("--resume", "out")[0] == 0
     assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--islands", "1", "--out", "one")[0] == 0
-    assert requested == [("ray", None), ("ray", None), ("serial", None)]
+    assert requested == [(None, None, 2), (None, None, 2), (None, None, 1)]
 
 
 @pytest.mark.parametrize("more", [(), ("--resume", "out")])
