@@ -5,11 +5,11 @@ BIN := .venv/bin
 # INSTALL_OPTIONS=--pip installs everything by pip instead of uv.
 INSTALL := $(PYTHON) deploy/packages/install.py .venv $(INSTALL_OPTIONS)
 
-.PHONY: help setup demo collect test ci nightly soak fuzz load lint bench docs lock sbom licences audit wheel wheel-matrix clean
+.PHONY: help setup demo collect test ci nightly soak fuzz load lint kernels bench docs lock sbom licences audit wheel wheel-matrix clean
 
 # The first target, so that `make` alone prints it.
 help:
-	@echo 'make demo     set up, identify a record, show the result: 48 s on a fresh machine with two cores'
+	@echo 'make demo     set up, identify a record, show the result: 30 s on a fresh machine with two cores'
 	@echo 'make test     the tests: 180 s'
 	@echo 'make setup    the environment .venv with what runs: Ray and the service'
 	@echo 'make lint     format, types, imports     make docs   the site     make bench   speed on this machine'
@@ -77,6 +77,10 @@ lint: .venv/ready-lint
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+# The machine code of all kernels, which is part of the package: after a change of a kernel or of its imports. 100 s of CPU.
+kernels: .venv/ready-test
+	$(BIN)/python deploy/packages/compile_kernels.py
 
 bench: setup
 	$(BIN)/islands bench

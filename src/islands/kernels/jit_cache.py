@@ -1,8 +1,13 @@
-"""Cache of compiled kernels on disk, and their compilation before a search starts.
+"""Machine code of the kernels: part of the package, or compiled before a search starts and stored.
 
 Numba compiles a kernel at its first call, which takes seconds, and can store the machine code in files. The
-files are in the user's cache folder and not next to the sources, because an installed package is often
-read-only. The folder is ``<user's cache>/islands/kernels/<islands>-<numba>-<processor>-<hash>``. The hash is
+package has those for processors with the features of `TARGET` in `ARCHIVE`, which ``make kernels`` writes.
+They are used with the versions of Python and Numba that made them, as long as the module of a kernel, and all
+that it imports from `COMPILED`, are what was compiled.
+
+All other kernels are compiled on this machine. Their files are in the user's cache folder and not next to the
+sources, because an installed package is often read-only. The folder is
+``<user's cache>/islands/kernels/<islands>-<numba>-<processor>-<hash>``. The hash is
 of the content of the sources, so all checkouts and installations with equal kernels share one folder. It may
 be deleted at any time. A process that compiles the kernels deletes the folders of other versions that were
 not used for `UNUSED_DAYS`.
@@ -14,7 +19,9 @@ first kernel is created. Numba's ``NUMBA_CACHE_DIR`` keeps its meaning for all o
 it.
 """
 
+import json
 import os
+import pickle
 import shutil
 import sys
 import tempfile
@@ -24,10 +31,12 @@ from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from threading import Lock
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
+from zipfile import BadZipFile, ZipFile
 
 import numba
-from llvmlite.binding import get_host_cpu_name
+from llvmlite.binding import get_host_cpu_features as get_features
+from llvmlite.binding import get_host_cpu_name, get_process_triple
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.ccallback import CFunc
@@ -49,6 +58,37 @@ UNUSED_DAYS = 30
 COMPILED = ("kernels", "effects", "expressions", "program", "simulators/fmu", "simulators/ode", "systems")
 
 _PACKAGE = Path(__file__).absolute().parents[1]
+
+#: Numba's cache of the kernels, compiled for `TARGET`.
+ARCHIVE = _PACKAGE / "kernels" / "machine_code.zip"
+
+#: Member of the archive that describes it.
+MANIFEST = "manifest.json"
+
+#: Processors of the archive, and their features: those of 2013 and later.
+TARGET = "x86-64-v3"
+FEATURES = (
+    *("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3"),
+    *("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave"),
+)
+
+
+class Manifest(NamedTuple):
+    """Description of the archive.
+
+    Attributes
+    ----------
+    made_for : list of str
+        Processor, system, Python and Numba; see `describe_target`.
+    digests : dict
+        Digest of each source by its path in the package.
+    imports : dict
+        For each module with kernels: the sources that it consists of, itself and those that it imports.
+    """
+
+    made_for: list[str]
+    digests: dict[str, str]
+    imports: dict[str, list[str]]
 
 
 def kernel(
@@ -102,10 +142,16 @@ def compile_callback(function: Callable[..., Any], signature: Any) -> CFunc:
 
 def _is_of_sources(function: Any) -> bool:
     """Return whether a function, and all that it encloses, are functions of `COMPILED`."""
-    packages = tuple(f"{__name__.partition('.')[0]}.{part.replace('/', '.')}." for part in COMPILED)
-    enclosed = (cell.cell_contents for cell in getattr(function, "__closure__", None) or ())
-    module = getattr(function, "__module__", None) or ""
-    return module.startswith(packages) and all(map(_is_of_sources, enclosed))
+    folders = tuple(f"{folder}/" for folder in COMPILED)
+    return all(module.startswith(folders) for module in list_modules(function))
+
+
+def list_modules(function: Any) -> list[str]:
+    """Return the paths in the package of the modules of a function, and of the functions that it encloses."""
+    package, _, module = (getattr(function, "__module__", None) or "").partition(".")
+    path = f"{module.replace('.', '/')}.py" if package == __name__.partition(".")[0] else ""
+    enclosed = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    return [path, *(each for value in enclosed if callable(value) for each in list_modules(value))]
 
 
 @cache
@@ -129,9 +175,57 @@ def cache_folder() -> Path | None:
 
 
 def are_stored() -> bool:
-    """Return whether all kernels are in the cache."""
+    """Return whether all kernels are in the archive, or in the cache."""
+    manifest = read_manifest()
+    if manifest is not None and all(map(is_current, manifest.imports)):
+        return True
     folder = cache_folder()
     return folder is not None and (folder / STAMP).exists()
+
+
+def describe_target() -> list[str]:
+    """Return what the code of the archive depends on besides the sources."""
+    return [TARGET, get_process_triple(), str(sys.implementation.cache_tag), numba.__version__]
+
+
+@cache
+def read_manifest() -> Manifest | None:
+    """Return the manifest of the archive; None if this processor, or this process, needs other code."""
+    # A user may choose another processor by the environment, as images of the service do.
+    if (config.CPU_NAME, config.CPU_FEATURES) not in ((None, None), (TARGET, "")):
+        return None
+    host = get_features()
+    if not all(host.get(feature) for feature in FEATURES):
+        return None
+    try:
+        manifest = Manifest(**json.loads(_open_archive(os.getpid()).read(MANIFEST)))
+    except (OSError, BadZipFile):
+        return None
+    return manifest if manifest.made_for == describe_target() else None
+
+
+@cache
+def _open_archive(_process: int) -> ZipFile:
+    """Open the archive, once in each process: those that share an open file share the place of reading."""
+    return ZipFile(ARCHIVE)
+
+
+@cache
+def is_current(module: str) -> bool:
+    """Return whether the archive has the code of a module's kernels, given its path in the package."""
+    manifest = read_manifest()
+    if manifest is None or module not in manifest.imports:
+        return False
+    return all(digest_source(each) == manifest.digests[each] for each in manifest.imports[module])
+
+
+@cache
+def digest_source(path: str) -> str:
+    """Return the digest of a source, given its path in the package; empty if there is no such file."""
+    try:
+        return sha256((_PACKAGE / path).read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
@@ -150,6 +244,8 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
         Whether this process compiled the kernels. If not, it loads each kernel from the folder at its first
         call.
     """
+    if are_stored():
+        return False
     folder = cache_folder()
     if folder is None:
         tell(
@@ -158,8 +254,6 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
         )
         compile_all()
         return True
-    if are_stored():
-        return False
     with _lock(folder / "compiling.lock", lambda: tell("waiting for another process to compile the kernels")):
         if (folder / STAMP).exists():
             return False
@@ -193,6 +287,10 @@ class _Locator(UserProvidedCacheLocator):
 class _CacheFiles(CompileResultCacheImpl):
     _locator_classes: ClassVar = [_Locator]
 
+    def reduce(self, cres: Any) -> Any:
+        """Leave out the types of the lines of source, which contain paths."""
+        return super().reduce(cres._replace(type_annotation=""))
+
 
 class _Cache(FunctionCache):
     """Numba's cache of one function, safe against concurrent processes and a deleted folder.
@@ -207,8 +305,25 @@ class _Cache(FunctionCache):
         # Machine code needs the allocation of arrays only, and the compiler refreshes the context itself.
         with suppress(OSError):
             rtsys.initialize(target_context)
+            archived = self._read_archived(sig, target_context)
+            if archived is not None:
+                return self._impl.rebuild(target_context, archived)
             return self._load_overload(sig, target_context)
         return None
+
+    def _read_archived(self, sig: Any, target_context: Any) -> Any:
+        if not all(map(is_current, list_modules(self._py_func))):
+            return None
+        archive, folder = _open_archive(os.getpid()), Path(self.cache_path).name
+        name = f"{folder}/{self._impl.filename_base}.nbi"
+        if name not in archive.NameToInfo:
+            return None
+        with archive.open(name) as index:
+            pickle.load(index)  # the version of Numba
+            _, files = pickle.load(index)
+        signature, (triple, *_), function = self._index_key(sig, target_context.codegen())
+        file = files.get((signature, (triple, TARGET, ""), function))
+        return None if file is None else pickle.loads(archive.read(f"{folder}/{file}"))
 
     def save_overload(self, sig: Any, data: Any) -> None:
         # Numba reads the function's index, chooses a free file name and writes both. Two processes that do
