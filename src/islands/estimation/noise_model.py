@@ -6,12 +6,10 @@ from functools import lru_cache
 from operator import attrgetter
 
 import numpy as np
-import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from islands.data.segments import Signal, find_bounds, map_segments
-from islands.kernels.linear_filter import filter_linearly
 
 #: Maximum order of the autoregression.
 MAX_ORDER = 16
@@ -88,6 +86,9 @@ class NoiseModel:
 
     def colour(self, innovations: Signal) -> Signal:
         """Filter innovations with the noise model, which starts at rest; the inverse of `whiten`."""
+        # The inspection of a record, which whitens only, does not load the kernels.
+        from islands.kernels.linear_filter import filter_linearly  # noqa: PLC0415
+
         filtered = filter_linearly([1.0], self._polynomial, innovations)
         return take_fractional_difference(filtered, -self.difference_order)
 
@@ -188,6 +189,8 @@ def take_fractional_difference(signal: Signal, order: float) -> Signal:
     """Return ``(1 - q^-1)^order`` times a signal that is zero before its first sample."""
     if order == 0.0:
         return signal
+    import scipy  # noqa: PLC0415 - the inspection of a record does not load it
+
     size = scipy.fft.next_fast_len(2 * signal.size - 1, real=True)
     spectrum = scipy.fft.rfft(signal, size) * _transform_weights(order, signal.size)
     return np.array(scipy.fft.irfft(spectrum, size)[: signal.size])
@@ -196,6 +199,8 @@ def take_fractional_difference(signal: Signal, order: float) -> Signal:
 @lru_cache(maxsize=16)
 def _transform_weights(order: float, count: int) -> NDArray[np.complex128]:
     """Return the transform of the impulse response of the difference (Hosking, 1981, equation 2)."""
+    import scipy  # noqa: PLC0415 - as above
+
     lags = np.arange(1, count)
     weights = np.concatenate([[1.0], np.cumprod((lags - 1 - order) / lags)])
     return np.asarray(scipy.fft.rfft(weights, scipy.fft.next_fast_len(2 * count - 1, real=True)))

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset, join
 from islands.data.segments import find_bounds
 from islands.estimation.noise_model import MAX_ORDER, NoiseModel, fit_noise
-from islands.kernels.linear_filter import divide_rows
 
 Array = NDArray[np.float64]
 
@@ -34,6 +33,9 @@ LARGEST, TOGETHER = 60, 3
 
 #: Rows of a comparison, at most, parts of a longer record that contain them, and rows for each parameter.
 _ROWS, _PARTS, _ROWS_PER_PARAMETER = 6000, 4, 5
+
+#: Samples that are filtered at once.
+_BLOCK = 64
 
 #: Segments that are used, at most: the longest, because each has an initial state.
 _SEGMENTS = 16
@@ -230,12 +232,21 @@ def _delay(signal: Array, lag: int, bounds: Sequence[tuple[int, int]]) -> Array:
 
 def _low_pass(signals: Array, constant: float, bounds: Sequence[tuple[int, int]]) -> Array:
     """Filter signals by a low-pass with a gain of one that is in equilibrium at the start of a segment."""
-    start = np.empty_like(signals)
-    for begin, end in bounds:
-        start[:, begin:end] = signals[:, begin : begin + 1]
     pole = float(np.exp(-1.0 / constant))
-    ends = np.array([end for _, end in bounds])
-    filtered: Array = start + divide_rows(np.array([-pole]), (1.0 - pole) * (signals - start), ends)
+    # By blocks, since the import of a compiled filter takes longer than an inspection.
+    decay = pole ** np.arange(1, _BLOCK + 1)
+    lags = np.subtract.outer(np.arange(_BLOCK), np.arange(_BLOCK))
+    response = np.where(lags >= 0, (1.0 - pole) * pole ** np.maximum(lags, 0), 0.0)
+    filtered = np.empty_like(signals)
+    for begin, end in bounds:
+        state = signals[:, begin]
+        for first in range(begin, end, _BLOCK):
+            block = signals[:, first : min(first + _BLOCK, end)]
+            size = block.shape[1]
+            filtered[:, first : first + size] = (
+                np.outer(state, decay[:size]) + block @ response[:size, :size].T
+            )
+            state = filtered[:, first + size - 1]
     return filtered
 
 

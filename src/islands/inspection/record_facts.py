@@ -1,6 +1,8 @@
 """All facts about a record, with a bound on the samples that they are measured on."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from islands.inspection.oversampling import recommend_rate
 from islands.inspection.quantisation import find_quantisation
 from islands.inspection.rest import check_rest
 from islands.inspection.saturation import find_saturation
+from islands.progress import Failure, attempt
 
 #: Most samples, and most inputs, that the facts are measured on.
 MOST_SAMPLES, MOST_INPUTS = 100_000, 16
@@ -57,7 +60,8 @@ class RecordFacts:
 def measure_facts(record: Dataset) -> RecordFacts:
     """Measure all facts about a record.
 
-    Missing outputs are skipped. Of a record with more than `MOST_SAMPLES` samples, the middle is taken; the
+    A fact that fails is unknown, and its sentence states the reason, so that the others remain. Missing
+    outputs are skipped. Of a record with more than `MOST_SAMPLES` samples, the middle is taken; the
     fact ``samples`` says so. The drift is always that of the whole record.
 
     Parameters
@@ -76,12 +80,22 @@ def measure_facts(record: Dataset) -> RecordFacts:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = [_count_samples(record, complete, part, first)]
         for channel in channels(part):
-            found += _describe_channel(channel, part)
+            found += _measure("quantisation", channel.name, partial(_describe_channel, channel, part))
         varying = [place for place in range(min(part.inputs, MOST_INPUTS)) if np.ptp(part.u[:, place]) > 0.0]
-        found += estimate_dead_times(part, varying)
-        found += [check_rest(part), *(check_loop(part, place) for place in varying)]
-        found += [measure_drift(complete), recommend_rate(part)]
+        found += _measure("dead-time", "", partial(estimate_dead_times, part, varying))
+        found += _measure("rest", "", lambda: [check_rest(part)])
+        found += _measure("loop", "", lambda: [check_loop(part, place) for place in varying])
+        found += _measure("drift", "", lambda: [measure_drift(complete)])
+        found += _measure("sampling-time", "", lambda: [recommend_rate(part)])
     return RecordFacts(tuple(sorted(found, key=lambda fact: FACTS.index(fact.name))))
+
+
+def _measure(name: str, signal: str, measure: Callable[[], Iterable[Fact]]) -> list[Fact]:
+    """Return the facts that a function measures; an unknown one of a name if it fails."""
+    found = attempt(lambda: list(measure()))
+    if isinstance(found, Failure):
+        return [Fact(name, signal, None, "", None, None, f"The {name} is not computed: {found.reason}.")]
+    return found
 
 
 def _count_samples(record: Dataset, complete: Dataset, part: Dataset, first: int) -> Fact:

@@ -14,7 +14,7 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import BANDS, SearchResult
-from islands.facade.automatic.kind_trials import ROUNDING, KindTrials, percent, try_kinds
+from islands.facade.automatic.kind_trials import DEAD_TIMES, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.library_fit import CERTIFICATES, LibraryFit
 from islands.facade.trials.library import TrialLibrary
 from islands.inspection.rest import check_rest
@@ -166,7 +166,8 @@ def choose_kind(
     bounded = {kind: each for kind, each in fits.items() if _is_bounded(each.found.recommended)}
     compared, errors, count = _measure_alike(record, bounded)
     kind, reason = _select_kind(record, libraries, trials, compared, errors, count)
-    used, sentence = trials.delays, NO_DEAD_TIME
+    failure = steps.not_computed.get(DEAD_TIMES)
+    used, sentence = trials.delays, f"Dead times are not computed: {failure}." if failure else NO_DEAD_TIME
     if delays is not None:
         sentence = f"The dead times are as given: {list(used)}."
     elif used:

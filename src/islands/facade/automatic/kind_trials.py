@@ -5,6 +5,7 @@ Small models of the library of every kind are compared in free run on held-out p
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf, isfinite
 from types import MappingProxyType
 
@@ -17,6 +18,9 @@ from islands.progress import Steps
 
 #: Kinds up to this factor of the least error are compared with larger models.
 PROMISING = 3.0
+
+#: Name of the step that estimates dead times.
+DEAD_TIMES = "preset auto: dead times"
 
 #: Error as a fraction of the output range that is a rounding error.
 ROUNDING = 1e-6
@@ -77,8 +81,8 @@ def try_kinds(
         return summarise(measure_library(splits, libraries[kind].with_delays(delays), steps))
 
     if delays is None:
-        steps("preset auto: dead times", None)
-        delays = _estimate_delays(record)
+        steps(DEAD_TIMES, None)
+        delays = steps.attempt(DEAD_TIMES, partial(_estimate_delays, record)) or ()
     chosen = tuple(delays) if any(delays) else ()
     errors = {kind: measure(kind, chosen) for kind in libraries}
     simplest = next(iter(libraries))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
+from islands.inspection import record_facts
 from islands.inspection.record_facts import FACTS, MOST_SAMPLES, measure_facts
 from support.known_records import lag, measure, slow, steps, white
 
@@ -86,3 +87,29 @@ def test_facts_are_measured_without_libraries_that_take_a_second_to_import():
     """A service inspects every file in a new process."""
     done = subprocess.run([sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True)
     assert done.stdout == "\n"
+
+
+@pytest.mark.parametrize(
+    ("function", "name"),
+    [
+        ("find_quantisation", "quantisation"),
+        ("estimate_dead_times", "dead-time"),
+        ("check_rest", "rest"),
+        ("check_loop", "loop"),
+        ("measure_drift", "drift"),
+        ("recommend_rate", "sampling-time"),
+    ],
+)
+def test_a_fact_that_fails_leaves_the_others(function, name, monkeypatch):
+    def fail(*_arguments):
+        raise ZeroDivisionError("the fact fails")
+
+    record = measure(steps(500, 0), lag(steps(500, 0), 5.0), 0.05)
+    complete = measure_facts(record).facts
+    monkeypatch.setattr(record_facts, function, fail)
+    found = measure_facts(record)
+    unknown = [fact for fact in found.facts if fact not in complete]
+    assert {fact.name for fact in unknown} == {name}
+    assert all("is not computed: ZeroDivisionError: the fact fails" in fact.sentence for fact in unknown)
+    assert all(fact.value is None for fact in unknown)
+    assert found.find("samples").value == 500.0

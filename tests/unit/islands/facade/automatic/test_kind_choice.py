@@ -40,7 +40,7 @@ def choose(data, delays=None):
     settings = FitSettings(certificate=0)
     result = fit_chosen_library(
         data, split(data), "auto", 2, None, None, delays, settings, 0, ignore_progress, never_stop
-    )
+    ).complete()
     return choice_from_document(result.settings["choice"]), result
 
 
