@@ -274,7 +274,6 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
     known = np.isfinite(errors)
     usual = max(float(np.quantile(errors[known], 1.0 - _LARGE)), _ROUNDING)
     firsts = np.flatnonzero(known & (errors > usual))
-    lengths = range(1, _LONGEST + 1)
     tried = np.array([prediction.leave_out(firsts, length) for length in range(1, _LONGEST + 1)])
     # An excursion ends where the samples after it go on as those before it.
     best = np.argmin(tried[:, 1] / np.maximum(tried[:, 0], _ROUNDING), axis=0)

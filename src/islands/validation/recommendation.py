@@ -73,7 +73,6 @@ _BESIDES_ERROR = (PROPERTY_1, ESTIMATION_ERROR, *_OF_EQUALS)
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
 
-
 _ONE = Constant(1.0)
 
 
@@ -116,8 +115,8 @@ class Recommendation:
     excluded: tuple[Exclusion, ...] = ()
 
 
-class _Funnel:
-    """Models that the criteria of a recommendation leave, and those that each of them excludes."""
+class _Selection:
+    """Models that remain under the criteria of a recommendation, and those that each of them excludes."""
 
     def __init__(self, count: int) -> None:
         self.left = list(range(count))
@@ -174,19 +173,21 @@ def recommend(
         return Recommendation(
             1, ("the free run of every model diverges; this one has the least one-step-ahead error",)
         )
-    funnel = _Funnel(len(assessments))
-    funnel.keep(DIVERGENCE, bounded)
+    selection = _Selection(len(assessments))
+    selection.keep(DIVERGENCE, bounded)
     if hysteresis:
-        funnel.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
-    funnel.keep(VALIDATION_ERROR, _pass_over(funnel.left, assessments, _LARGEST_RATIO, _measure_validation))
-    funnel.keep(ESTIMATION_ERROR, _pass_over(funnel.left, assessments, _LARGEST_RATIO))
-    reference = min(funnel.left, key=lambda at: (assessments[at].validation_error, at))
+        selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
+    selection.keep(
+        VALIDATION_ERROR, _pass_over(selection.left, assessments, _LARGEST_RATIO, _measure_validation)
+    )
+    selection.keep(ESTIMATION_ERROR, _pass_over(selection.left, assessments, _LARGEST_RATIO))
+    reference = min(selection.left, key=lambda at: (assessments[at].validation_error, at))
     best = assessments[reference]
-    funnel.keep(WORSE, [at for at in funnel.left if _is_equal(assessments[at], best)])
-    funnel.keep(EQUALS_ESTIMATION_ERROR, _pass_over(funnel.left, assessments, LARGEST_ESTIMATION_RATIO))
-    funnel.keep(CHECKS, [at for at in funnel.left if is_sound(assessments[at].physics, hysteresis)])
-    chosen = min(funnel.left, key=lambda at: (sizes[at], at))
-    found = Recommendation(chosen + 1, (), reference + 1, tuple(funnel.excluded))
+    selection.keep(WORSE, [at for at in selection.left if _is_equal(assessments[at], best)])
+    selection.keep(EQUALS_ESTIMATION_ERROR, _pass_over(selection.left, assessments, LARGEST_ESTIMATION_RATIO))
+    selection.keep(CHECKS, [at for at in selection.left if is_sound(assessments[at].physics, hysteresis)])
+    chosen = min(selection.left, key=lambda at: (sizes[at], at))
+    found = Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
     reasons = (
         _describe_choice(found, sizes, assessments, unit),
         _describe_physics(found, assessments, hysteresis, unit),
