@@ -107,7 +107,7 @@ for name, model in (("constrained", constrained), ("unconstrained", free)):
 
 # %% checks
 errors = [each.metrics["validation"]["free_run"].mape for each in (constrained, free)]
-assert all(0.15 < error < 0.25 for error in errors), errors
+assert all(0.15 < error < 0.3 for error in errors), errors
 assert constrained.physics.property_1
 assert not free.physics.property_1
 assert constrained.physics.hold_drift_percent < 1e-6

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
 from pathlib import Path
-from traceback import extract_tb
 from typing import Protocol, TypeVar
 
 from islands.errors import IslandsError, check_callables
@@ -293,9 +292,15 @@ def explain_failure(error: Exception) -> str:
     """Return the message of a deliberate error; class, message and place of any other one."""
     if isinstance(error, IslandsError):
         return str(error)
-    *_, place = extract_tb(error.__traceback__)
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
     text = ": ".join(filter(None, (type(error).__name__, str(error))))
-    return f"{text} ({Path(place.filename).name}, line {place.lineno})"
+    return (
+        text
+        if place is None
+        else f"{text} ({Path(place.tb_frame.f_code.co_filename).name}, line {place.tb_lineno})"
+    )
 
 
 class Steps:

@@ -1,7 +1,9 @@
-"""A cluster of two nodes with separate object stores: the result is the same, also if a node is lost."""
+"""A cluster of nodes with separate object stores: the result is the same if a node or an island is lost."""
 
 import os
+import time
 from dataclasses import replace
+from threading import Timer
 
 import pytest
 
@@ -10,7 +12,7 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.runtime.cluster import cluster
 from islands_service.runtime.ray_engine import RayEngine
-from support.processes import descendants, eventually, kill
+from support.processes import actors, descendants, eventually, kill
 from support.searches import SMALL, exactly, record
 
 pytestmark = pytest.mark.nightly
@@ -81,3 +83,25 @@ def test_search_without_a_cpu_begins_when_a_machine_joins(head, posed, undisturb
         ]
     assert messages[0].startswith("waiting for capacity: 0 of 1 island actors are ready")
     assert seen == undisturbed
+
+
+def test_an_island_of_three_nodes_that_is_killed_inside_an_epoch_changes_nothing(head):
+    settings = replace(SMALL, islands=3, generations=120, migrate_every=40, population=200)
+    problem = Problem(record(2000), settings)
+    began = time.monotonic()
+    undisturbed = [
+        exactly(each.archipelago) for each in SerialEngine().run(problem, empty_archipelago(3, 5), never)
+    ]
+    epoch_seconds = (time.monotonic() - began) / len(undisturbed) / settings.islands
+    messages, seen, timers = [], [], []
+    for _ in range(3):
+        add(head)
+    with cluster(head.address):
+        for epoch in RayEngine(messages.append).run(problem, empty_archipelago(3, 5), never):
+            seen.append(exactly(epoch.archipelago))
+            if len(seen) == 2:  # the first epoch makes the populations
+                timers.append(Timer(epoch_seconds / 3.0, lambda: kill(min(actors()))))
+                timers[0].start()
+    timers[0].join()
+    assert seen == undisturbed
+    assert any("an actor was lost" in line for line in messages)

@@ -161,7 +161,9 @@ def compare_with_oracle(individuals, data, setting):
         assert found.outcome
         parts, true = np.array(found.theta) * norms, np.array(model.parameters) * norms
         assert np.abs(parts - true).max() <= close * np.abs(true).max()
-        assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=min(100 * close, 2e-5))
+        # A fitness has 33 binary digits.
+        digits = max(min(100 * close, 2e-5), 2.0**-32)
+        assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=digits)
         seen["well" if pivot > 1e-5 else "ill"] += 1
         seen["pruned"] += pruned and len(regressors) < len(distinct_genes(each.genes))
     return seen

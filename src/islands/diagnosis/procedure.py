@@ -323,7 +323,7 @@ def _search_with_steps(
                 confirmed.append(found[current])
                 selected = find_timing_simulator(outcome.hypothesis, outcome.target, run) or simulator
             if get_discretisation(selected) in found or len(found) == MAX_SEARCHES:
-                return min(confirmed or found.values(), key=lambda each: each[1].hypothesis.cost)
+                return min(confirmed or found.values(), key=lambda each: each[1].hypothesis.rank)
         # The missing effect had hidden that another intersample behaviour or a finer step fits better.
         run.progress("intersample behaviour changed: repeating the search")
         simulator = selected

@@ -343,5 +343,5 @@ def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
     code, out, _ = run("--resume", "out", *words)
     assert code == 0
     assert "cache of structures: " in out
-    assert requested == [("serial", None), ("serial", None), ("ray", "there:6379")]
+    assert requested == [("serial", None, 2), ("serial", None, 2), ("ray", "there:6379", 2)]
     assert models(tmp_path / "out") == models(tmp_path / "whole")
