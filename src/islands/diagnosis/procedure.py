@@ -185,8 +185,8 @@ def diagnose(
     try:
         found = _find_causes(record, base, target, run.with_effects(effects), forms, interim, seed)
         found = complete_findings(found, held or found.best, target, record_findings, noise_level, run.rng)
-    except IslandsError:
-        raise  # of the caller
+    except (IslandsError, OSError, MemoryError):
+        raise  # of the caller, or of the machine: the diagnosis may succeed if it is repeated
     except Exception as error:
         failed = interim.fail(error, seed)
         if failed is None:

@@ -48,7 +48,7 @@ SEARCH = {
 }
 
 
-class ProcessEndedError(Exception):
+class ProcessEndedError(BaseException):
     """The process ended."""
 
 
