@@ -85,7 +85,7 @@ def test_search_without_a_cpu_begins_when_a_machine_joins(head, posed, undisturb
     assert seen == undisturbed
 
 
-def test_an_island_of_three_nodes_that_is_killed_inside_an_epoch_changes_nothing(head):
+def test_an_island_killed_inside_an_epoch_on_three_nodes_changes_nothing(head):
     settings = replace(SMALL, islands=3, generations=120, migrate_every=40, population=200)
     problem = Problem(record(2000), settings)
     began = time.monotonic()
