@@ -1,6 +1,7 @@
 """Figures of a job: one that fails leaves the others."""
 
 import numpy as np
+import pytest
 
 import islands
 from islands.figures import registry
@@ -11,6 +12,7 @@ def fail(*_arguments):
     raise ArithmeticError("the figure fails")
 
 
+@pytest.mark.ci
 def test_a_figure_that_fails_states_the_reason(monkeypatch):
     rng = np.random.default_rng(3)
     u = np.repeat(rng.uniform(-1.0, 1.0, 60), 4)

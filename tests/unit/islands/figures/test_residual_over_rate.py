@@ -29,6 +29,7 @@ def diagnosis(friction: float = FRICTION):
     return islands.diagnose(record, "column:y_sim", columns={"y_sim": simulated})
 
 
+@pytest.mark.ci
 def test_the_residual_without_friction_is_a_step_over_the_rate_and_with_it_none() -> None:
     above, below = draw_residual_over_rate(diagnosis()).axes
     lines = {line.get_color(): line for line in above.lines if line.get_color() in (BEFORE, SIMULATED)}

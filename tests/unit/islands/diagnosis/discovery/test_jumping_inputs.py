@@ -98,6 +98,7 @@ def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int
     assert exact == ([] if name == "none" else [name])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("size", "part", "count"), [(0.05, 0.6, 50.0), (0.02, 0.9, 100.0)])
 def test_small_steps_of_an_actuator_are_found(size: float, part: float, count: float) -> None:
     record = make_smooth_record(size, np.inf)
@@ -109,6 +110,7 @@ def test_small_steps_of_an_actuator_are_found(size: float, part: float, count: f
     assert found.fit.mean_square**0.5 < 1.1 * 0.002 < part * base.mean_square**0.5
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("direct", [0.0, 1.0])
 def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> None:
     """A plant that responds at once has the steps at each sample, and another one their average."""
@@ -130,6 +132,7 @@ def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> 
     assert found.fit.mean_square < 0.7 * base.mean_square
 
 
+@pytest.mark.ci
 def test_slips_between_samples_need_differential_equations() -> None:
     """Its difference equation reads the slips at the samples only."""
     fine, times = 20, np.arange(24_000) / 1000.0
