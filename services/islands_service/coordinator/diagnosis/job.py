@@ -95,10 +95,10 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
             noise_level=spec.noise_level,
         )
         steps(FORMULA, BEFORE_FORMULA)
+        start = state.begin_search(diagnosed)
         count = partial(steps.call, report.count_epochs)
-        begin = partial(state.begin_search, diagnosed)
-        search = partial(explain_residual, diagnosed, spec.seed, on_epoch=count, stop=steps.stop)
-        formula = steps.attempt(FORMULA, lambda: search(start=begin()))
+        search = partial(explain_residual, diagnosed, spec.seed, on_epoch=count, stop=steps.stop, start=start)
+        formula = steps.attempt(FORMULA, search)
         left_out.remove(FORMULA)
         found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
         steps("writing the report", BEFORE_REPORT)
