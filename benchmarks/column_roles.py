@@ -2,9 +2,10 @@
 
     python benchmarks/column_roles.py [--count N] [--first SEED] [--fit]
 
-Columns have random order and names that say nothing. The weights of `islands.inspection.column_direction` are
-estimated on the systems "calibration"; "test" has other systems of the same kinds with other seeds,
-"loggers" files with many columns, and "portfolio" the records and laws that test `--library auto`. With
+Columns have random order and names that say nothing. The weights of
+`islands.records.inspection.column_direction` are estimated on the systems "calibration"; "test" has other
+systems of the same kinds with other seeds, "loggers" files with many columns, and "portfolio" the records
+and laws that test `--library auto`. With
 ISLANDS_MEASURED_DIR, "measured" has measured records. A choice is right if the output and all inputs are. The
 expected calibration error is the mean difference of the stated probability and the frequency of right choices
 in ten classes of probability. With ``--fit`` the
@@ -28,9 +29,9 @@ from scipy.optimize import minimize  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from islands.data.dataset import Dataset  # noqa: E402
-from islands.inspection import column_roles  # noqa: E402
-from islands.inspection.column_direction import WEIGHTS, estimate_direction, measure_properties  # noqa: E402
+from islands.records.dataset import Dataset  # noqa: E402
+from islands.records.inspection import column_roles  # noqa: E402
+from islands.records.inspection.column_direction import WEIGHTS, estimate_direction, measure_properties  # noqa: E402
 from support.laws import LAWS  # noqa: E402
 from support.portfolio_records import KINDS  # noqa: E402
 from support.role_records import RoleRecord, Roles, make_logs, make_records, rename, roles  # noqa: E402

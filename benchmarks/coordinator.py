@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
+from islands.records.dataset import Dataset
 from islands_service.engines import ENGINES
 
 ISLANDS = (2, 10, 30, 100, 300, 1000)

@@ -20,8 +20,8 @@ import numpy as np  # noqa: E402 - after the environment is set
 from numpy.typing import NDArray  # noqa: E402
 from scipy.signal import lfilter  # noqa: E402
 
-from islands.data.dataset import Dataset  # noqa: E402
-from islands.inspection.record_facts import measure_facts  # noqa: E402
+from islands.records.dataset import Dataset  # noqa: E402
+from islands.records.inspection.record_facts import measure_facts  # noqa: E402
 
 #: Bounds of the stated probabilities in the table.
 BINS = (0.0, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)

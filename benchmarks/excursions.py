@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from islands.inspection.gross_errors import find_gross_errors
+from islands.records.inspection.gross_errors import find_gross_errors
 from support.measured_events import ERRORS, EVENTS, SIGNALS
 
 

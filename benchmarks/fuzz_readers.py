@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from islands.io.records import READERS, preview
+from islands.records.reading import READERS, preview
 from support.fuzzing import SLOW, Defect, corpus
 from support.hostile_tables import FAMILIES, reading_seconds
 

@@ -28,16 +28,16 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 import islands
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.result import Diagnosis
 from islands.errors import ExtrapolationWarning, IslandsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.results.identification import Result
-from islands.io.result_folder import result_json
 from islands.models.candidate_library import LIBRARIES
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
+from islands.report.documents.diagnosis_json import as_json, diagnosis_document
+from islands.report.documents.result_folder import result_json
 from islands.simulators.specification.equations import OdeSpec
 
 Generator = np.random.Generator

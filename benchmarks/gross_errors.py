@@ -20,7 +20,6 @@ for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import numpy as np  # noqa: E402 - after the environment is set
 
-from islands.data.dataset import Dataset  # noqa: E402
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate  # noqa: E402
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target  # noqa: E402
 from islands.diagnosis.detectability import estimate_rate  # noqa: E402
@@ -28,6 +27,7 @@ from islands.diagnosis.gross_errors.channel_admission import admit_channels  # n
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop  # noqa: E402
 from islands.diagnosis.gross_errors.explanation import GrossError  # noqa: E402
 from islands.diagnosis.gross_errors.search import find_gross_errors  # noqa: E402
+from islands.records.dataset import Dataset  # noqa: E402
 from islands.simulators.context import make_context  # noqa: E402
 from islands.simulators.extended import ExtendedSimulator  # noqa: E402
 from islands.simulators.interface import Simulator  # noqa: E402

@@ -25,8 +25,8 @@ import numpy as np  # noqa: E402 - after the environment is set
 
 import islands  # noqa: E402
 from islands.diagnosis.detectability import diagnose_surrogate  # noqa: E402
-from islands.diagnosis.documents.extension_json import extended_document  # noqa: E402
 from islands.diagnosis.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402
+from islands.report.documents.extension_json import extended_document  # noqa: E402
 from islands.simulators.specification.factory import make_simulator  # noqa: E402
 
 NAIVE = Path(__file__).parents[1] / "tests" / "support" / "naive_damper.py"

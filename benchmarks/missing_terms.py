@@ -21,10 +21,10 @@ import islands
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
+from islands.report.documents.extension_json import extended_json
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.factory import make_simulator

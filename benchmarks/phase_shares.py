@@ -21,8 +21,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from islands.data.coupled_record import couple
-from islands.data.dataset import Dataset
 from islands.diagnosis.procedure import PHASES, diagnose
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
 from islands.facade.automatic.preset_choice import choose_preset
@@ -33,7 +31,9 @@ from islands.facade.identify import identify
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.warm_up import warm_up
 from islands.progress import Phase, never_stop
-from islands.reports.origin import Origin
+from islands.records.coupled import couple
+from islands.records.dataset import Dataset
+from islands.report.pages.origin import Origin
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.planning.experiment import Experiment, make_model
 from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.diagnosis.procedure import diagnose
 from islands.effects.interface.effect import Effect
+from islands.records.dataset import Dataset
 from islands.simulators.specification.factory import make_simulator
 from islands.systems.signals import sines
 from islands_measurements.detection.injection.noise import NOISES

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from planned_experiments import EXPERIMENTS, NoisePlans, make_plans
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit, whiten_target
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.planning.cause import Cause, CauseScale
@@ -23,6 +22,7 @@ from islands.diagnosis.planning.experiment import Experiment, ExperimentModel
 from islands.diagnosis.planning.noise_free_fit import NoiseFreeFit, fit_noise_free
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.effects.interface.effect import Effect
+from islands.records.dataset import Dataset
 from islands_measurements.detection.injection.noise import NOISES
 
 #: Kinds of noise, and the number of records of each cause.

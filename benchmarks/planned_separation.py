@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from planned_experiments import EXPERIMENTS, Planned, make_plans
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.planning.cause import CauseScale
 from islands.diagnosis.planning.decisive_experiment import design_experiment
 from islands.diagnosis.planning.experiment import make_model
@@ -30,6 +29,7 @@ from islands.diagnosis.planning.planned_input import find_limits
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.diagnosis.planning.separation import require_detection
 from islands.diagnosis.procedure import diagnose
+from islands.records.dataset import Dataset
 from islands.simulators.specification.factory import make_simulator
 from islands_measurements.detection.injection.noise import NOISES
 

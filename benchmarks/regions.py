@@ -37,7 +37,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import numpy as np
 import ray
 
-from islands.data.dataset import Dataset
 from islands.distribution import read_version
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
@@ -46,6 +45,7 @@ from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState, advance
+from islands.records.dataset import Dataset
 from islands_service.coordinator.identification_job import ProgressReporter
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_notes import JobNotes

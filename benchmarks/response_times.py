@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.catalogue import make_record
 
 PIEZO = ("--input", "u_V", "--output", "y_um")

@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 os.environ.setdefault("RAY_AUTH_TOKEN", "0123456789abcdef0123456789abcdef")
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.catalogue import make_record
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import actors, eventually

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from service_table import Figure, run
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.catalogue import make_record
 from support.processes import descendants, eventually
 from support.service_processes import Service, serving

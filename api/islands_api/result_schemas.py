@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from islands.io.models import NARX
+from islands.persistence.models import NARX
 from islands_api.schemas import Envelope, ModelView, ResponseModel
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from islands.io.models import NARX
+from islands.persistence.models import NARX
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,

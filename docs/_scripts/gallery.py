@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import islands
-from islands.data.split import split
-from islands.figures.style import (
+from islands.records.split import split
+from islands.report.figures.style import (
     MEASURED,
     MEASURED_WIDTH,
     SIMULATED,

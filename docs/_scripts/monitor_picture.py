@@ -12,7 +12,7 @@ import numpy as np
 from page_pictures import CHROMIUM, PATIENCE, PICTURES, PORT
 from playwright.sync_api import sync_playwright
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands_api.client import Client
 
 sys.path.insert(0, str(Path(__file__).parents[2]))

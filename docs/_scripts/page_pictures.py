@@ -17,7 +17,7 @@ from urllib.request import urlopen
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
-from islands.io.records.writer import write_record
+from islands.records.writer import write_record
 from islands.systems.example_records import EXAMPLE_RECORDS
 
 PICTURES = Path(__file__).parents[1] / "pictures"

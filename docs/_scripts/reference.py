@@ -24,10 +24,10 @@ from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
 from islands.evolution.settings import Settings
 from islands.export import EXPORTS, FILE_EXPORTS
 from islands.expressions.primitives import PRIMITIVES
-from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.records import READERS
 from islands.models.candidate_library import LIBRARIES
 from islands.models.latent import STRUCTURE_SUMMARIES
+from islands.records.reading import READERS
+from islands.report.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES

@@ -6,8 +6,8 @@
 from pathlib import Path
 
 import islands
-from islands.figures.convergence import draw_islands
-from islands.figures.style import save
+from islands.report.figures.convergence import draw_islands
+from islands.report.figures.style import save
 from islands.systems.example_records import EXAMPLE_RECORDS
 
 PICTURE = Path(__file__).parents[1] / "pictures" / "search.svg"

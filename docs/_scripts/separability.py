@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import islands
-from islands.figures.separability import draw_separability
-from islands.figures.style import save
+from islands.report.figures.separability import draw_separability
+from islands.report.figures.style import save
 from islands.systems.signals import sine
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import islands
-from islands.figures.style import (
+from islands.report.figures.style import (
     FRAME,
     MEASURED,
     RESIDUAL,

@@ -17,9 +17,9 @@ from islands.cli.engines import check_engine, open_pool
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.stop_requests import stop_requests
 from islands.errors import SettingsError, lookup
-from islands.figures.confusion import draw_confusion
-from islands.figures.style import save
 from islands.progress import Steps, StoppedError
+from islands.report.figures.confusion import draw_confusion
+from islands.report.figures.style import save
 from islands_measurements.detection.cases import CASES, SimulatedCase
 from islands_measurements.detection.injection.noise import NOISES
 from islands_measurements.detection.injection.unusual.table import UNUSUAL_CAUSES

@@ -18,30 +18,30 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from islands.data.averaging import average_samples
-from islands.data.coupled_record import couple, match_coupled, split_coupled
-from islands.data.dataset import Dataset
-from islands.data.split import Split, average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.export import FILE_EXPORTS
 from islands.facade.coupled.result import read_fitted_model
-from islands.figures.drawn_numbers import tabulate_lines
-from islands.figures.free_run import draw_free_run
-from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
-from islands.figures.style import save, write_text_figure
-from islands.io.checkpoints import history_from_document
-from islands.io.ensembles import bands_from_document, ensemble_from_document
-from islands.io.models import any_model_from_json, model_from_json, read_validated_model
-from islands.io.result_folder import result_document
-from islands.io.result_models import read_criterion, read_shooting_interval
 from islands.models.coupled_narx import CoupledModel
+from islands.persistence.checkpoints import history_from_document
+from islands.persistence.ensembles import bands_from_document, ensemble_from_document
+from islands.persistence.models import any_model_from_json, model_from_json, read_validated_model
+from islands.persistence.result_models import read_criterion, read_shooting_interval
 from islands.progress import Failure, attempt
-from islands.reports.comparison import ComparedModel, comparison_report
-from islands.reports.coupled import coupled_report
-from islands.reports.identification import identification_report
-from islands.reports.origin import Origin
+from islands.records.averaging import average_samples
+from islands.records.coupled import couple, match_coupled, split_coupled
+from islands.records.dataset import Dataset
+from islands.records.split import Split, average_split, match_split, split_data
+from islands.report.documents.result_folder import result_document
+from islands.report.figures.drawn_numbers import tabulate_lines
+from islands.report.figures.free_run import draw_free_run
+from islands.report.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
+from islands.report.figures.style import save, write_text_figure
+from islands.report.pages.comparison import ComparedModel, comparison_report
+from islands.report.pages.coupled import coupled_report
+from islands.report.pages.identification import identification_report
+from islands.report.pages.origin import Origin
 from islands.validation.assessment import Assessment, assess, with_refit
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import FMU, REPORT, Job, name_free_run

@@ -12,15 +12,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.averaging import AUTO
-from islands.data.dataset import Dataset
-from islands.data.masked_values import fill_masked
 from islands.distribution import describe_missing_extra
 from islands.errors import IslandsError, SettingsError, suggest
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.models.candidate_library import LIBRARIES, get_library
 from islands.models.narx import Model
+from islands.records.averaging import AUTO
+from islands.records.dataset import Dataset
+from islands.records.masked_values import fill_masked
 from islands.simulation.predictors import free_run
 
 try:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.bouc_wen import consistent_estimation, consistent_validation
 from support.command_line import fail, succeed
 from support.undrawn import undrawn_figures

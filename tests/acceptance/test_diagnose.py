@@ -14,8 +14,8 @@ from scipy.signal import lfilter
 from islands.diagnosis.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import SurrogateCase
-from islands.io.records import write_record
 from islands.parallel import ParallelMap
+from islands.records.writer import write_record
 from islands.simulators.interface import Simulator
 from islands_measurements.detection.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset

@@ -23,9 +23,9 @@ from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.export import EXPORTS
 from islands.expressions.primitives import PRIMITIVES
-from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.records import READERS
 from islands.models.candidate_library import LIBRARIES
+from islands.records.reading import READERS
+from islands.report.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.simulators.specification.table import SIMULATORS
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED

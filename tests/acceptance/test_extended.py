@@ -12,10 +12,10 @@ import pytest
 from islands.diagnosis.calibration.levenberg_marquardt import evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.documents.extension_json import extended_json
 from islands.effects.catalogue import CATALOGUE
 from islands.export.fmu.compiler import find_compiler
-from islands.io.records import write_record
+from islands.records.writer import write_record
+from islands.report.documents.extension_json import extended_json
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from support.command_line import fail, succeed

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.io.records import read_record
+from islands.records.reading import read_record
 from support.fuzzing import corpus, mutate, run_cases
 from support.odd_files import write_workbook
 from support.repository import ROOT

@@ -7,7 +7,7 @@ import pytest
 from fuzz_invariance import TRANSFORMATIONS, Answer, compare, draw_case, run_case
 
 import islands
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.systems.bouc_wen import authors_estimation, authors_validation
 
 #: Cases of the seed 0 that take a few seconds each; `benchmarks/fuzz_invariance.py` has others.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures.names import LATENT_FIGURES
+from islands.report.figures.names import LATENT_FIGURES
 from islands.simulation.predictors import free_run
 from support.command_line import ISLANDS, fail, succeed
 from support.latent_systems import spring_record

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from islands.io.models import write_model
+from islands.persistence.models import write_model
 from islands.systems.published_models import get_published_model
 
 PROGRAM = """

@@ -12,7 +12,7 @@ import pytest
 from command_outputs import PAGES, update
 
 import islands
-from islands.io.models import read_model
+from islands.persistence.models import read_model
 from support import pages
 from support.command_line import succeed
 from support.repository import DOCS

@@ -21,9 +21,9 @@ from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
 from islands.evolution.settings import Settings
 from islands.export import EXPORTS
-from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.records import READERS
 from islands.models.candidate_library import LIBRARIES
+from islands.records.reading import READERS
+from islands.report.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.simulators.specification.table import SIMULATORS
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED

@@ -30,7 +30,7 @@ def test_an_expression_that_backtracks_is_found(pattern: str, method: str) -> No
 
 
 def test_expressions_of_the_readers_take_linear_time() -> None:
-    expressions = list_expressions("src/islands/io/records")
+    expressions = list_expressions("src/islands/records/reading")
     assert len(expressions) > 8
     assert [f"{each}: {text}" for each in expressions if (text := find_slow_text(each))] == []
 

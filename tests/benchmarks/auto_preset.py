@@ -20,9 +20,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import IslandsError
 from islands.models.candidate_library import LIBRARIES
+from islands.records.dataset import Dataset
 from support.measured_portfolio import MEASURED
 from support.portfolio_records import KINDS
 

@@ -10,10 +10,10 @@ from time import perf_counter
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.models.candidate_library import candidates
+from islands.records.dataset import Dataset
 
 #: Degree and lags of the libraries.
 LIBRARIES = ((2, 4), (3, 3), (3, 4), (2, 11))

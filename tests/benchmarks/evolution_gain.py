@@ -21,8 +21,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import islands
-from islands.data.dataset import Dataset
 from islands.facade.results.fitted_model import FittedModel
+from islands.records.dataset import Dataset
 from support.laws import Law
 
 _UNIT = ((-2.0, 2.0),)

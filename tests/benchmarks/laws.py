@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import islands
-from islands.data.dataset import Dataset
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import metrics

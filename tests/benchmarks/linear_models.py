@@ -21,9 +21,9 @@ from scipy.signal import lfilter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from islands.data.dataset import Dataset
 from islands.estimation.output_error import fit_output_error
 from islands.models.narx import Model
+from islands.records.dataset import Dataset
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
 from support.slow_processes import BATTERY_POLE

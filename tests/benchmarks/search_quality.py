@@ -17,11 +17,11 @@ from statistics import median
 from time import perf_counter
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.signal_map import match_rate
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
-from islands.io.records import read_record
+from islands.records.dataset import Dataset
+from islands.records.reading import read_record
+from islands.records.signal_map import match_rate
 from islands.systems.catalogue import make_record
 from islands.validation.metrics import metrics
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from islands.diagnosis.documents.monitor_json import describe_status, monitor_document
-from islands.diagnosis.documents.monitor_state import SavedMonitor
-from islands.io.records import write_record
+from islands.records.writer import write_record
+from islands.report.documents.monitor_json import describe_status, monitor_document
+from islands.report.documents.monitor_state import SavedMonitor
 from islands_service.domain.job import JobOutcome, JobState
 from support.canvas import get_drawn
 from support.monitor_updates import store_monitor

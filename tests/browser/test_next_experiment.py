@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.io.records.writer import input_csv
+from islands.records.writer import input_csv
 from islands_service.domain.job import NEXT_EXPERIMENT, JobOutcome, JobState
 from islands_service.store.blobs import Blobs
 from support.canvas import DRAWN

@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 import islands
-from islands.figures.names import ALL_FIGURES
-from islands.figures.style import FRAME, MEASURED, RESIDUAL, SIMULATED
-from islands.reports.saved_result import report_saved_result
+from islands.report.figures.names import ALL_FIGURES
+from islands.report.figures.style import FRAME, MEASURED, RESIDUAL, SIMULATED
+from islands.report.pages.saved_result import report_saved_result
 from support.contrast import LINE_CONTRAST, contrast, shown_in_dark
 from support.identifications import record
 from support.screen import Screen

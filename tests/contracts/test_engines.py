@@ -10,7 +10,6 @@ from math import inf
 
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
@@ -20,7 +19,8 @@ from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
 from islands.expressions.tree import Lagged
 from islands.facade.identify import identify
-from islands.io.checkpoints import read_checkpoint, write_checkpoint
+from islands.persistence.checkpoints import read_checkpoint, write_checkpoint
+from islands.records.dataset import Dataset
 from islands_service.engines import ENGINES
 from support import own_primitive
 from support.searches import exactly, record

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.example_records import make_piezo
 from islands_service.liveness import StopRequest
 from support.coordinators import SerialCoordinator

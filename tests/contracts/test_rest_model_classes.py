@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures.names import LATENT_FIGURES
+from islands.report.figures.names import LATENT_FIGURES
 from islands_api.client import Client
 from islands_api.client.errors import ServiceError
 from islands_api.web.auth import LOCAL_OWNER

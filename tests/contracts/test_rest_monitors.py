@@ -5,12 +5,12 @@ import json
 import pytest
 
 import islands
-from islands.diagnosis.documents import monitor_state
-from islands.diagnosis.documents.monitor_json import monitor_document
-from islands.diagnosis.documents.monitor_state import monitor_to_json
 from islands.diagnosis.monitoring import alarm_rate, record_follower
 from islands.errors import RecordError
 from islands.facade.record_monitor import reject_record
+from islands.report.documents import monitor_state
+from islands.report.documents.monitor_json import monitor_document
+from islands.report.documents.monitor_state import monitor_to_json
 from islands_api.client import Client
 from islands_service.domain import monitor_spec
 from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState

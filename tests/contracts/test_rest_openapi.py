@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 
 from islands.export import EXPORTS, FILE_EXPORTS
 from islands.export.fmu.compiler import find_compiler
-from islands.io.models import model_from_json
+from islands.persistence.models import model_from_json
 from support.service import (
     columns,
     csv,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.io.models import model_from_json
+from islands.persistence.models import model_from_json
 from islands.systems import signals
 from islands_api.client import Client
 from islands_service.coordinator.identification_job import run_identification_job

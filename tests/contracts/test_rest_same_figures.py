@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.signal_map import match_rate
-from islands.io.models import model_from_json
-from islands.io.result_text.statements import BEFORE_REFIT
+from islands.persistence.models import model_from_json
+from islands.records.signal_map import match_rate
+from islands.report.text.statements import BEFORE_REFIT
 from islands.validation.metrics import metrics
 from islands_api.client import Client
 from islands_api.web.auth import LOCAL_OWNER

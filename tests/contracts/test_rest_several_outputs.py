@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.coupled_record import CoupledRecord
 from islands.facade.coupled.identification import identify_coupled
+from islands.records.coupled import CoupledRecord
 from islands_api.client import Client
 from islands_service.coordinator import identification_job
 from islands_service.coordinator.heartbeat import CoordinatorStopping

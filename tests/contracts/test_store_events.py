@@ -5,7 +5,7 @@ import threading
 import pytest
 from sqlalchemy import update
 
-from islands.io.models import NARX
+from islands.persistence.models import NARX
 from islands_service.domain.job import DISCREPANCY, SEARCHED, JobState, JobStateError
 from islands_service.store.job_rows.job_claims import ATTEMPTS
 from islands_service.store.tables import jobs

@@ -10,7 +10,7 @@ import pytest
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
-from islands.io.checkpoints import compressed_checkpoint, read_checkpoint, write_checkpoint
+from islands.persistence.checkpoints import compressed_checkpoint, read_checkpoint, write_checkpoint
 from islands_service.engines import ENGINES
 from islands_service.runtime import regions
 from islands_service.runtime.errors import ClusterError

@@ -9,7 +9,7 @@ import pytest
 import islands
 import islands.facade.library_fit
 import islands.facade.results.identification
-import islands.io.result_folder
+import islands.report.documents.result_folder
 from islands import export
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution import search_result
@@ -21,10 +21,10 @@ from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit_record
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary
-from islands.figures import model_responses, registry
-from islands.figures.names import ALL_FIGURES
-from islands.io.result_folder import write_interim_result
-from islands.io.result_text import statements
+from islands.report.documents.result_folder import write_interim_result
+from islands.report.figures import model_responses, registry
+from islands.report.figures.names import ALL_FIGURES
+from islands.report.text import statements
 from islands.validation import assessment
 
 #: The laws of `Steps` are in the unit tests.
@@ -63,9 +63,9 @@ STEPS = {
     "estimation of the parameters on all data": (refit, "_estimate"),
     "residual tests": (assessment, "assess_residual"),
     "physics checks": (assessment, "check_physics"),
-    "facts about the data": (islands.io.result_folder, "measure_output_noise"),
-    "summary.txt": (islands.io.result_folder, "summary"),
-    "method.txt": (islands.io.result_folder, "method_text"),
+    "facts about the data": (islands.report.documents.result_folder, "measure_output_noise"),
+    "summary.txt": (islands.report.documents.result_folder, "summary"),
+    "method.txt": (islands.report.documents.result_folder, "method_text"),
     "figures": (registry, "search_figures"),
     "figures of responses": (model_responses, "draw_responses"),
 }

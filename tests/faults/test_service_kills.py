@@ -10,8 +10,8 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify
-from islands.io.records import read_record
-from islands.io.result_folder import result_document
+from islands.records.reading import read_record
+from islands.report.documents.result_folder import result_document
 from islands_service.intake.confined_process import ENVIRONMENT
 from support.control_groups import memory_limit
 from support.processes import alive, descendants, eventually, kill

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import islands
-from islands.diagnosis.documents.monitor_state import SavedMonitor, monitor_to_json
+from islands.report.documents.monitor_state import SavedMonitor, monitor_to_json
 from islands_api.client import Client
 from support.monitored_oscillator import make_records
 from support.monitoring_jobs import OSCILLATOR, write_records

@@ -11,8 +11,8 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify
-from islands.io.records import read_record
-from islands.io.result_folder import result_document
+from islands.records.reading import read_record
+from islands.report.documents.result_folder import result_document
 from support.service_client import SPEC
 from support.service_processes import Service, serving
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.signal_map import match_rate
+from islands.records.signal_map import match_rate
 from islands.validation.metrics import metrics
 from support.command_line import succeed
 

@@ -6,8 +6,8 @@ The printed parameters are rounded to three digits and give 0.3310 / 0.3388 and 
 
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED, get_published_model

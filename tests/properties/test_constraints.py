@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.constraints.conditions import Constraint
@@ -17,6 +16,7 @@ from islands.models.clusters import OUTPUT_AT_REST, steady_state
 from islands.models.narx import make_model
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run
 

@@ -13,7 +13,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.estimate import estimate
@@ -22,6 +21,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from support.regressions import problem, seeds, squares
 
@@ -331,7 +331,7 @@ def test_theta_of_quotients_scales_exactly_with_units_of_powers_of_two(volts, me
 DIGEST = """
 import hashlib
 import numpy as np
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.estimation.least_squares import factorise, least_squares
 from islands.expressions.tree import (Lagged)
 from islands.models.regressor import regressor

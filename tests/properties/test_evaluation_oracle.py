@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares, null_space
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.evaluation import Evaluator
@@ -18,6 +17,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 from support.searches import distinct_genes, record

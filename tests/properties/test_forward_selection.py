@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset, join
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
 from islands.expressions.printing import plain
 from islands.models.candidate_library import candidates
+from islands.records.dataset import Dataset, join
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.physics import cluster_sums
 

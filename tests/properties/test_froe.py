@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.estimation.least_squares import least_squares
 from islands.estimation.structure_selection.froe import froe
 from islands.expressions.parsing import parse
@@ -19,6 +18,7 @@ from islands.expressions.tree import Lagged
 from islands.kernels import err_selection
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix
+from islands.records.dataset import Dataset
 from support.regressions import problem, seeds, squares
 
 

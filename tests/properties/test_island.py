@@ -22,7 +22,7 @@ from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.io.checkpoints import write_checkpoint
+from islands.persistence.checkpoints import write_checkpoint
 from support.repository import ROOT
 from support.searches import SMALL, distinct_genes, evolved, exactly, islands_of, record
 from support.variation import breed_compiled, find_structure

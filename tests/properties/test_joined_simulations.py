@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.data.dataset import Dataset, join
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.effects.interface.effect import Effect
+from islands.records.dataset import Dataset, join
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

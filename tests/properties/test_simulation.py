@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.kernels.summation import total
 from islands.models.narx import make_model
+from islands.records.dataset import Dataset, join
 from islands.simulation.layout import WIDTHS, layout
 from islands.simulation.linked import LinkedModel
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead

@@ -9,17 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.split import Split
-from islands.io.result_folder import finite, residual_structure_document, result_document
-from islands.io.result_text.coupled_statements import describe_coupled
-from islands.io.result_text.diagnosis_statements import VERDICTS as VERDICTS_OF_DIAGNOSES
-from islands.io.result_text.diagnosis_statements import DiagnosisFacts, describe_diagnosis
-from islands.io.result_text.statements import describe, find_statements
-from islands.io.result_text.summary_text import summary
-from islands.reports.coupled import coupled_report
-from islands.reports.identification import identification_report
-from islands.reports.origin import Origin
+from islands.records.dataset import Dataset
+from islands.records.split import Split
+from islands.report.documents.result_folder import finite, residual_structure_document, result_document
+from islands.report.pages.coupled import coupled_report
+from islands.report.pages.identification import identification_report
+from islands.report.pages.origin import Origin
+from islands.report.text.coupled_statements import describe_coupled
+from islands.report.text.diagnosis_statements import VERDICTS as VERDICTS_OF_DIAGNOSES
+from islands.report.text.diagnosis_statements import DiagnosisFacts, describe_diagnosis
+from islands.report.text.statements import describe, find_statements
+from islands.report.text.summary import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics

@@ -11,7 +11,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 import islands
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands_api.cli.app import app
 from support.awkward_records import SAMPLES, AwkwardRecord
 from support.command_line import stored

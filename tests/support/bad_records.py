@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.io.records import read_record
+from islands.records.reading import read_record
 
 HEADER = "t_s,u_V,y_um"
 

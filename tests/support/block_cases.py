@@ -5,16 +5,16 @@ from functools import cache
 
 import numpy as np
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.preprocessing_steps import Preprocessing, PreprocessingSteps
-from islands.data.signal_map import map_coupled_signals, map_signals, match_rate
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.preprocessing_steps import Preprocessing, PreprocessingSteps
+from islands.records.signal_map import map_coupled_signals, map_signals, match_rate
 from islands.simulation.blocks import make_simulator
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, equation

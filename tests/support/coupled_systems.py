@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 
 
 def equation(terms, inputs, output, dt=0.1):

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.interim_findings import InterimFindings
 from islands.diagnosis.procedure import diagnose
 from islands.facade.explain_residual import FORMULA
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.progress import Steps
+from islands.records.dataset import Dataset
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 

@@ -5,8 +5,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from islands.io.records.preview import preview
 from islands.parallel import ParallelMap
+from islands.records.reading.preview import preview
 from islands_service.coordinator.diagnosis.job import run_diagnosis_job
 from islands_service.domain.job import DISCREPANCY, Job, JobOutcome, Lease, Submission
 from islands_service.store import Store

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import evaluate_fit
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect, Site
 from islands.export.equations.collection import collect_equations
 from islands.export.extension import export_extended
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -235,7 +235,7 @@ def run_cases(
 
 def main() -> None:
     """Run the cases that standard input names, as a child process of `benchmarks/fuzz_readers.py`."""
-    from islands.io.records import preview
+    from islands.records.reading import preview
 
     asked = json.load(sys.stdin)
     # Libraries print messages.

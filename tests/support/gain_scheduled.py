@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.io import models
 from islands.models.parametric import ParametricModel
+from islands.persistence import models
+from islands.records.dataset import Dataset
 
 
 @dataclass(frozen=True, kw_only=True)

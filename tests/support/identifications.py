@@ -4,9 +4,9 @@ from functools import partial
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify as identify_with_default
+from islands.records.dataset import Dataset
 
 #: Identification with a fixed preset: the default tries several kinds of models first.
 identify = partial(identify_with_default, preset="hysteresis")

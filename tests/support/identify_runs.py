@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.evolution.engine import SerialEngine
 from islands.evolution.presets import resolve_settings
+from islands.records.dataset import Dataset
 
 SMALL = (
     "--preset",

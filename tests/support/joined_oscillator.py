@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import ForceCoordinate, SimulationContext
+from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import ResampledSimulator
 from support.built_in_simulators import make_oscillator

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
 from islands.kernels.memory_operators import play_from
+from islands.records.dataset import Dataset
 
 Signal = NDArray[np.float64]
 

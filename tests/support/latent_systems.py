@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel, StateSpaceLayout
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 
 #: Parameters of a resonance with a cubic spring.
 SPRING = {

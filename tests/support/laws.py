@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 
 #: Sampling time of all records in seconds.

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 
 import islands
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from support.repository import measured_record
 
 Pair = tuple[Dataset, Dataset]

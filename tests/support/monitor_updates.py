@@ -6,13 +6,13 @@ from dataclasses import asdict
 
 from sqlalchemy import Connection
 
-from islands.diagnosis.documents.monitor_json import (
+from islands.report.documents.monitor_json import (
     describe_alarm,
     describe_monitor,
     describe_record,
     describe_status,
 )
-from islands.diagnosis.documents.monitor_state import SavedMonitor, head_to_json, record_to_json
+from islands.report.documents.monitor_state import SavedMonitor, head_to_json, record_to_json
 from islands_service.domain.monitoring import Monitor, MonitorStatus, MonitorUpdate, RecordEntry
 from islands_service.store import Store
 from islands_service.store.job_rows.monitor_records import update_monitor

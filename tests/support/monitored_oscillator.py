@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 from benchmarks.monitor import SIMULATION, make_record
 
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.monitor_state import SavedMonitor
 from islands.facade.record_monitor import create_monitor, monitor_record
+from islands.records.dataset import Dataset
+from islands.report.documents.monitor_state import SavedMonitor
 
 __all__ = ["ONSET", "SIMULATION", "TRAINING", "follow", "make_records", "undisturbed_monitor"]
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from islands.data.dataset import Dataset
-from islands.io.records import write_record
+from islands.records.dataset import Dataset
+from islands.records.writer import write_record
 from islands_api.client import Client
 from islands_service.coordinator.monitoring_job import run_monitoring_job
 from islands_service.domain.job import JobOutcome

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from support.simulated_records import recorded
 
 SAMPLES = 2000

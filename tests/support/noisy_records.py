@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 #: Terms of the system, in canonical order, and their parameters.
 TERMS = ("y(k-1)", "u(k-1)", "y(k-1)*u(k-1)")

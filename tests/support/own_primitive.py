@@ -3,7 +3,7 @@
 import numpy as np
 
 import islands
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 #: Half of the width of the dead zone.
 PLAY = 0.5

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from islands.io.records.reader import READERS
-from islands.io.records.table import Table
+from islands.records.reading.reader import READERS
+from islands.records.reading.table import Table
 
 
 def list_parsed(monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from islands.benchmarks.definition import Benchmark, BenchmarkData, BenchmarkTest
 from islands.benchmarks.peers.catalogue import Peer
-from islands.data.dataset import Dataset, join
+from islands.records.dataset import Dataset, join
 
 #: Least squares of ``y(k)`` on its lags, those of the input, and a constant.
 LEAST_SQUARES = """

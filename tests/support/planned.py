@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.planning.cause import Cause, CauseScale
 from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.diagnosis.planning.experiment import Experiment
@@ -15,7 +14,8 @@ from islands.diagnosis.planning.pair_separation import CausePair
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Signal
-from islands.estimation.noise_model import NoiseModel
+from islands.records.dataset import Dataset
+from islands.records.noise_model import NoiseModel
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
 from islands.effects.interface.context import SimulationContext
 from islands.kernels.memory_operators import play_from
+from islands.records.dataset import Dataset
 from support.built_in_simulators import make_piezo
 
 Signal = NDArray[np.float64]

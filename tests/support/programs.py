@@ -3,8 +3,8 @@
 import numpy as np
 
 import islands
-from islands.data.dataset import Dataset
 from islands.expressions.primitives import PRIMITIVES
+from islands.records.dataset import Dataset
 from islands.systems.published_models import PUBLISHED
 
 SAMPLES = 60

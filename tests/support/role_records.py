@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from islands.inspection.column_roles import ColumnChoice
+from islands.records.inspection.column_roles import ColumnChoice
 from support.known_records import Signal, delay, hysteresis, lag
 
 Random = np.random.Generator

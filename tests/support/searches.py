@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.individual import make_regressor
 from islands.evolution.settings import Settings
+from islands.records.dataset import Dataset
 
 SMALL = Settings(
     population=24,

@@ -21,7 +21,7 @@ import uvicorn
 from fastapi import FastAPI
 from sqlalchemy import Connection
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands_api.server.asgi import HTTPServer, make_server_config
 from islands_api.server.listener import open_listener
 from islands_api.web.app import create_app

@@ -11,9 +11,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.export.fmu.compiler import find_compiler
-from islands.io.models import model_json
+from islands.persistence.models import model_json
+from islands.records.dataset import Dataset
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.equations import OdeSpec

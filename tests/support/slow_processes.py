@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 #: Second pole of the battery, and the noise of its voltage and of the level of the tank.
 BATTERY_POLE, BATTERY_NOISE, TANK_NOISE = float(np.exp(-1.0 / 30.0)), 5e-4, 0.01

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 import islands
-from islands.data.dataset import Dataset
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.results.notebook_html import render_sentences
-from islands.io.result_folder import result_document
-from islands.reports.coupled import coupled_report
-from islands.reports.identification import identification_report
-from islands.reports.origin import Origin
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import result_document
+from islands.report.pages.coupled import coupled_report
+from islands.report.pages.identification import identification_report
+from islands.report.pages.origin import Origin
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.diagnosed_records import MEASURED_OUTPUTS, OTHERS, diagnose_difference
 from support.laws import LAWS

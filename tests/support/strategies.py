@@ -12,13 +12,13 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Constant, Lagged, Shift
 from islands.models.narx import make_model
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
 
 #: Number of inputs.
 INPUTS = 2

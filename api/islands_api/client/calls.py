@@ -13,7 +13,7 @@ import httpx
 
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
-from islands.io.models import NARX
+from islands.persistence.models import NARX
 from islands_api.client.recording_parts import make_part
 from islands_api.client.response_parsing import read_as, read_mapping
 from islands_api.dataset_schemas import DatasetPage, DatasetSummary, DatasetView

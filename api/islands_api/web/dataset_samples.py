@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.io.records.table import select
+from islands.records.reading.table import select
 from islands_api.web.dependencies import AppState
 from islands_api.web.uploads.dataset_storage import open_stored
 from islands_service.domain.plot_envelopes import describe_envelopes

@@ -11,7 +11,7 @@ import numpy as np
 from fastapi import Depends, Request
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.limits.owner_counts import OwnerCounts

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import to_json
 
-from islands.data.dataset import Dataset
-from islands.data.split import compare_input_ranges, measure_input_ranges
 from islands.errors import ModelError, SettingsError, suggest
-from islands.io.models import any_model_from_json
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.models.operating_point import find_equilibrium
 from islands.models.protocol import DynamicModel
+from islands.persistence.models import any_model_from_json
+from islands.records.dataset import Dataset
+from islands.records.split import compare_input_ranges, measure_input_ranges
 from islands.systems import signals
 from islands_api.model_simulation_schemas import (
     MAX_SAMPLES,

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import fields
 
 from islands.errors import SettingsError, suggest
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.reading.options import ReadingOptions
 
 #: Options of reading a record, which the form field ``reading`` contains.
 _READING = frozenset(option.name for option in fields(ReadingOptions))

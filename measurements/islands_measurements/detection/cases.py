@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
@@ -12,6 +11,7 @@ from islands.expressions.primitives import MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.narx import Model
 from islands.models.regressor import Regressor, regressor
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
 from islands.simulators.interface import Simulator

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects import model_form
 from islands.errors import IslandsError
 from islands.facade.results.saved_simulation import SavedSimulation
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LocalExtendedSpec
 from islands_measurements.detection.injection.excitation import Signal

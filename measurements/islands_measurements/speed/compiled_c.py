@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.export.fmu.compiler import compile_library
 from islands.export.languages.c import definition
 from islands.expressions.primitives import SIGN
 from islands.models.regressor import Regressor
+from islands.records.dataset import Dataset
 from islands_measurements.speed.expression_source import infix
 
 

@@ -9,13 +9,13 @@ from multiprocessing import get_context
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.offspring import Offspring
 from islands.evolution.settings import Settings
 from islands.kernels.breeding import Individuals
 from islands.processes.pool import prepare_process
+from islands.records.dataset import Dataset
 from islands_measurements.speed import kernel_evaluator
 from islands_measurements.speed.clock import cpu, wall
 

@@ -11,7 +11,6 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator
@@ -26,6 +25,7 @@ from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.program.regressor_matrix import select_rows
 from islands.program.term_pool import link
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
 from islands_measurements.speed.clock import milliseconds

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.models.regressor import Regressor
+from islands.records.dataset import Dataset
 from islands_measurements.speed.expression_source import infix
 
 Vector = NDArray[np.float64]

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from islands.data.dataset import Dataset
 from islands.progress import ProgressCallback
+from islands.records.dataset import Dataset
 from islands_measurements.speed import kernel_evaluator
 from islands_measurements.speed.clock import refuse_threads
 from islands_measurements.speed.comparison import Comparison, compare

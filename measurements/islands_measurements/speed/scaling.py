@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from islands.data.dataset import Dataset
 from islands.expressions.tree import walk
-from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, save
+from islands.records.dataset import Dataset
+from islands.report.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, save
 from islands_measurements.speed import kernel_evaluator
 from islands_measurements.speed.full_runs import Run
 from islands_measurements.speed.workload import WorkloadModel, full_tree, monomial, random_workload

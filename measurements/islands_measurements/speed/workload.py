@@ -13,7 +13,6 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
@@ -26,6 +25,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.kernels.breeding import Individuals
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
+from islands.records.dataset import Dataset
 from islands.systems.catalogue import make_record
 
 #: Settings of the paper's case 1, with the choices of its preset when the goals were set: another selection

@@ -8,9 +8,6 @@ from sys import maxsize
 from time import monotonic
 from typing import Any
 
-from islands.data.coupled_record import couple, split_coupled
-from islands.data.dataset import Dataset
-from islands.data.split import describe_search_extrapolation
 from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO
 from islands.evolution.search_result import (
@@ -30,9 +27,12 @@ from islands.facade.fit import fit_record
 from islands.facade.identification_progress import SEARCH, IdentificationProgress, class_phases
 from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
-from islands.io.checkpoints import history_document
-from islands.io.models import NARX
+from islands.persistence.checkpoints import history_document
+from islands.persistence.models import NARX
 from islands.progress import PhasedProgress, ProgressCallback, StoppedError, TimeLeft
+from islands.records.coupled import couple, split_coupled
+from islands.records.dataset import Dataset
+from islands.records.split import describe_search_extrapolation
 from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_outcome import (

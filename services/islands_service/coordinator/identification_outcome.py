@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import structlog
 
-from islands.data.coupled_record import match_coupled
 from islands.evolution.search_result import SearchResult
 from islands.facade.coupled.result import CoupledResult
-from islands.io.models import model_json
-from islands.io.result_folder import result_document
-from islands.io.result_text.coupled_statements import describe_coupled
-from islands.io.result_text.statements import describe
+from islands.persistence.models import model_json
 from islands.progress import explain_failure
+from islands.records.coupled import match_coupled
+from islands.report.documents.result_folder import result_document
+from islands.report.text.coupled_statements import describe_coupled
+from islands.report.text.statements import describe
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import JobOutcome, JobState

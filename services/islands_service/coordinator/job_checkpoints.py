@@ -5,7 +5,7 @@ from typing import Any, TextIO
 
 from islands.evolution.search_state import SearchState
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
-from islands.io.checkpoints import (
+from islands.persistence.checkpoints import (
     compressed_checkpoint,
     read_archipelago,
     state_document,

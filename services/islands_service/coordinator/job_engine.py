@@ -10,7 +10,7 @@ from islands.evolution.engine import ArchipelagoEpoch, Engine, SerialEngine
 from islands.evolution.protocol import SearchProblem
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.identification_progress import estimate_state_space_seconds
-from islands.io.models import NARX
+from islands.persistence.models import NARX
 from islands.progress import ProgressCallback, Stop
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, Job, Lease
 from islands_service.domain.job_memory import estimate_memory, machine_memory

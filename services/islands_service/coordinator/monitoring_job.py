@@ -5,24 +5,24 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.monitor_json import (
+from islands.effects.interface.context import Signal
+from islands.errors import RecordError
+from islands.facade.record_monitor import create_monitor, monitor_record
+from islands.records.dataset import Dataset
+from islands.report.documents.monitor_json import (
     describe_alarm,
     describe_monitor,
     describe_record,
     describe_status,
 )
-from islands.diagnosis.documents.monitor_state import (
+from islands.report.documents.monitor_state import (
     RejectedRecord,
     SavedMonitor,
     head_to_json,
     monitor_from_head,
     record_to_json,
 )
-from islands.diagnosis.documents.monitor_text import describe_alarm_text, describe_last_record
-from islands.effects.interface.context import Signal
-from islands.errors import RecordError
-from islands.facade.record_monitor import create_monitor, monitor_record
+from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from islands_service.coordinator.job_failures import check_readable, make_problem_document
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import JobOutcome, JobState, ProgressReport

@@ -12,8 +12,6 @@ from typing import Any
 
 import structlog
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.migration.topology import parse_topology
@@ -22,6 +20,8 @@ from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation
 from islands.models.narx import require_narx
+from islands.records.channel_names import parse_channel_name
+from islands.records.input_lead import advance_all_inputs
 from islands_service.domain.free_runs import SearchFreeRun, simulate_searched
 from islands_service.runtime.errors import ClusterError
 

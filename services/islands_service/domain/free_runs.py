@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.models.protocol import DynamicModel
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run

@@ -60,7 +60,7 @@ RUN_TIME, BY_OWNER = "run time", "stopped by its owner"
 #: `islands_service.coordinator.job_runners`.
 IDENTIFICATION = "identification"
 
-#: Class of the models that a search finds, `islands.io.models.NARX`, whose import would take long.
+#: Class of the models that a search finds, `islands.persistence.models.NARX`, whose import would take long.
 SEARCHED = "narx"
 
 #: Kind of a job that diagnoses a simulation.

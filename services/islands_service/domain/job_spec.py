@@ -21,7 +21,7 @@ from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
-from islands.io.models import MODEL_CLASSES, NARX
+from islands.persistence.models import MODEL_CLASSES, NARX
 from islands.simulators.specification.table import ColumnSpec, SimulationSpec, innermost
 from islands_service.domain.uploaded_fmu import UploadedFmuSpec
 

@@ -103,7 +103,7 @@ class RecordEntry:
     name, sha256 : str
     is_rejected : bool
     state : str
-        JSON of the record in `islands.diagnosis.documents.monitor_state`.
+        JSON of the record in `islands.report.documents.monitor_state`.
     document : str
         JSON of the record for clients.
     """
@@ -130,9 +130,9 @@ class MonitorUpdate:
     start : int
         Index of the first record that the next one is compared with.
     head : str
-        State without its records: JSON of `islands.diagnosis.documents.monitor_state`.
+        State without its records: JSON of `islands.report.documents.monitor_state`.
     document : str
-        Parameters and alarms for clients: JSON of `islands.diagnosis.documents.monitor_json`.
+        Parameters and alarms for clients: JSON of `islands.report.documents.monitor_json`.
     entry : RecordEntry
         The record.
     alarm : str or None

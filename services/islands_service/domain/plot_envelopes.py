@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.envelope import find_envelope
+from islands.records.envelope import find_envelope
 
 
 def describe_envelopes(

@@ -13,10 +13,10 @@ from islands_service.intake.confined_answer import ask_confined
 from islands_service.intake.confined_process import enter, refuse, send_document
 
 if TYPE_CHECKING:
-    from islands.inspection.record_note import RecordNote
-    from islands.io.records import Preview
-    from islands.io.records.reading_options import ReadingOptions
-    from islands.io.records.table import Table
+    from islands.records.inspection.record_note import RecordNote
+    from islands.records.reading import Preview
+    from islands.records.reading.options import ReadingOptions
+    from islands.records.reading.table import Table
 
 #: Largest number of columns of a record: their descriptions are stored, and shown in every list.
 _MAX_COLUMNS = 1000
@@ -39,7 +39,7 @@ class InspectionRequest:
     dt, rows : float, str or None
         As in a job of `islands_service.domain.job_spec`.
     reading : mapping
-        Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
+        Options of `islands.records.reading.options.ReadingOptions` that differ from the default.
     resting_inputs : bool
         Accept constant inputs.
     """
@@ -65,7 +65,7 @@ async def inspect_file(
     Returns
     -------
     mapping
-        An `islands.io.records.preview.Preview` as a document, with the keys ``notes`` in place of
+        An `islands.records.reading.preview.Preview` as a document, with the keys ``notes`` in place of
         ``problems``, ``inspection`` and ``reading``.
 
     Raises
@@ -95,12 +95,12 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
         The file, the requested columns or the options of reading cannot be used.
     """
     # Only the process that reads files imports its readers.
-    from islands.io.records.preview import preview_table  # noqa: PLC0415
-    from islands.io.records.reader import open_record  # noqa: PLC0415
-    from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
-    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
-    from islands.io.records.sampling.common_clock import merge_notes  # noqa: PLC0415
-    from islands.io.records.table_reading import read_table  # noqa: PLC0415
+    from islands.records.reading.open_table import read_table  # noqa: PLC0415
+    from islands.records.reading.options import ReadingOptions  # noqa: PLC0415
+    from islands.records.reading.preview import preview_table  # noqa: PLC0415
+    from islands.records.reading.reader import open_record  # noqa: PLC0415
+    from islands.records.reading.row_range import parse_rows  # noqa: PLC0415
+    from islands.records.reading.sampling.common_clock import merge_notes  # noqa: PLC0415
 
     options = ReadingOptions(**request.reading)
     # The file is parsed once, because parsing takes most of the time: all that follows reads this table.
@@ -149,7 +149,7 @@ def _merge_notes(
 
     The inspection ends some notes with the option that changes them.
     """
-    from islands.inspection.record_note import make_note  # noqa: PLC0415
+    from islands.records.inspection.record_note import make_note  # noqa: PLC0415
 
     found = []
     for text in warnings:
@@ -167,8 +167,8 @@ def _measure(
     if the file has no record.
     """
     from islands.facade.inspect_record import inspect_table  # noqa: PLC0415
-    from islands.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
-    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+    from islands.records.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
+    from islands.records.reading.row_range import parse_rows  # noqa: PLC0415
 
     rows = request.rows
     if rows is None and found.samples > MOST_SAMPLES:
@@ -210,8 +210,8 @@ def _check_readable(found: "Preview", file: str) -> None:
 
 def _check_usable(table: "Table", problems: Mapping[str, str], request: InspectionRequest) -> None:
     """Reject columns with a problem in the preview, if the job that would read them is not known yet."""
-    from islands.io.records.column_names import find_column  # noqa: PLC0415
-    from islands.io.records.validation import check_values  # noqa: PLC0415
+    from islands.records.reading.column_names import find_column  # noqa: PLC0415
+    from islands.records.reading.validation import check_values  # noqa: PLC0415
 
     for name in (*request.inputs, *([] if request.output is None else [request.output])):
         source = find_column(name, problems)

@@ -35,13 +35,13 @@ PROGRAMS: Mapping[str, Callable[[], None]] = {
 #: formats are left out: they would double the memory of this process.
 _PRELOADED = (
     "islands.facade.inspect_record",
-    "islands.inspection.record_facts",
-    "islands.io.records.column_names",
-    "islands.io.records.preview",
-    "islands.io.records.reader",
-    "islands.io.records.reading_options",
-    "islands.io.records.row_range",
-    "islands.io.records.table_reading",
+    "islands.records.inspection.record_facts",
+    "islands.records.reading.column_names",
+    "islands.records.reading.preview",
+    "islands.records.reading.reader",
+    "islands.records.reading.options",
+    "islands.records.reading.row_range",
+    "islands.records.reading.open_table",
     "numpy.fft",
     "numpy.random",
 )

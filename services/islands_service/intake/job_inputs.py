@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset, join
-from islands.data.split import hold_out
-from islands.io.records.row_range import parse_rows
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset, join
+from islands.records.reading.row_range import parse_rows
+from islands.records.split import hold_out
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
 from islands_service.intake.record_reading import RecordRequest, read_confined
 from islands_service.settings import service_settings

@@ -8,16 +8,16 @@ from itertools import combinations
 from math import prod
 from typing import Any
 
-from islands.data.compatibility import check_dt
-from islands.data.coupled_record import check_outputs
 from islands.errors import RecordError, SettingsError, lookup, suggest
 from islands.estimation.constraints.state_space import find_conditions
 from islands.estimation.estimator_table import REFITS
 from islands.evolution.settings import LATENT
-from islands.io.models import MODEL_CLASSES, NARX, model_from_json
-from islands.io.records.column_names import find_column
-from islands.io.records.row_range import overlap, parse_rows
-from islands.io.records.validation import check_choice
+from islands.persistence.models import MODEL_CLASSES, NARX, model_from_json
+from islands.records.compatibility import check_dt
+from islands.records.coupled import check_outputs
+from islands.records.reading.column_names import find_column
+from islands.records.reading.row_range import overlap, parse_rows
+from islands.records.reading.validation import check_choice
 from islands.simulators.specification.table import SIMULATORS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_memory import DEFAULT_SHARE, estimate_memory, machine_memory
 from islands_service.domain.job_spec import Discrepancy, Identification, Part, SimulatedRecord

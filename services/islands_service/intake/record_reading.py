@@ -12,8 +12,8 @@ from typing import IO, Any
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
+from islands.records.dataset import Dataset
 from islands_service.intake.confined_file import open_answer
 from islands_service.intake.confined_process import enter, refuse
 
@@ -32,7 +32,7 @@ _DESCRIBED = (
 
 @dataclass(frozen=True, slots=True)
 class RecordRequest:
-    """Columns, rows and options of reading, as in `islands.io.records.reader.read_dataset`."""
+    """Columns, rows and options of reading, as in `islands.records.reading.reader.read_dataset`."""
 
     inputs: Sequence[str]
     output: str
@@ -97,9 +97,9 @@ def main() -> None:
     """Read the file named on standard input, and write the record to standard output."""
     path, asked, answer = enter(writes=True)
     # Only the process that reads files imports its readers.
-    from islands.io.records import read_dataset  # noqa: PLC0415
-    from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
-    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+    from islands.records.reading import read_dataset  # noqa: PLC0415
+    from islands.records.reading.options import ReadingOptions  # noqa: PLC0415
+    from islands.records.reading.row_range import parse_rows  # noqa: PLC0415
 
     request = RecordRequest(**asked)
     try:

@@ -24,7 +24,7 @@ def read_columns(
     ----------
     names : sequence of str
     reading : mapping
-        Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
+        Options of `islands.records.reading.options.ReadingOptions` that differ from the default.
     memory, seconds
         Limits of the subprocess: bytes of address space, and time.
 
@@ -57,8 +57,8 @@ def find_columns(path: Path, names: Sequence[str], reading: Mapping[str, Any]) -
         A column does not exist, or it contains text.
     """
     # Only the process that reads files imports its readers.
-    from islands.io.records.reader import open_record  # noqa: PLC0415
-    from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
+    from islands.records.reading.options import ReadingOptions  # noqa: PLC0415
+    from islands.records.reading.reader import open_record  # noqa: PLC0415
 
     table = open_record(path, ReadingOptions(**reading))
     for name in names:

@@ -25,7 +25,7 @@ class SimulationPreviewRequest:
     job : mapping
         What is previewed, see `islands_service.domain.job_spec.SimulatedRecord`.
     reading : mapping
-        Options of `islands.io.records.reading_options.ReadingOptions` that differ from the default.
+        Options of `islands.records.reading.options.ReadingOptions` that differ from the default.
     points : int
         Largest number of parts of the plotted signals.
     fmu : mapping or None
@@ -92,9 +92,9 @@ def main() -> None:
 
 def _describe(path: str, request: SimulationPreviewRequest, fmus: Any) -> dict[str, Any]:
     from islands.diagnosis.calibration.preview import choose_stretch, preview_calibration  # noqa: PLC0415
-    from islands.io.records import read_dataset  # noqa: PLC0415
-    from islands.io.records.reading_options import ReadingOptions  # noqa: PLC0415
-    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
+    from islands.records.reading import read_dataset  # noqa: PLC0415
+    from islands.records.reading.options import ReadingOptions  # noqa: PLC0415
+    from islands.records.reading.row_range import parse_rows  # noqa: PLC0415
     from islands.simulators.specification.factory import make_simulator  # noqa: PLC0415
 
     job = SimulatedRecord.model_validate(request.job)

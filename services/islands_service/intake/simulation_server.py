@@ -10,9 +10,9 @@ from contextlib import suppress
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.preview import preview_calibration
 from islands.errors import SettingsError
+from islands.records.dataset import Dataset
 from islands.simulators.fmu.fmi_description import import_fmpy
 from islands.simulators.fmu.warm_up import compile_kernels
 from islands.simulators.specification.factory import make_simulator
@@ -27,7 +27,11 @@ PROGRAMS: Mapping[str, Callable[[], None]] = {
 }
 
 #: Modules that the programs import when they run.
-_PRELOADED = ("islands.io.records", "islands.io.records.reading_options", "islands.io.records.row_range")
+_PRELOADED = (
+    "islands.records.reading",
+    "islands.records.reading.options",
+    "islands.records.reading.row_range",
+)
 
 
 def main() -> None:

@@ -50,8 +50,9 @@ class StoredDataset:
     bytes : int
         Size of the file.
     preview : mapping
-        Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`. Jobs read the
-        file with the options ``reading``. In a page it contains only the fields of `summarise_preview`.
+        Columns with units and statistics, sampling, warnings: see
+        `islands.records.reading.preview`. Jobs read the file with the options ``reading``. In a page it
+        contains only the fields of `summarise_preview`.
         That of an FMU has its description as ``fmu``, see `islands_service.domain.uploaded_fmu`.
     source : str or None
         URL of the download without its query; None for an upload.

@@ -35,7 +35,7 @@ _ROWS: Select[Any] = select(
 )
 
 
-#: Schema of a state with its records: that of `islands.diagnosis.documents.monitor_state`, which this module
+#: Schema of a state with its records: that of `islands.report.documents.monitor_state`, which this module
 #: does not import for its numerical packages. A test compares them.
 STATE_SCHEMA = "islands.monitor-state/1"
 

@@ -9,9 +9,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError, name_option
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset
 
 #: The metric of every benchmark: of the free run, over all samples and outputs that are scored.
 METRIC = "RMSE"

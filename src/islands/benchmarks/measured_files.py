@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.benchmarks.definition import BenchmarkData, BenchmarkTest
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset, join
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset, join
 
 #: Initial samples of most tests (nonlinear_benchmarks: ``state_initialization_window_length``).
 KNOWN = 50

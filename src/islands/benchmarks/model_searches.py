@@ -11,9 +11,6 @@ from types import MappingProxyType
 from typing import Protocol
 
 from islands.benchmarks.definition import LATENT, LINEAR, NARX
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_all_inputs
 from islands.errors import SettingsError
 from islands.estimation.latent_models import search_linear_models
 from islands.facade.coupled.identification import fit_coupled
@@ -25,6 +22,9 @@ from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.progress import ProgressCallback, Steps, Stop
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.input_lead import advance_all_inputs
 from islands.simulation.predictors import free_run
 from islands.validation.prediction_bands import PredictionBands
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from islands.benchmarks.definition import Benchmark, BenchmarkData, BenchmarkTest
-from islands.data.dataset import Dataset, join
 from islands.errors import SettingsError, lookup
+from islands.records.dataset import Dataset, join
 
 #: Name of the package; its sets are named ``nonlinear_benchmarks:EMPS``.
 PACKAGE = "nonlinear_benchmarks"

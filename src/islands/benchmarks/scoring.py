@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.benchmarks.definition import BenchmarkTest
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.signal_map import match_rate
 from islands.errors import ModelError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.model_simulation import predict
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.signal_map import match_rate
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.ensemble import Ensemble
 from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands

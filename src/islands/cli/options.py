@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from islands.figures.names import ALL_FIGURES
+from islands.report.figures.names import ALL_FIGURES
 
 Record = Annotated[
     Path, typer.Argument(help="The record: text, XLSX, NPZ, MAT, HDF5, Parquet, MDF or TDMS; also .gz, .zip.")

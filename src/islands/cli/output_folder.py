@@ -44,7 +44,7 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
 def keep_models(folder: Path) -> Callable[["SearchResult"], None]:
     """Return a callback that writes the models of a search to a folder before the steps after the search."""
     # The help of a command does not need it.
-    from islands.io.result_folder import write_interim_result  # noqa: PLC0415
+    from islands.report.documents.result_folder import write_interim_result  # noqa: PLC0415
 
     return partial(write_interim_result, folder=folder)
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from islands.cli.option_groups import group_options, make_option
-from islands.data.preprocessing_steps import DETREND, PreprocessingSteps
+from islands.records.preprocessing_steps import DETREND, PreprocessingSteps
 
 #: Types and descriptions of the options, by the field.
 _OPTIONS: dict[str, tuple[Any, str]] = {

@@ -9,7 +9,7 @@ import typer
 
 from islands.cli.option_groups import group_options, make_option
 from islands.errors import name_flag
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.reading.options import ReadingOptions
 
 #: Prefix of the parameters, which keeps them apart from those of a search.
 _PREFIX = "reading_"

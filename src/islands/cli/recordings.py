@@ -5,16 +5,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from islands.cli.console import print_message
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset, join
-from islands.data.input_lead import advance_inputs
-from islands.data.preprocessing import preprocess
-from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
-from islands.data.split import describe_search_extrapolation
 from islands.errors import SettingsError
-from islands.io.records import read_dataset
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import overlap, parse_rows
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset, join
+from islands.records.input_lead import advance_inputs
+from islands.records.preprocessing import preprocess
+from islands.records.preprocessing_steps import NO_STEPS, PreprocessingSteps
+from islands.records.reading import read_dataset
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.row_range import overlap, parse_rows
+from islands.records.split import describe_search_extrapolation
 
 #: Fraction of every recording that is used for validation.
 FRACTION = 0.25

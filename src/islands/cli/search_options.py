@@ -11,7 +11,7 @@ import typer
 from islands.cli.option_groups import group_options, make_option
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings, get_text_type
-from islands.io.models import MODEL_CLASSES, NARX
+from islands.persistence.models import MODEL_CLASSES, NARX
 
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESET_NAMES))]
 ModelClass = Annotated[

@@ -9,8 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from islands.errors import SettingsError
-from islands.io.records import READERS
-from islands.io.records.formats.packed import PACKED
+from islands.records.reading import READERS
+from islands.records.reading.formats.packed import PACKED
 
 #: Date and time in a file name: 2026-11-23T01-30, 20261123_0130, 2026-11-23 01:30:05.
 _TIME = re.compile(

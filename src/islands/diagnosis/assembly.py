@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.initial_states import fit_initial_states
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.target import Target
@@ -24,6 +23,7 @@ from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit, c
 from islands.diagnosis.planning.next_experiment import design_next_experiment
 from islands.diagnosis.result import Candidate, Diagnosis
 from islands.diagnosis.run import DiagnosisRun
+from islands.records.dataset import Dataset
 
 #: Effects are rejected if they increase the error of the hold-out part by more than this percentage, with a
 #: certainty of 97.5 %. It is not zero, since an effect that calibration absorbs changes the RMSE by almost

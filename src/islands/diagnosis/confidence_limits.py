@@ -21,7 +21,7 @@ from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit
 from islands.diagnosis.result import Diagnosis
 from islands.effects.hysteresis import is_held
 from islands.effects.interface.effect import Signal
-from islands.estimation.noise_model import fit_noise
+from islands.records.noise_model import fit_noise
 
 #: Coloured part of the misfit up to which a cause explains it.
 MAX_COLOURED_FRACTION = 0.05

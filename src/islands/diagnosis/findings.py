@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.segments import count_runs
 from islands.diagnosis.calibration.resolution import is_unresolved, measure_resolution
 from islands.diagnosis.gross_errors.explanation import GrossError
 from islands.diagnosis.gross_errors.record_finding import FAMILY, RecordFinding
@@ -14,7 +13,8 @@ from islands.diagnosis.inference.finding import Finding, Value
 from islands.diagnosis.inference.noise_detectors import DETECTORS, QUANTISATION
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.effects.interface.effect import Signal, SimulationContext
-from islands.estimation.noise_model import is_rounding_error
+from islands.records.noise_model import is_rounding_error
+from islands.records.segments import count_runs
 
 
 def describe_gross_errors(errors: Sequence[GrossError]) -> tuple[Finding, ...]:

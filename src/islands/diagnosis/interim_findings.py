@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.assembly import make_diagnosis
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.starts_calibrator import (
@@ -27,6 +26,7 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect
 from islands.parallel import ParallelMap, intercepted_map
 from islands.progress import explain_failure
+from islands.records.dataset import Dataset
 
 #: Steps of a diagnosis after the calibration of the simulation, in their order.
 STEPS = (

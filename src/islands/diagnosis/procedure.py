@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.assembly import extend_equations, make_diagnosis, make_gross_diagnosis
 from islands.diagnosis.calibration.intersample_selection import (
     Discretisation,
@@ -66,6 +65,7 @@ from islands.effects.interface.effect import Effect
 from islands.errors import IslandsError, RecordError
 from islands.parallel import ParallelMap
 from islands.progress import Phase, PhasedProgress, ProgressCallback, ignore_progress
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

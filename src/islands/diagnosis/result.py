@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.discovery.missing_terms import Discovery
@@ -15,6 +14,7 @@ from islands.diagnosis.inference.holdout import HoldoutGain
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.effects.interface.context import Signal
+from islands.records.dataset import Dataset
 
 
 @dataclass(frozen=True, slots=True)

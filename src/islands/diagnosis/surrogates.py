@@ -6,13 +6,13 @@ from math import inf
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import count_runs
 from islands.diagnosis.calibration.preparation import select_effects
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.diagnosis.result import Diagnosis
 from islands.effects.interface.effect import Effect, Signal
-from islands.estimation.noise_model import NoiseModel, fit_noise
+from islands.records.dataset import Dataset
+from islands.records.noise_model import NoiseModel, fit_noise
+from islands.records.segments import count_runs
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from islands.data.channel_names import TEMPERATURES
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.errors import RecordError
+from islands.records.channel_names import TEMPERATURES
 
 #: Notes on the formulas of effects of a channel.
 TEMPERATURE_NOTE = "{T} is the first temperature among the channels, {T_0} its first value"

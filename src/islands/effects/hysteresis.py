@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from islands.data.segments import MAX_RANGE_AT_REST
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
 from islands.effects.interface.map_equation import MapEquation
 from islands.kernels.memory_operators import jumper, play_from, slider
+from islands.records.segments import MAX_RANGE_AT_REST
 
 #: Largest breakaway distance, relative to the peak of the input.
 _MAX_BREAKAWAY = 0.6

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord
 from islands.estimation.constraints.conditions import Constrained
 from islands.estimation.constraints.state_space import linearise_constraints, meet_constraints
 from islands.estimation.damped_least_squares import find_directions, inner_products
@@ -30,6 +29,7 @@ from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import make_residual
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
+from islands.records.coupled import AnyRecord
 from islands.simulation.initial_outputs import estimate_initial_outputs
 from islands.simulation.outcome import EvaluationOutcome
 

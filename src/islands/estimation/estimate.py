@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.conditions import Constrained
@@ -15,6 +14,7 @@ from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 

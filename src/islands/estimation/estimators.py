@@ -6,7 +6,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.errors import lookup
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import ESTIMATORS
@@ -17,6 +16,7 @@ from islands.expressions.tree import Lagged
 from islands.models.narx import Model, require_narx
 from islands.models.protocol import DynamicModel
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 #: Estimates parameters from (start, record, constraints, warm-up, samples of an interval or None).

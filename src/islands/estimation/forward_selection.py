@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.estimation.constraints.conditions import Direction
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.froe import froe
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import gram_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
 Structure = tuple[Regressor, ...]

@@ -14,9 +14,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
-from islands.data.flat_extremes import SensorLimits, find_limits
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.constraints.state_space import (
     NO_CONDITIONS,
     StateSpaceConditions,
@@ -25,6 +22,9 @@ from islands.estimation.constraints.state_space import (
 from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import StateSpaceLayout
+from islands.records.dataset import Dataset
+from islands.records.flat_extremes import SensorLimits, find_limits
+from islands.records.input_lead import advance_all_inputs
 from islands.simulation.initial_states import Segment, estimate_states
 from islands.simulation.segment_lanes import SegmentLanes
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from islands.data.dataset import Dataset
 from islands.estimation.constraints.state_space import take_system
 from islands.estimation.constraints.static_state import StateSpace
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
@@ -32,6 +31,7 @@ from islands.kernels.state_space import evaluate_unit
 from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.models.unit_functions import find_codes, make_odd_unit
 from islands.progress import Steps
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Numbers of states of the linear systems, and of those that have modes only. A system of 24 states has 576

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.flat_extremes import find_limits
 from islands.estimation.constraints.state_space import find_conditions
 from islands.estimation.fitted_state_space import number
 from islands.estimation.latent_data import SignalScales, estimate_start
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import LatentModel
+from islands.records.dataset import Dataset
+from islands.records.flat_extremes import find_limits
 from islands.simulation.initial_states import Segment, read_inputs
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes

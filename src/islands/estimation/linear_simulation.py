@@ -20,11 +20,11 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.estimation.extended_least_squares import is_stable
-from islands.estimation.noise_model import NoiseModel
 from islands.expressions.tree import Constant, Expression
 from islands.kernels.linear_filter import divide_rows
 from islands.kernels.qr import orthogonalise
 from islands.kernels.summation import dot
+from islands.records.noise_model import NoiseModel
 
 #: Iterations of Steiglitz and McBride, Gauss-Newton steps, and halvings of a step.
 _INITIAL_ITERATIONS, _MAX_STEPS, _MAX_HALVINGS = 8, 30, 12

@@ -11,12 +11,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
 from islands.estimation.linear_simulation import find_start, minimise
 from islands.estimation.output_error import make_problem
 from islands.kernels.state_space import simulate_states
 from islands.models.latent import StateSpaceLayout
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
 
 #: The steps end when one reduces the squared error by a smaller relative amount.
 _LEAST_GAIN = 1e-6

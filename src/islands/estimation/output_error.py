@@ -17,8 +17,6 @@ from math import inf
 import numpy as np
 import scipy
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.estimate import FittedStructure
 from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR, Criterion
@@ -32,10 +30,12 @@ from islands.estimation.linear_simulation import (
     minimise,
     solve,
 )
-from islands.estimation.noise_model import fit_whitening, is_rounding_error
 from islands.expressions.tree import Expression, Lagged
 from islands.kernels.linear_filter import divide_rows
 from islands.models.narx import Model, make_model
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
+from islands.records.noise_model import fit_whitening, is_rounding_error
 
 #: Largest order of a model. An order is tried only if one of the two before it reduced the criterion.
 _LARGEST_ORDER, _PATIENCE = 4, 2

@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.estimation.constraints.state_space import linearise_constraints
 from islands.estimation.covariance import sandwich
 from islands.estimation.damped_least_squares import inner_products
@@ -23,6 +22,7 @@ from islands.kernels.state_space import trace_states
 from islands.kernels.state_space_products import accumulate_products
 from islands.models.latent import LatentModel
 from islands.models.linear_system import Quantity, list_modes, measure_gains, measure_mode
+from islands.records.dataset import Dataset
 from islands.simulation.initial_states import estimate_initial_states, read_inputs
 from islands.simulation.layout import find_intervals
 

@@ -12,8 +12,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.compatibility import match_record
-from islands.data.coupled_record import AnyRecord, CoupledRecord, match_coupled
 from islands.errors import RecordError
 from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.damped_least_squares import (
@@ -31,6 +29,8 @@ from islands.estimation.shooting_residual import (
 )
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
+from islands.records.compatibility import match_record
+from islands.records.coupled import AnyRecord, CoupledRecord, match_coupled
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 

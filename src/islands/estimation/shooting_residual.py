@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset
 from islands.estimation.damped_least_squares import Residual, approximate_jacobian
 from islands.kernels.simulate import DIVERGED, Layout, simulate
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.program.term_pool import link
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset
 from islands.simulation.blocks import make_simulator
 from islands.simulation.initial_outputs import STEP, change_initial_outputs, count_segments
 from islands.simulation.layout import layout

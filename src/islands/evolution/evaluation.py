@@ -12,7 +12,6 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.err_targets import ERR_TARGETS
@@ -28,6 +27,7 @@ from islands.kernels import population as kernel
 from islands.kernels.breeding import UNUSED, Individuals
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
 from islands.program.regressor_matrix import select_rows
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import find_divergence_bound

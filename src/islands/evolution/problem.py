@@ -6,7 +6,6 @@ from itertools import zip_longest
 from typing import cast
 
 from islands.available_cpus import count_cpus
-from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import make_selection_problem, select_forward, select_pool
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import Offsets
@@ -25,6 +24,7 @@ from islands.expressions.tree import Expression, height
 from islands.models.narx import Model
 from islands.models.regressor import Regressor
 from islands.progress import Steps
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 

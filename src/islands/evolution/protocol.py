@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from islands.data.dataset import Dataset
 from islands.evolution.individual import AnyIndividual
 from islands.evolution.island import Island, StepInfo
 from islands.evolution.settings import Settings
 from islands.models.protocol import DynamicModel
+from islands.records.dataset import Dataset
 
 #: Bytes in use and byte limit of each cache, by name.
 Caches = Mapping[str, tuple[int, int]]

@@ -8,11 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from islands.data.averaging import count_means
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
-from islands.data.loops import has_loops
-from islands.data.split import Split
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.fitness import FITNESS_MODES
 from islands.evolution.history import HistoryPoint
@@ -21,6 +16,11 @@ from islands.models.equations import equation
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
+from islands.records.averaging import count_means
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
+from islands.records.loops import has_loops
+from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.linear_comparison import fit_linear_comparison, is_linear

@@ -6,8 +6,6 @@ from math import inf
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from islands.data.averaging import check_average
-from islands.data.input_lead import check_feedthrough
 from islands.errors import (
     SettingsError,
     check_at_least,
@@ -34,6 +32,8 @@ from islands.expressions.tree import Primitive
 from islands.expressions.user_primitive import primitive_table
 from islands.models.candidate_library import get_library
 from islands.models.latent import ZERO_BLOCKS, LatentModel
+from islands.records.averaging import check_average
+from islands.records.input_lead import check_feedthrough
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000

@@ -18,11 +18,11 @@ from islands.export.languages.matlab_system import matlab_system_source
 from islands.export.languages.modelica import modelica_source
 from islands.export.languages.python import python_source
 from islands.export.languages.s_function import s_function_source
-from islands.io.models import model_json
 from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
 from islands.models.protocol import DynamicModel
+from islands.persistence.models import model_json
 from islands.progress import explain_failure
 
 #: Models that can be exported.

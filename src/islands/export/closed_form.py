@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from islands.data.channel_names import AT_ONCE
 from islands.errors import ModelError
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged, replace_leaves
-from islands.io.models import narx_from_json
 from islands.models.narx import Model, make_model, measured_model
+from islands.persistence.models import narx_from_json
+from islands.records.channel_names import AT_ONCE
 from islands.simulators.specification.base import EffectSpec, ScalesSpec
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.table import (

@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from math import isfinite
 
-from islands.data.dataset import Dataset
-from islands.data.split import Split
 from islands.errors import SettingsError, lookup
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.refinement import refine
@@ -23,11 +21,13 @@ from islands.evolution.settings import LATENT, Settings
 from islands.facade.identification_progress import SEARCH
 from islands.facade.latent_identification import complete_latent, search_latent
 from islands.facade.results.model_simulation import SHOOTING
-from islands.io.models import MODEL_CLASSES, NARX
 from islands.models.latent import LatentModel
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel
+from islands.persistence.models import MODEL_CLASSES, NARX
 from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess

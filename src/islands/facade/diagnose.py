@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 
 from threadpoolctl import threadpool_limits
 
-from islands.data.dataset import Dataset
-from islands.data.split import hold_out
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.experiment_plan import plan_experiment as plan_with_simulator
 from islands.diagnosis.procedure import diagnose as diagnose_simulator
@@ -14,13 +12,15 @@ from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, Signal
 from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
-from islands.io.data_frames import as_record
-from islands.io.records.column_names import list_inputs
-from islands.io.records.reading_options import DEFAULT_READING, take_reading
 from islands.models.narx import Model
 from islands.models.parametric import ParametricModel
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
+from islands.records.dataset import Dataset
+from islands.records.reading.column_names import list_inputs
+from islands.records.reading.data_frames import as_record
+from islands.records.reading.options import DEFAULT_READING, take_reading
+from islands.records.split import hold_out
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.base import SpecModel
@@ -34,7 +34,7 @@ from islands.simulators.specification.table import (
 )
 
 if TYPE_CHECKING:
-    from islands.io.data_frames import ReadingLike, RecordLike
+    from islands.records.reading.data_frames import ReadingLike, RecordLike
 
 #: Simulation as a user names it; quoted in signatures, because its specifications take a thousand letters.
 SimulationLike: TypeAlias = str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator

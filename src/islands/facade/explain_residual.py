@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 
 if TYPE_CHECKING:

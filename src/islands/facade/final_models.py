@@ -6,8 +6,6 @@ from functools import partial
 from math import inf, isfinite
 from typing import Protocol, TypeAlias, TypeVar
 
-from islands.data.dataset import Dataset
-from islands.data.split import Split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import (
     LEAST_SQUARES,
@@ -30,6 +28,8 @@ from islands.facade.trials.library import make_trial_library
 from islands.models.narx import require_narx
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.records.split import Split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run_error, multiple_shooting

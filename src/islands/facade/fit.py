@@ -6,9 +6,6 @@ from typing import TYPE_CHECKING, Unpack
 
 from numpy.typing import ArrayLike
 
-from islands.data.averaging import AUTO
-from islands.data.dataset import Dataset
-from islands.data.split import split_data, warn_of_extrapolation
 from islands.errors import SettingsError, check_seed, name_option
 from islands.evolution.search_result import ResultCallback, SearchResult, ignore_result
 from islands.facade.automatic.kind_choice import StoppedChoiceError
@@ -17,11 +14,8 @@ from islands.facade.class_fit import fit_class
 from islands.facade.library_fit import FitChanges, FitSettings
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
-from islands.io.data_frames import read_data
-from islands.io.models import NARX
-from islands.io.records.reading_options import DEFAULT_READING
-from islands.io.result_folder import record_document
 from islands.models.latent import LatentModel
+from islands.persistence.models import NARX
 from islands.progress import (
     ProgressCallback,
     Steps,
@@ -29,11 +23,17 @@ from islands.progress import (
     ignore_progress,
     never_stop,
 )
+from islands.records.averaging import AUTO
+from islands.records.dataset import Dataset
+from islands.records.reading.data_frames import read_data
+from islands.records.reading.options import DEFAULT_READING
+from islands.records.split import split_data, warn_of_extrapolation
+from islands.report.documents.result_folder import record_document
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import ReadingLike, RecordLike
+    from islands.records.reading.data_frames import ReadingLike, RecordLike
 
 
 def fit(

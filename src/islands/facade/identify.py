@@ -6,9 +6,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from islands.data.averaging import count_means
-from islands.data.dataset import Dataset
-from islands.data.split import split_data, warn_of_extrapolation
 from islands.errors import RecordError, SettingsError, check_seed
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import (
@@ -50,9 +47,6 @@ from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.rate_selection import select_rate
-from islands.io.data_frames import read_data
-from islands.io.records.reading_options import DEFAULT_READING
-from islands.io.result_folder import record_document
 from islands.models.candidate_library import full_set
 from islands.program.primitive_functions import row_address
 from islands.progress import (
@@ -63,11 +57,17 @@ from islands.progress import (
     ignore_progress,
     never_stop,
 )
+from islands.records.averaging import count_means
+from islands.records.dataset import Dataset
+from islands.records.reading.data_frames import read_data
+from islands.records.reading.options import DEFAULT_READING
+from islands.records.split import split_data, warn_of_extrapolation
+from islands.report.documents.result_folder import record_document
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import ReadingLike, RecordLike
+    from islands.records.reading.data_frames import ReadingLike, RecordLike
 
 #: Outcomes of individuals with estimated parameters.
 FEASIBLE_OUTCOMES = ("ok", "abandoned")

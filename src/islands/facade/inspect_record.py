@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_unit
-from islands.data.dataset import Dataset
 from islands.errors import (
     RecordError,
     SettingsError,
@@ -21,25 +19,27 @@ from islands.errors import (
     name_option,
     name_without_value,
 )
-from islands.inspection.channel import channels
-from islands.inspection.column_roles import ColumnChoice, choose_columns
-from islands.inspection.findings import InspectedColumn, InspectedSampling, RecordInspection
-from islands.inspection.gross_errors import find_input_codes
-from islands.inspection.record_facts import RecordFacts, measure_facts
-from islands.inspection.record_note import MOST_ROWS, RecordNote, make_note
-from islands.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
-from islands.io.records.column_names import find_column, split_structures
-from islands.io.records.preview import ColumnPreview, Preview, preview_table
-from islands.io.records.reader import open_record
-from islands.io.records.reading_options import DEFAULT_READING, EXCLUDE, KEEP, ROWS, SAMPLE, ReadingOptions
-from islands.io.records.sampling.column_clocks import find_clocks, may_differ
-from islands.io.records.sampling.common_clock import ColumnUse, align_columns, merge_notes
-from islands.io.records.sampling.recording import Recording
-from islands.io.records.sampling.time_step import TimeSource, find_time_scale
-from islands.io.records.sampling.time_unit import TimeScale
-from islands.io.records.table import Columns, Table
-from islands.io.records.table_reading import exclude_gross_errors, read_table
-from islands.io.records.validation import MIN_SAMPLES, check_choice
+from islands.records.channel_names import parse_unit
+from islands.records.dataset import Dataset
+from islands.records.inspection.channel import channels
+from islands.records.inspection.column_roles import ColumnChoice, choose_columns
+from islands.records.inspection.findings import InspectedColumn, InspectedSampling, RecordInspection
+from islands.records.inspection.gross_errors import find_input_codes
+from islands.records.inspection.record_facts import RecordFacts, measure_facts
+from islands.records.inspection.record_note import MOST_ROWS, RecordNote, make_note
+from islands.records.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
+from islands.records.reading.column_names import find_column, split_structures
+from islands.records.reading.open_table import exclude_gross_errors, read_table
+from islands.records.reading.options import DEFAULT_READING, EXCLUDE, KEEP, ROWS, SAMPLE, ReadingOptions
+from islands.records.reading.preview import ColumnPreview, Preview, preview_table
+from islands.records.reading.reader import open_record
+from islands.records.reading.sampling.column_clocks import find_clocks, may_differ
+from islands.records.reading.sampling.common_clock import ColumnUse, align_columns, merge_notes
+from islands.records.reading.sampling.recording import Recording
+from islands.records.reading.sampling.time_step import TimeSource, find_time_scale
+from islands.records.reading.sampling.time_unit import TimeScale
+from islands.records.reading.table import Columns, Table
+from islands.records.reading.validation import MIN_SAMPLES, check_choice
 
 #: Columns that are read to choose inputs and output, at most.
 _MOST_COLUMNS = 32

@@ -5,9 +5,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_all_inputs
-from islands.data.split import Split
 from islands.errors import SettingsError
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.fitted_state_space import FittedStateSpace
@@ -32,6 +29,9 @@ from islands.facade.results.model_simulation import SHOOTING
 from islands.models.latent import LatentModel
 from islands.parallel import map_over_record
 from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.records.input_lead import advance_all_inputs
+from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel
 

@@ -7,9 +7,6 @@ from functools import partial, reduce
 from typing import TypedDict
 
 from islands.available_cpus import count_cpus
-from islands.data.averaging import AUTO, count_means
-from islands.data.dataset import Dataset
-from islands.data.split import Split
 from islands.errors import SettingsError, check_integers, lookup
 from islands.estimation.estimator_table import ESTIMATORS, REFITS, make_criterion
 from islands.estimation.estimators import estimate_with
@@ -58,6 +55,9 @@ from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
 from islands.progress import ProgressCallback, Steps, Stop, StoppedError, ignore_progress, never_stop
+from islands.records.averaging import AUTO, count_means
+from islands.records.dataset import Dataset
+from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess
 from islands.validation.ensemble import ValidatedModel

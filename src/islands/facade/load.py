@@ -13,8 +13,8 @@ from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.reader import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.models import read_coupled_model, read_model
-from islands.io.saved_documents import KINDS, open_document
+from islands.persistence.models import read_coupled_model, read_model
+from islands.persistence.saved_documents import KINDS, open_document
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec, parse_spec

@@ -7,9 +7,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from islands.data.compatibility import ColumnReference, match_record
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.monitor_state import RejectedRecord, SavedMonitor
 from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE, parse_alarm_rate
 from islands.diagnosis.monitoring.record_follower import (
     TRAINING,
@@ -19,6 +16,9 @@ from islands.diagnosis.monitoring.record_follower import (
 )
 from islands.effects.interface.context import Signal
 from islands.errors import RecordError, SettingsError
+from islands.records.compatibility import ColumnReference, match_record
+from islands.records.dataset import Dataset
+from islands.report.documents.monitor_state import RejectedRecord, SavedMonitor
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator

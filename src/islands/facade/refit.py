@@ -8,11 +8,6 @@ those of the parameters before, which are an estimate of it.
 from dataclasses import replace
 from functools import partial
 
-from islands.data.averaging import average_samples
-from islands.data.compatibility import ColumnReference, match_record
-from islands.data.dataset import Dataset, join
-from islands.data.missing_outputs import skip_missing_outputs
-from islands.data.signal_map import map_signals
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR, Criterion
@@ -27,6 +22,11 @@ from islands.models.narx import Model, require_narx
 from islands.models.protocol import DynamicModel
 from islands.parallel import map_over_record
 from islands.progress import Steps
+from islands.records.averaging import average_samples
+from islands.records.compatibility import ColumnReference, match_record
+from islands.records.dataset import Dataset, join
+from islands.records.missing_outputs import skip_missing_outputs
+from islands.records.signal_map import map_signals
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, with_refit

@@ -12,8 +12,6 @@ from typing import Final
 import numpy as np
 
 from islands.available_cpus import count_cpus
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.output_error import fit_output_error
@@ -40,6 +38,8 @@ from islands.kernels.population import (
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
 from islands.program.primitive_functions import row_address
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED

@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import SUB
@@ -28,6 +27,7 @@ from islands.expressions.tree import (
     replace_leaves,
     walk,
 )
+from islands.records.preprocessing_steps import Preprocessing
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,6 @@ from dataclasses import dataclass, fields, replace
 from itertools import accumulate
 from typing import ClassVar
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged, Symbol
 from islands.models.block import Block, BlockTerm, subtract_offsets
@@ -19,6 +17,8 @@ from islands.models.equations import latex_statement, mathml_statement, signal_n
 from islands.models.latent import LatentModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import describe_values
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,6 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Any, ClassVar, TypeAlias
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.block import Block, BlockTerm
@@ -28,6 +25,9 @@ from islands.models.equations import (
 from islands.models.narx import Model, measured_model, require_narx
 from islands.models.protocol import DynamicModel, EquationText
 from islands.models.signal_statement import describe_values, join_statements, symbols
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.preprocessing_steps import Preprocessing
 
 
 @dataclass(frozen=True, slots=True)

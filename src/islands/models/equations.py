@@ -6,8 +6,6 @@ from html import escape, unescape
 from textwrap import wrap
 from typing import Protocol
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.signal_map import SignalReference
 from islands.expressions.parsing import parse
 from islands.expressions.printing import (
     MINUS,
@@ -23,6 +21,8 @@ from islands.expressions.printing import (
 from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves
 from islands.models.regressor import Regressor
 from islands.models.signal_statement import describe_signals
+from islands.records.channel_names import parse_channel_name
+from islands.records.signal_map import SignalReference
 
 #: Maximum number of visible characters of a row of MathML.
 _ROW_CHARACTERS = 80

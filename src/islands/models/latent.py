@@ -18,8 +18,6 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.flat_extremes import NO_LIMITS, SensorLimits
 from islands.errors import ModelError
 from islands.models.block import Block
 from islands.models.equations import signal_names
@@ -37,6 +35,8 @@ from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
 from islands.models.state_space_rest import find_rest, linearise
 from islands.models.unit_functions import find_codes, parse_unit
+from islands.records.channel_names import parse_channel_name
+from islands.records.flat_extremes import NO_LIMITS, SensorLimits
 
 #: Blocks of parameters that are zero in the structure of a system: effects of the units on the states or on
 #: the output, or weights of the states in the arguments of the units.

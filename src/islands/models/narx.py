@@ -7,8 +7,6 @@ from numbers import Real
 from reprlib import repr as abbreviate
 from typing import Any, ClassVar
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.primitives import SUB
 from islands.expressions.printing import plain
@@ -25,6 +23,8 @@ from islands.models.equations import (
 from islands.models.protocol import DynamicModel, ModelEquation, no_model_error
 from islands.models.regressor import Regressor, regressor
 from islands.models.signal_statement import describe_values, symbols
+from islands.records.channel_names import parse_channel_name
+from islands.records.preprocessing_steps import Preprocessing
 
 
 @dataclass(frozen=True, slots=True, repr=False)

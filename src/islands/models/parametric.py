@@ -1,7 +1,7 @@
 """Base of model classes whose parameters are estimated by the error of the free run.
 
 A subclass states its difference equations as text; simulation, estimation, files, exports, diagnosis and the
-service work with them. Add it to ``islands.io.models.MODEL_CLASSES``.
+service work with them. Add it to ``islands.persistence.models.MODEL_CLASSES``.
 """
 
 from abc import ABC, abstractmethod
@@ -10,9 +10,6 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, ClassVar, Self
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
-from islands.data.preprocessing_steps import Preprocessing
 from islands.errors import ModelError
 from islands.expressions.parsing import parse_signals
 from islands.expressions.printing import (
@@ -26,6 +23,9 @@ from islands.models.block import Block, BlockTerm
 from islands.models.equations import latex_statement, mathml_statement, signal_names
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import describe_signals, describe_values, symbols
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
+from islands.records.preprocessing_steps import Preprocessing
 
 #: Significant digits of the parameters in the text of an equation.
 _DIGITS = 6

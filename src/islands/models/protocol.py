@@ -1,15 +1,15 @@
 """Protocol of dynamic models: what simulation, refinement, bands, exports, files and diagnosis read.
 
-A class of models is one file in this package and an entry of `islands.io.models.MODEL_CLASSES`.
+A class of models is one file in this package and an entry of `islands.persistence.models.MODEL_CLASSES`.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
-from islands.data.signal_map import SignalReference
 from islands.errors import ModelError
 from islands.models.block import Block
+from islands.records.signal_map import SignalReference
 
 
 def no_model_error(value: object, otherwise: str = "") -> ModelError:

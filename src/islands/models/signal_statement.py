@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.signal_map import SampledReference, SignalReference
+from islands.records.channel_names import parse_channel_name
+from islands.records.signal_map import SampledReference, SignalReference
 
 
 def describe_signals(model: SignalReference, names: Sequence[str] = ()) -> str:

@@ -30,7 +30,7 @@ _PRELOADED = [
     "__main__",
     "islands.diagnosis.procedure",
     "islands.simulators.specification.factory",
-    "islands.figures.diagnosis",
+    "islands.report.figures.diagnosis",
 ]
 
 A = TypeVar("A")

@@ -6,7 +6,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels import gram as gram_kernel
 from islands.kernels import regressor_columns as column_kernel
@@ -14,6 +13,7 @@ from islands.kernels.interpreter import Program
 from islands.kernels.regressor_columns import LANES, TIMES, Rows
 from islands.kernels.simd import padded_size
 from islands.program.term_pool import Term, link
+from islands.records.dataset import Dataset
 
 
 def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray[np.float64]:

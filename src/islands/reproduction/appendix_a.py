@@ -17,16 +17,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from islands.data.dataset import Dataset
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.individual import Individual, require_genes
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import make_problem
-from islands.figures.monte_carlo import MonteCarloGroup, ScanLine, draw_groups, draw_scan
 from islands.models.equations import equation
 from islands.models.narx import Model
 from islands.progress import never_stop
+from islands.records.dataset import Dataset
+from islands.report.figures.monte_carlo import MonteCarloGroup, ScanLine, draw_groups, draw_scan
 from islands.reproduction.section import WHY, ComparisonTable, Section, SectionFigure
 from islands.reproduction.tasks import Document, ReproductionOptions, Task
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead

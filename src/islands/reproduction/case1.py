@@ -5,18 +5,18 @@ from functools import partial
 
 from matplotlib.figure import Figure
 
-from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS
 from islands.facade.identify import identify_record
 from islands.facade.setting_changes import SettingChanges
-from islands.figures.paper import (
+from islands.models.narx import Model, require_narx
+from islands.records.dataset import Dataset
+from islands.report.figures.paper import (
     Reproduced,
     draw_errors_by_switch,
     draw_shares,
     draw_training_data,
     draw_validation,
 )
-from islands.models.narx import Model, require_narx
 from islands.reproduction.ablation import (
     LITERAL,
     SWITCHES,

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from islands.data.dataset import Dataset, same_dt
 from islands.errors import RecordError
-from islands.figures.paper import Reproduced, draw_training_data, draw_validation
-from islands.io.records import fingerprint, preview, read_record
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.dataset import Dataset, same_dt
+from islands.records.reading import fingerprint, preview, read_record
+from islands.records.reading.options import ReadingOptions
+from islands.report.figures.paper import Reproduced, draw_training_data, draw_validation
 from islands.reproduction.published import (
     assess_published,
     explain_error,

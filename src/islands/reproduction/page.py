@@ -7,9 +7,9 @@ from html import escape
 from io import BytesIO
 from pathlib import Path
 
-from islands.figures.style import save
-from islands.figures.themes import THEMES
-from islands.io.checkpoints.writing import replace_file
+from islands.persistence.checkpoints.writing import replace_file
+from islands.report.figures.style import save
+from islands.report.figures.themes import THEMES
 from islands.reproduction.section import ComparisonTable, Section, SectionFigure
 
 #: Files of a reproduction in its folder.

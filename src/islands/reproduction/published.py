@@ -5,11 +5,11 @@ from math import floor, log10
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
+from islands.records.dataset import Dataset
 from islands.reproduction.searches import measure_errors, model_document
 from islands.reproduction.tasks import Document
 from islands.systems.published_models import Published

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.individual import Individual, require_genes
@@ -12,6 +11,7 @@ from islands.evolution.presets import resolve_settings, with_tuples
 from islands.expressions.parsing import parse
 from islands.models.equations import plain_text
 from islands.models.narx import Model, make_model
+from islands.records.dataset import Dataset
 from islands.reproduction.tasks import Document
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics

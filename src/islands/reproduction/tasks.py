@@ -15,8 +15,8 @@ from typing import Any
 import islands
 from islands.distribution import read_version
 from islands.errors import SettingsError
-from islands.io.checkpoints.writing import replace_file
 from islands.parallel import ParallelMap
+from islands.persistence.checkpoints.writing import replace_file
 from islands.progress import ProgressCallback, ignore_progress
 
 #: Result of a task as a JSON document.

@@ -5,8 +5,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL
@@ -18,6 +16,8 @@ from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
 from islands.program.term_pool import link
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset
 from islands.simulation.initial_states import estimate_initial_states
 from islands.simulation.layout import check_warm_up, find_intervals
 

@@ -16,11 +16,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord
-from islands.data.dataset import Dataset, join
-from islands.data.signal_map import match_rate
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
+from islands.records.coupled import AnyRecord
+from islands.records.dataset import Dataset, join
+from islands.records.signal_map import match_rate
 from islands.simulation.predictors import Simulation, free_run
 
 #: Samples of a segment from which its initial outputs are estimated: at least this number, and this part.

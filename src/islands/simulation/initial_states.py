@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.signal_map import map_coupled_signals, map_signals
 from islands.kernels.state_estimation import find_nearest, minimise_error
 from islands.kernels.state_space import simulate_state_space
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.signal_map import map_coupled_signals, map_signals
 
 #: Weight of the measurement of the initial states, relative to the variance of the output of the states.
 _RIDGE = 1e-3

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.models.narx import require_narx
 from islands.models.operating_point import find_equilibrium
 from islands.models.protocol import DynamicModel
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import BOUND, free_run
 

@@ -5,11 +5,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.simd import padded_size
 from islands.kernels.simulate import WIDTHS, Layout
+from islands.records.coupled import AnyRecord
+from islands.records.dataset import Dataset
 
 #: Fixed cost of an instruction, in units of its cost per lane.
 _OVERHEAD_LANES = 24

@@ -7,9 +7,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord, CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.signal_map import map_coupled_signals, map_signals
 from islands.errors import RecordError, SettingsError, check_integers
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.kernels.summation import dot, total
@@ -18,6 +15,9 @@ from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.program.term_pool import link
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.signal_map import map_coupled_signals, map_signals
 from islands.simulation.blocks import make_simulator
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status

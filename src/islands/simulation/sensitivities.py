@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.expressions.output_derivatives import OutputDerivative, differentiate_by_outputs
 from islands.expressions.primitives import MUL
 from islands.expressions.tree import Apply, Constant, Expression
 from islands.kernels.sensitivities import WIDTHS, Slopes, SparseDirections, compute_sensitivities
 from islands.models.regressor import Regressor
 from islands.program.term_pool import link
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 
 #: A derivative whose sum of squares is larger is set to zero: products of such derivatives overflow.

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
-from islands.data.signal_map import map_signals
 from islands.models.latent import LatentModel
+from islands.records.dataset import Dataset
+from islands.records.signal_map import map_signals
 from islands.simulation.blocks import make_simulator
 
 

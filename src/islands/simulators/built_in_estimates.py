@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from islands.data.dataset import Dataset
-from islands.data.segments import is_resting
 from islands.errors import RecordError
+from islands.records.dataset import Dataset
+from islands.records.segments import is_resting
 from islands.simulators.ode.lane_simulation import simulate_lanes
 from islands.simulators.ode.lane_values import LaneInput
 from islands.simulators.ode.preparation import make_ode_simulator

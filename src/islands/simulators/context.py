@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import fill_gaps, is_resting
 from islands.effects.interface.context import SimulationContext
 from islands.errors import RecordError
+from islands.records.dataset import Dataset
+from islands.records.segments import fill_gaps, is_resting
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -7,10 +7,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.masked_values import fill_masked
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, ForceLaw, Site, apply_map
+from islands.records.masked_values import fill_masked
 from islands.simulators.interface import (
     Forces,
     SimulationRun,

@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import delay_samples
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Site
 from islands.effects.interface.force import sum_output_forces
 from islands.errors import RecordError
 from islands.kernels.linear_filter import filter_linearly
+from islands.records.dataset import Dataset
+from islands.records.segments import delay_samples
 from islands.simulators.interface import Forces, SimulationRun, Simulator
 
 #: Iterations of the method of Steiglitz and McBride.

@@ -15,11 +15,11 @@ from typing import TypeAlias
 import numpy as np
 import scipy
 
-from islands.data.channel_names import simplify_unit
-from islands.data.segments import delay_samples
 from islands.effects.interface.context import Signal
 from islands.expressions.parsing import parse_expression
 from islands.expressions.tree import DELAY, Apply, Constant, Expression, Symbol, substitute
+from islands.records.channel_names import simplify_unit
+from islands.records.segments import delay_samples
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.ode.system import OdeSystem
 from islands.simulators.ode.system_parts import OdeEffect, OdeForce, OdeParameter, OdeState

@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from islands.data.masked_values import fill_masked
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Site
 from islands.effects.interface.force import add_output_forces
 from islands.errors import RecordError, SettingsError, suggest
+from islands.records.masked_values import fill_masked
 from islands.simulators.interface import Forces, Simulator
 
 #: Typical change of a parameter, relative to its value.

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.signal_ranges import RangeLike
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect
+from islands.records.signal_ranges import RangeLike
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Forces, SimulatorWrapper
 

@@ -23,8 +23,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, lookup
+from islands.records.dataset import Dataset
 
 #: Length of a training or validation record in samples.
 SAMPLES = 500

@@ -12,9 +12,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.kernels.jit_cache import kernel
+from islands.records.dataset import Dataset
 from islands.systems.signals import Seed, filtered_noise, sine
 
 #: Sampling time and integration step in seconds, section 6.1.

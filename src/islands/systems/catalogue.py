@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError, lookup
+from islands.records.dataset import Dataset
 from islands.systems import appendix, bouc_wen, signals
 from islands.systems.bouc_wen import AUTHORS_SEED, DT
 

@@ -7,8 +7,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_unit
-from islands.data.dataset import Dataset
+from islands.records.channel_names import parse_unit
+from islands.records.dataset import Dataset
 
 #: Digits behind the decimal point, as a logger would write them.
 _DECIMALS = 4

@@ -9,8 +9,6 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
-from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.constraints.checks import ConstraintCheck, check_constraints
 from islands.estimation.constraints.state_space import linearise_constraints
@@ -19,6 +17,8 @@ from islands.estimation.parameter_constraints import count_free_parameters
 from islands.models.latent import LatentModel
 from islands.models.protocol import DynamicModel
 from islands.progress import Failure, attempt
+from islands.records.dataset import Dataset
+from islands.records.split import Split
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead

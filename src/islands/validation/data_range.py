@@ -17,7 +17,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 #: Excess in ranges above which a band has the same width: it is of no use, but finite.
 _LARGEST_EXCESS = 1e6

@@ -24,14 +24,14 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord, CoupledSplit
-from islands.data.dataset import Dataset
-from islands.data.signal_map import match_rate
-from islands.data.split import Split
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimator_table import Criterion
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
+from islands.records.coupled import AnyRecord, CoupledSplit
+from islands.records.dataset import Dataset
+from islands.records.signal_map import match_rate
+from islands.records.split import Split
 from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run, free_runs
 from islands.validation.equal_laws import ROUNDING, find_laws

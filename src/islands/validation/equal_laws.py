@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import AnyRecord
-from islands.data.dataset import Dataset
 from islands.estimation.damped_least_squares import inner_products
 from islands.estimation.shooting_residual import make_residual
 from islands.models.coupled_narx import AnyModel
+from islands.records.coupled import AnyRecord
+from islands.records.dataset import Dataset
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 
 #: Two free runs are equal if the mean square of their difference is at most this fraction of that of the

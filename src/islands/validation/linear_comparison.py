@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from islands.data.split import Split
 from islands.estimation.output_error import fit_output_error
 from islands.expressions.tree import Constant, Lagged
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
 from islands.validation.recommendation import measure_size, recommend
 

@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.compatibility import match_record
-from islands.data.dataset import Dataset, join
 from islands.estimation.parameter_constraints import PROPERTY_1
 from islands.expressions import printing
 from islands.kernels.characteristic_roots import converges
 from islands.models.clusters import OUTPUT_AT_REST, clusters
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.records.compatibility import match_record
+from islands.records.dataset import Dataset, join
 from islands.simulation.predictors import find_divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
 

@@ -20,14 +20,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.compatibility import match_record
-from islands.data.coupled_record import AnyRecord, CoupledSplit
-from islands.data.dataset import Dataset
-from islands.data.signal_map import match_rate
-from islands.data.split import Split
 from islands.errors import SettingsError, check_numbers
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
+from islands.records.compatibility import match_record
+from islands.records.coupled import AnyRecord, CoupledSplit
+from islands.records.dataset import Dataset
+from islands.records.signal_map import match_rate
+from islands.records.split import Split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
 from islands.validation.data_range import DataRange, measure_range

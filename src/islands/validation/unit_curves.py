@@ -12,9 +12,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.models.latent import LatentModel
 from islands.models.unit_functions import evaluate_curve
+from islands.records.dataset import Dataset
 from islands.simulation.unit_arguments import UnitRun, simulate_units
 from islands.validation.ensemble import Ensemble
 

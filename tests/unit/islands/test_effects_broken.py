@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.errors import SettingsError
+from islands.records.dataset import Dataset
 from support.built_in_simulators import make_piezo
 from support.simulated_records import recorded, wave
 

@@ -10,15 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.diagnosis.monitoring.alarm_rate import parse_alarm_rate
 from islands.errors import IslandsError, command_line_names, name_option, suggest
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import resolve_settings
 from islands.export import export
 from islands.expressions.parsing import parse
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.dataset import Dataset
+from islands.records.preprocessing_steps import PreprocessingSteps
+from islands.records.reading.options import ReadingOptions
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec, parse_spec
 from islands.systems.catalogue import make_record

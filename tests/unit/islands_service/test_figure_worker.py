@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures import registry
+from islands.report.figures import registry
 from islands_service import figure_worker
 
 

@@ -12,10 +12,10 @@ from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.record_options import with_reading_options
 from islands.cli.search_options import DEFAULTS, ModelClass, SearchOptions, Seed, with_search_options
-from islands.data.coupled_record import join_columns
 from islands.errors import SettingsError
-from islands.io.models import NARX
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.persistence.models import NARX
+from islands.records.coupled import join_columns
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import parse_spec
 from islands_api.cli.service import job_views as views

@@ -11,7 +11,7 @@ from islands.cli.console import errors, output
 from islands.cli.record_options import with_reading_options
 from islands.cli.watched_folder import find_time, hash_file, order_of_recording
 from islands.errors import SettingsError
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.cli.service.job_views import print_json
 from islands_api.client import Client

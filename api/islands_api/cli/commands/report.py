@@ -8,7 +8,7 @@ import typer
 
 from islands.cli.console import output
 from islands.errors import SettingsError
-from islands.reports.origin import REPORT_FILE
+from islands.report.pages.origin import REPORT_FILE
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Url, open_client
 
 #: Id of a job, and of a job with the rank of a model.
@@ -50,7 +50,7 @@ def report(
         path = out or Path("comparison.html")
     elif folder.exists():
         # The models take a second to import.
-        from islands.reports.saved_result import report_saved_result  # noqa: PLC0415
+        from islands.report.pages.saved_result import report_saved_result  # noqa: PLC0415
 
         page = report_saved_result(folder)
         path = out or (folder if folder.is_dir() else folder.parent) / REPORT_FILE

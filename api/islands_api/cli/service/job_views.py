@@ -14,11 +14,11 @@ from rich.table import Table
 
 from islands.cli.console import output
 from islands.cli.progress_display import format_duration, progress
-from islands.io.models import any_model_from_json
-from islands.io.result_text.text_layout import LEGEND, MARK, term_table, wrap
 from islands.models.coupled_narx import CoupledModel
 from islands.models.protocol import DynamicModel
-from islands.reports.origin import REPORT_FILE
+from islands.persistence.models import any_model_from_json
+from islands.report.pages.origin import REPORT_FILE
+from islands.report.text.layout import LEGEND, MARK, term_table, wrap
 from islands.simulators.specification.table import EXTENDED_FILE
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView

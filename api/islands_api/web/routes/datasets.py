@@ -11,7 +11,7 @@ from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from islands.document_problems import find_problem
 from islands.errors import SettingsError
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest, ReadingRequest, Samples
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dataset_samples import describe_rows, get_columns

@@ -12,10 +12,10 @@ import structlog
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import IslandsError, suggest
-from islands.figures.availability import list_model_figures
-from islands.figures.names import LEAST_ISLANDS, MODEL_FIGURES, SEARCH_FIGURES
-from islands.io.models import model_from_json
 from islands.models.latent import LatentModel
+from islands.persistence.models import model_from_json
+from islands.report.figures.availability import list_model_figures
+from islands.report.figures.names import LEAST_ISLANDS, MODEL_FIGURES, SEARCH_FIGURES
 from islands_api.result_schemas import FreeRun
 from islands_api.schemas import Names
 from islands_api.web.auth import Principal, Reader

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 
-from islands.data.averaging import average_samples
-from islands.data.dataset import Dataset
+from islands.records.averaging import average_samples
+from islands.records.dataset import Dataset
 from islands_api.model_simulation_schemas import MAX_SAMPLES, SimulatedOutput, SimulationRequest
 from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep

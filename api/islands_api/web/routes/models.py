@@ -5,7 +5,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.export import EXPORTS, Exported, export
-from islands.io.models import any_model_from_json
+from islands.persistence.models import any_model_from_json
 from islands_api.result_schemas import (
     CoupledIdentificationResult,
     DiscrepancyResult,

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath, PureWindowsPath
 from typing import IO
 
 from islands.errors import ModelError, RecordError
-from islands.io.records import READERS
+from islands.records.reading import READERS
 from islands_api.web.problems import PayloadTooLargeError
 from islands_service.domain.uploaded_fmu import FMU_SUFFIX
 

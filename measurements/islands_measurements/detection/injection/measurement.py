@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands_measurements.detection.injection.excitation import Excitation, Signal
 from islands_measurements.detection.injection.faults import Fault, Inject, alter_parameter
 from islands_measurements.detection.injection.noise import FED_BACK, NOISES

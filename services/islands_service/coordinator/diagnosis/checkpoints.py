@@ -11,7 +11,7 @@ from islands.diagnosis.calibration.fit_journal import FitJournal, journal_from_d
 from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError
 from islands.evolution.search_state import SearchState
-from islands.io.checkpoints import (
+from islands.persistence.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
     compress_text,

@@ -10,11 +10,11 @@ from islands.diagnosis.procedure import diagnose
 from islands.export.closed_form import find_closed_form
 from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA, explain_residual
 from islands.facade.results.complete_diagnosis import DiagnosisResult
-from islands.io.result_text.diagnosis_statements import describe_headline
 from islands.models.narx import Model
 from islands.parallel import ParallelMap
 from islands.progress import Steps, report_part
-from islands.reports.origin import Origin
+from islands.report.pages.origin import Origin
+from islands.report.text.diagnosis_statements import describe_headline
 from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.diagnosis.checkpoints import DiagnosisCheckpoints

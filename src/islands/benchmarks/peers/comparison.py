@@ -14,10 +14,10 @@ from islands.benchmarks.peers.catalogue import Peer
 from islands.benchmarks.peers.child import PeerRecording
 from islands.benchmarks.peers.environments import read_last_line
 from islands.benchmarks.scoring import measure_simulation, separate_reason
-from islands.data.coupled_record import AnyRecord, CoupledRecord
 from islands.errors import IslandsError
 from islands.processes.limited_command import run_command
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
+from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.simulation.predictors import divergence_bound_of_range
 
 #: Wall seconds for each CPU second of the limit, on a machine with other load.

@@ -17,13 +17,13 @@ from islands.cli.output_folder import RESULT_FILES, check_folder, keep_models, p
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import stop_requests
-from islands.data.dataset import Dataset
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.facade.identify import identify_record
-from islands.figures.names import ALL_FIGURES
-from islands.io.records import write_record
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.records.writer import write_record
+from islands.report.figures.names import ALL_FIGURES
 from islands.reproduction.published import estimate_again
 from islands.reproduction.searches import read_document, search_island
 from islands.simulation.predictors import free_run

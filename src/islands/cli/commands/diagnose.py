@@ -26,8 +26,6 @@ from islands.cli.runs.plan import (
     write_plan,
 )
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
-from islands.data.dataset import Dataset
-from islands.data.split import hold_out
 from islands.diagnosis.calibration.fit_journal import FitJournal
 from islands.diagnosis.detectability import SelfTest, self_test
 from islands.diagnosis.findings import ResidualFormula
@@ -47,11 +45,13 @@ from islands.facade.explain_residual import (
     explain_residual,
 )
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, DiagnosisResult
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.result_text.text_layout import wrap
 from islands.processes.pool import process_pool
 from islands.progress import Steps, report_part
-from islands.reports.origin import REPORT_FILE
+from islands.records.dataset import Dataset
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.split import hold_out
+from islands.report.pages.origin import REPORT_FILE
+from islands.report.text.layout import wrap
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator

@@ -7,7 +7,7 @@ import typer
 
 from islands.cli.console import output
 from islands.errors import SettingsError
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.example_records import EXAMPLE_RECORDS
 
 examples = typer.Typer(

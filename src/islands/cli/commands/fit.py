@@ -17,20 +17,20 @@ from islands.cli.recordings import Recordings, measured_names, state_extrapolati
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
 from islands.cli.search_options import ModelClass
 from islands.cli.stop_requests import REPEAT, stop_requests
-from islands.data.averaging import AUTO
-from islands.data.coupled_record import join_columns, split_coupled
-from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS, REFITS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.facade.identification_progress import class_phases, fit_phases
-from islands.figures.names import FREE_RUN, parse_figures
-from islands.io.models import NARX
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
 from islands.models.candidate_library import LIBRARIES
 from islands.models.latent import ZERO_BLOCKS
+from islands.persistence.models import NARX
 from islands.progress import PhasedProgress, Steps
+from islands.records.averaging import AUTO
+from islands.records.coupled import join_columns, split_coupled
+from islands.records.preprocessing_steps import NO_STEPS, PreprocessingSteps
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.report.figures.names import FREE_RUN, parse_figures
 
 #: Default library for several outputs.
 SEVERAL_OUTPUTS = "polynomial"

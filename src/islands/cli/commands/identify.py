@@ -13,12 +13,12 @@ from islands.cli.preprocessing_options import with_preprocessing_options
 from islands.cli.record_options import with_reading_options
 from islands.cli.runs.identify import RunOptions, load_run, run
 from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_options
-from islands.data.coupled_record import join_columns
-from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.errors import SettingsError, lookup
-from islands.figures.names import FREE_RUN, parse_figures
-from islands.io.records import fingerprint
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.records.coupled import join_columns
+from islands.records.preprocessing_steps import NO_STEPS, PreprocessingSteps
+from islands.records.reading import fingerprint
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.report.figures.names import FREE_RUN, parse_figures
 
 #: Options of the run rather than of the search: allowed with ``--resume``.
 RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose", "figures")

@@ -10,9 +10,9 @@ from islands.cli import options
 from islands.cli.console import errors
 from islands.cli.record_options import with_reading_options
 from islands.facade.inspect_record import inspect_record
-from islands.io.inspection_text import format_inspection
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import parse_rows
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.row_range import parse_rows
+from islands.report.text.inspection import format_inspection
 
 
 @with_reading_options
@@ -46,9 +46,9 @@ def inspect(
         _write(out, document, text)
         if found.record is not None:
             # Imported here, because it loads matplotlib.
-            from islands.figures.overview import draw_overview  # noqa: PLC0415
-            from islands.figures.style import save  # noqa: PLC0415
-            from islands.figures.themes import THEMES  # noqa: PLC0415
+            from islands.report.figures.overview import draw_overview  # noqa: PLC0415
+            from islands.report.figures.style import save  # noqa: PLC0415
+            from islands.report.figures.themes import THEMES  # noqa: PLC0415
 
             for theme in THEMES:
                 suffix = "" if theme == "light" else f"-{theme}"

@@ -16,15 +16,6 @@ from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings
 from islands.cli.watched_folder import WatchedFolder, find_time, hash_file
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.monitor_json import monitor_json
-from islands.diagnosis.documents.monitor_state import (
-    RejectedRecord,
-    SavedMonitor,
-    read_monitor,
-    write_monitor,
-)
-from islands.diagnosis.documents.monitor_text import describe_alarm_text, describe_last_record
 from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE
 from islands.diagnosis.monitoring.record_follower import TRAINING
 from islands.errors import IslandsError, SettingsError
@@ -34,9 +25,18 @@ from islands.facade.record_monitor import (
     parse_monitored,
     reject_record,
 )
-from islands.figures.monitored_states import draw_monitored_states
-from islands.figures.style import save
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
+from islands.records.dataset import Dataset
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.report.documents.monitor_json import monitor_json
+from islands.report.documents.monitor_state import (
+    RejectedRecord,
+    SavedMonitor,
+    read_monitor,
+    write_monitor,
+)
+from islands.report.figures.monitored_states import draw_monitored_states
+from islands.report.figures.style import save
+from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LocalSpec, innermost
 

@@ -10,14 +10,14 @@ from islands.cli import options
 from islands.cli.record_options import with_reading_options
 from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
-from islands.figures.names import MODEL_FIGURES
-from islands.io.records import read_dataset
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import parse_rows
-from islands.io.result_text.text_layout import term_table, wrap
-from islands.io.saved_documents import open_document, read_saved_model
 from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
+from islands.persistence.saved_documents import open_document, read_saved_model
+from islands.records.reading import read_dataset
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.row_range import parse_rows
+from islands.report.figures.names import MODEL_FIGURES
+from islands.report.text.layout import term_table, wrap
 
 
 @with_reading_options
@@ -99,6 +99,6 @@ def _draw(
         raise SettingsError(f"--figure is for a model of one output, and {name} is none")
     stated = model.model
     data = read_dataset(record, stated.column_names, stated.output_name, dt, rows, options=reading)
-    from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+    from islands.report.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
 
     save(model.plot(figure, data), out)

@@ -15,12 +15,6 @@ from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.record_options import with_reading_options
-from islands.data.coupled_record import AnyRecord, CoupledRecord, match_coupled
-from islands.data.dataset import Dataset, same_dt
-from islands.data.preprocessing import preprocess
-from islands.data.preprocessing_steps import DETREND
-from islands.data.signal_map import map_signals, match_rate
-from islands.data.split import compare_input_ranges, measure_input_ranges
 from islands.errors import ExtrapolationWarning, RecordError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
@@ -28,17 +22,23 @@ from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.records import read_columns, read_dataset, write_simulation
-from islands.io.records.column_names import find_column
-from islands.io.records.reader import open_record
-from islands.io.records.reading_options import DEFAULT_READING, ReadingOptions
-from islands.io.records.row_range import parse_rows
-from islands.io.records.table_reading import read_table
-from islands.io.records.writer import write_coupled_simulation
 from islands.models.coupled_narx import AnyModel, coupled_signals
 from islands.models.equations import named_signals
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_values
+from islands.records.coupled import AnyRecord, CoupledRecord, match_coupled
+from islands.records.dataset import Dataset, same_dt
+from islands.records.preprocessing import preprocess
+from islands.records.preprocessing_steps import DETREND
+from islands.records.reading import read_columns, read_dataset
+from islands.records.reading.column_names import find_column
+from islands.records.reading.open_table import read_table
+from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.reader import open_record
+from islands.records.reading.row_range import parse_rows
+from islands.records.signal_map import map_signals, match_rate
+from islands.records.split import compare_input_ranges, measure_input_ranges
+from islands.records.writer import write_coupled_simulation, write_simulation
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.simulation.initial_states import find_first_states
 from islands.validation.metrics import metrics

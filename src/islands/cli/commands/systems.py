@@ -7,7 +7,7 @@ import typer
 from rich.table import Table
 
 from islands.cli.console import output
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands.systems.catalogue import SYSTEMS, make_record
 
 systems = typer.Typer(

@@ -8,12 +8,12 @@ from typing import Any
 import islands
 from islands.cli.recordings import advance_as_named
 from islands.cli.stop_requests import REPEAT, StopRequests
-from islands.data.averaging import AUTO
-from islands.data.coupled_record import CoupledRecord, couple
-from islands.data.dataset import Dataset
-from islands.data.preprocessing import preprocess
-from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.progress import Steps
+from islands.records.averaging import AUTO
+from islands.records.coupled import CoupledRecord, couple
+from islands.records.dataset import Dataset
+from islands.records.preprocessing import preprocess
+from islands.records.preprocessing_steps import PreprocessingSteps
 
 
 def couple_data(

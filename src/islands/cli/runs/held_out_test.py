@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 import islands
 from islands.cli.console import output
-from islands.data.coupled_record import CoupledRecord
-from islands.data.signal_map import match_rate
+from islands.records.coupled import CoupledRecord
+from islands.records.signal_map import match_rate
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.metrics import metrics
 

@@ -20,10 +20,6 @@ from islands.cli.runs.held_out_test import TEST, evaluate_test
 from islands.cli.runs.timed_engine import TimedEngine
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
-from islands.data.compatibility import match_record
-from islands.data.coupled_record import CoupledRecord, split_coupled
-from islands.data.preprocessing_steps import PreprocessingSteps
-from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import (
     AUTO,
@@ -37,16 +33,20 @@ from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, cho
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.coupled.identification import identify_coupled_data
 from islands.facade.identify import identify_record
-from islands.io.checkpoints import (
+from islands.persistence.checkpoints import (
     read_checkpoint,
     state_document,
     state_from_document,
     write_checkpoint,
     write_hall,
 )
-from islands.io.records import fingerprint
-from islands.io.records.reading_options import ReadingOptions
 from islands.progress import ProgressCallback, Steps
+from islands.records.compatibility import match_record
+from islands.records.coupled import CoupledRecord, split_coupled
+from islands.records.preprocessing_steps import PreprocessingSteps
+from islands.records.reading import fingerprint
+from islands.records.reading.options import ReadingOptions
+from islands.records.split import share_samples, split_data
 
 #: File of the search state.
 CHECKPOINT = "checkpoint.json"

@@ -10,18 +10,18 @@ import typer
 
 from islands.cli.console import output
 from islands.cli.option_groups import group_options, make_option
-from islands.data.channel_names import parse_unit
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.plan_json import plan_document
-from islands.diagnosis.documents.plan_text import plan_text
-from islands.diagnosis.documents.result_json import as_json
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.planned_input import InputForm, InputLimits, PlannedInput
 from islands.errors import SettingsError, lookup
-from islands.io.records import read_dataset
-from islands.io.records.reading_options import ReadingOptions
-from islands.io.records.row_range import parse_rows
-from islands.io.records.writer import write_input
+from islands.records.channel_names import parse_unit
+from islands.records.dataset import Dataset
+from islands.records.reading import read_dataset
+from islands.records.reading.options import ReadingOptions
+from islands.records.reading.row_range import parse_rows
+from islands.records.writer import write_input
+from islands.report.documents.diagnosis_json import as_json
+from islands.report.documents.plan_json import plan_document
+from islands.report.text.plan import plan_text
 
 #: Files of a plan.
 PLAN, MATRIX, EXPERIMENT = "plan.json", "plan.svg", "experiment.csv"
@@ -179,8 +179,8 @@ def write_plan(plan: ExperimentPlan, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name in (PLAN, EXPERIMENT):
         (folder / name).unlink(missing_ok=True)
-    from islands.figures.separability import draw_separability  # noqa: PLC0415 - matplotlib
-    from islands.figures.style import save  # noqa: PLC0415
+    from islands.report.figures.separability import draw_separability  # noqa: PLC0415 - matplotlib
+    from islands.report.figures.style import save  # noqa: PLC0415
 
     save(draw_separability(plan.isolability), folder / MATRIX)
     if plan.decisive is not None:

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.segments import find_bounds
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
 from islands.diagnosis.calibration.target import Target
+from islands.records.segments import find_bounds
 
 
 def fit_initial_states(

@@ -14,7 +14,7 @@ from islands.diagnosis.calibration.problem import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.effect import Signal
-from islands.estimation.noise_model import (
+from islands.records.noise_model import (
     NoiseModel,
     fit_noise,
     fit_whitening,

@@ -4,16 +4,16 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.magnitudes import check_magnitudes
-from islands.data.segments import is_resting, split_at_gaps
-from islands.data.split import MIN_RECORDING_SAMPLES, estimation_part
 from islands.diagnosis.calibration.resolution import measure_resolution
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, SimulationContext, Site
 from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError, SettingsError, check_type, suggest
+from islands.records.dataset import Dataset
+from islands.records.magnitudes import check_magnitudes
+from islands.records.segments import is_resting, split_at_gaps
+from islands.records.split import MIN_RECORDING_SAMPLES, estimation_part
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 

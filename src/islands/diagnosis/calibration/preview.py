@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target, validate_prior
+from islands.records.dataset import Dataset
+from islands.records.segments import fill_gaps
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

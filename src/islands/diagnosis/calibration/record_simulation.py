@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.compatibility import ColumnReference, match_record
-from islands.data.dataset import Dataset
-from islands.data.signal_ranges import compare_ranges, measure_ranges
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import make_target
 from islands.errors import ExtrapolationWarning
+from islands.records.compatibility import ColumnReference, match_record
+from islands.records.dataset import Dataset
+from islands.records.signal_ranges import compare_ranges, measure_ranges
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.segments import delay_samples, find_bounds, map_segments
 from islands.diagnosis.calibration.resolution import is_unresolved
 from islands.effects.interface.effect import Signal, SimulationContext
-from islands.estimation.noise_model import NoiseModel
+from islands.records.noise_model import NoiseModel
+from islands.records.segments import delay_samples, find_bounds, map_segments
 
 
 @dataclass(frozen=True, slots=True, eq=False)

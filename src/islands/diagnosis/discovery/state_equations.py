@@ -5,14 +5,14 @@ from math import ceil
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.intersample_selection import select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate, evaluate_fit
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.context import Signal, SimulationContext
 from islands.errors import RecordError
 from islands.expressions.tree import Symbol
+from islands.records.dataset import Dataset
+from islands.records.segments import fill_gaps
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

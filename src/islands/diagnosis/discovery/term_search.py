@@ -12,7 +12,6 @@ from operator import attrgetter
 
 import numpy as np
 
-from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.intersample_selection import get_discretisation, select_intersample
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -60,6 +59,7 @@ from islands.expressions.primitives import DIV, EQUATION_FUNCTIONS
 from islands.expressions.printing import render
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.expressions.tree import replace as replace_parts
+from islands.records.segments import fill_gaps
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.ode.output_system import SYMBOL_MEANINGS

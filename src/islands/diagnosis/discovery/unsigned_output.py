@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.state_equations import (
@@ -25,6 +24,7 @@ from islands.effects.interface.effect import Signal
 from islands.effects.nonlinearity import UNSIGNED_SENSOR
 from islands.errors import RecordError
 from islands.kernels.linear_filter import filter_linearly
+from islands.records.dataset import Dataset
 from islands.simulators.linear import LinearSimulator, estimate_linear
 
 #: Number of time constants and natural frequencies of the filters, and damping ratios of the resonances.

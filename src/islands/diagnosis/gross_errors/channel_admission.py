@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.channel_names import TEMPERATURES
-from islands.data.dataset import Dataset
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
 from islands.effects.interface.effect import Signal
+from islands.records.channel_names import TEMPERATURES
+from islands.records.dataset import Dataset
 
 #: Largest RMS difference between a channel and a scaled copy of another signal, relative to the standard
 #: deviation of the channel, for which it counts as a copy. Two sensors of one signal differ by their noise.

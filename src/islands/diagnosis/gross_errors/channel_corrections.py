@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.gross_errors.correction import Correction
+from islands.records.dataset import Dataset
 
 
 def correct_swapped_channels(record: Dataset, read: Set[str]) -> Iterator[Correction]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.effects.interface.effect import Signal
+from islands.records.dataset import Dataset
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import find_runs
-from islands.data.signal_ranges import compare_ranges, measure_ranges
+from islands.records.dataset import Dataset
+from islands.records.segments import find_runs
+from islands.records.signal_ranges import compare_ranges, measure_ranges
 from islands.simulators.interface import Simulator
 from islands.simulators.saved_extension import SavedExtension
 

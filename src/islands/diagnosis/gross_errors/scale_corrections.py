@@ -4,8 +4,8 @@ from collections.abc import Iterator, Set
 from dataclasses import replace
 from math import pi
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.gross_errors.correction import Correction
+from islands.records.dataset import Dataset
 
 #: Factors between units that are confused, each with an example; their inverses are tried as well.
 UNIT_FACTORS = (

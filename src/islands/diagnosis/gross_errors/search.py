@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.channel_corrections import correct_swapped_channels
@@ -25,7 +24,8 @@ from islands.diagnosis.gross_errors.scale_corrections import (
 from islands.diagnosis.gross_errors.time_offset import correct_time_offset
 from islands.effects.interface.effect import Signal
 from islands.errors import RecordError
-from islands.estimation.noise_model import estimate_effective_samples
+from islands.records.dataset import Dataset
+from islands.records.noise_model import estimate_effective_samples
 from islands.simulators.interface import Simulator
 
 #: Makes the corrections of a record; receives the record, the names of the channels that the simulation

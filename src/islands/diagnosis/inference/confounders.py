@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from islands.data.segments import map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.effects.interface.effect import Effect, Signal
+from islands.records.segments import map_segments
 
 #: Factors on the strength of the confounder in its simulations; each moves the slips to other instants.
 STRENGTH_FACTORS = tuple(np.linspace(0.9, 1.1, 9).tolist())

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.initial_states import fit_initial_states
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -20,6 +19,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.extension_trial import find_added_parameters
 from islands.diagnosis.inference.holdout import HoldoutGain, measure_gain
 from islands.diagnosis.inference.verdict import choose_reference_fit
+from islands.records.dataset import Dataset
 
 #: Difference of two values in standard deviations above which they contradict each other.
 MAX_DISTANCE = 4.0

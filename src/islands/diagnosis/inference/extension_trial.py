@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
-from islands.data.signal_ranges import SignalRange, measure_ranges
 from islands.diagnosis.calibration.intersample_selection import halve_step
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -20,6 +18,8 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.effect import Signal, SimulationContext
+from islands.records.dataset import Dataset
+from islands.records.signal_ranges import SignalRange, measure_ranges
 
 #: Largest factor of the recorded input with which an extended simulation is tried.
 INPUT_FACTOR = 1.2

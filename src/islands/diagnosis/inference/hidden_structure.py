@@ -15,7 +15,6 @@ from functools import partial
 
 import numpy as np
 
-from islands.data.segments import delay_samples, find_runs, map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
@@ -28,8 +27,9 @@ from islands.diagnosis.inference.noise_surrogates import (
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.residual_structure import MIN_DISTANCE, SHIFTS
 from islands.effects.interface.effect import Signal
-from islands.estimation.noise_model import fit_noise
 from islands.kernels.linear_filter import filter_linearly
+from islands.records.noise_model import fit_noise
+from islands.records.segments import delay_samples, find_runs, map_segments
 
 #: Number of cells of the map of the input. A sawtooth over the input needs three cells for each tooth.
 CELLS = 120

@@ -5,12 +5,12 @@ from math import frexp
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.segments import find_bounds
 from islands.diagnosis.calibration.initial_states import fit_initial_states
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
 from islands.effects.interface.effect import Signal
+from islands.records.dataset import Dataset
+from islands.records.segments import find_bounds
 
 #: Number of blocks into which the estimation part and the hold-out part are each divided. Blocks are the
 #: units of the bootstrap and the cross-validation. They sum squared errors, so that one may contain the

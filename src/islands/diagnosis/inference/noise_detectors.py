@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.data.channel_names import simplify_unit
-from islands.data.segments import find_bounds
 from islands.diagnosis.calibration.variance_model import MAD, fit_variance_model
 from islands.effects.interface.effect import Signal, SimulationContext
-from islands.estimation.noise_model import fit_noise
+from islands.records.channel_names import simplify_unit
+from islands.records.noise_model import fit_noise
+from islands.records.segments import find_bounds
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import scipy
 
-from islands.data.segments import count_runs, delay_samples, find_bounds, take_backward_differences
 from islands.diagnosis.inference.noise_surrogates import (
     Randomisation,
     draw_surrogates,
@@ -13,9 +12,10 @@ from islands.diagnosis.inference.noise_surrogates import (
 )
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.effects.interface.effect import Signal
-from islands.estimation.noise_model import fit_noise
 from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import play_from
+from islands.records.noise_model import fit_noise
+from islands.records.segments import count_runs, delay_samples, find_bounds, take_backward_differences
 
 #: Lags of the features, in samples.
 LAGS = (1, 2, 4, 8, 16, 32)

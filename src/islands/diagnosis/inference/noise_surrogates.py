@@ -5,9 +5,9 @@ from enum import Enum, auto
 
 import numpy as np
 
-from islands.data.segments import find_bounds
 from islands.effects.interface.effect import Signal
-from islands.estimation.noise_model import NoiseModel, fit_integrated_noise, fit_noise
+from islands.records.noise_model import NoiseModel, fit_integrated_noise, fit_noise
+from islands.records.segments import find_bounds
 
 #: Loss of minus twice the log-likelihood, per sample, up to which a residual is taken for a random walk.
 #: Calibration absorbs most of the slowest part of such noise, so that other models fit the rest better. Their

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from islands.data.segments import map_segments
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.gross_errors.closed_loop import PULSE
 from islands.effects.interface.effect import Signal
+from islands.records.segments import map_segments
 
 
 def respond_to_pulse(fit: CalibrationResult) -> Signal | None:

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.segments import count_runs, map_segments, take_backward_differences
 from islands.effects.interface.effect import Signal, SimulationContext
-from islands.estimation.noise_model import fit_noise
+from islands.records.noise_model import fit_noise
+from islands.records.segments import count_runs, map_segments, take_backward_differences
 
 #: Number of random circular shifts that give the null distribution of a map.
 SHIFTS = 200

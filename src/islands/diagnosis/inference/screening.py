@@ -6,7 +6,6 @@ from operator import itemgetter
 
 import numpy as np
 
-from islands.data.segments import fill_gaps
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.starts_calibrator import CalibrationTask, calibrate_best
@@ -15,6 +14,7 @@ from islands.diagnosis.gross_errors.closed_loop import acts_at_once
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import ACTUATOR_MAPS, SENSOR_MAPS
 from islands.effects.interface.effect import Effect, Signal, Site, invalid_effect_error
+from islands.records.segments import fill_gaps
 from islands.simulators.extended import ExtendedSimulator
 
 #: Maximum number of starting points per effect that are calibrated.

@@ -44,8 +44,8 @@ from islands.diagnosis.inference.verdict import (
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.effect import Effect
 from islands.effects.model_form import CORE_SHAPE
-from islands.estimation.noise_model import estimate_effective_samples
 from islands.parallel import memoised_map
+from islands.records.noise_model import estimate_effective_samples
 
 #: Beginning of the messages of a search that takes the residual for model error.
 WITH_MODEL_ERROR = "with model error: "

@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.initial_states import fit_initial_states
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import bound_reduction
 from islands.diagnosis.inference.screening import transfer_parameters
+from islands.records.dataset import Dataset
 
 
 def leave_out_contradicted_time(

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import select_effects
 from islands.diagnosis.inference.screening import screen_effects
@@ -18,6 +17,7 @@ from islands.diagnosis.monitoring.change_cause import ChangeCause, choose_cause
 from islands.diagnosis.monitoring.effect_states import EffectStates, MonitorReference, calibrate_record
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import (
     BatchSimulator,

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
@@ -26,7 +25,8 @@ from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
 from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError
-from islands.estimation.noise_model import NoiseModel
+from islands.records.dataset import Dataset
+from islands.records.noise_model import NoiseModel
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

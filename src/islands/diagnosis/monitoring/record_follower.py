@@ -6,7 +6,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.monitoring.change_cause import MIN_FRACTION, ChangeCause, explain_change
 from islands.diagnosis.monitoring.change_detection import MIN_CHANGED, compute_statistics, find_threshold
 from islands.diagnosis.monitoring.change_point import ChangeForm, locate_change
@@ -19,6 +18,7 @@ from islands.diagnosis.monitoring.effect_states import (
 )
 from islands.effects.interface.context import Signal
 from islands.errors import SettingsError
+from islands.records.dataset import Dataset
 from islands.simulators.interface import Simulator
 
 #: Default number of records that the monitor takes as the undisturbed state: a day of hourly records.

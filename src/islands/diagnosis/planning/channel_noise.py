@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from islands.effects.interface.context import Signal
-from islands.estimation.noise_model import NoiseModel, white_noise
+from islands.records.noise_model import NoiseModel, white_noise
 
 
 class NoiseOrigin(StrEnum):

@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.preparation import (
     MIN_SAMPLES,
     validate_prior,
@@ -24,6 +23,7 @@ from islands.effects.interface.effect import Effect
 from islands.errors import SettingsError, lookup
 from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, StoppedError, ignore_progress
+from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 

@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
-from islands.data.split import estimation_part
 from islands.diagnosis.calibration.preparation import MIN_SAMPLES, make_target, select_effects
 from islands.diagnosis.planning.channel_noise import make_white_noise
 from islands.diagnosis.planning.experiment import Experiment, MeasuredChannel
@@ -14,6 +12,8 @@ from islands.diagnosis.planning.noise_estimate import estimate_noise
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect
 from islands.errors import RecordError, SettingsError
+from islands.records.dataset import Dataset
+from islands.records.split import estimation_part
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -6,7 +6,6 @@ from math import sqrt
 
 import numpy as np
 
-from islands.data.segments import find_bounds
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
@@ -16,7 +15,8 @@ from islands.diagnosis.planning.pair_separation import PairSeparation
 from islands.diagnosis.planning.separation import require_separation
 from islands.effects.interface.context import Signal
 from islands.effects.interface.effect import Effect
-from islands.estimation.noise_model import fit_noise
+from islands.records.noise_model import fit_noise
+from islands.records.segments import find_bounds
 
 
 @dataclass(frozen=True, slots=True, eq=False)

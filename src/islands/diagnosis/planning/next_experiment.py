@@ -7,7 +7,6 @@ from math import ceil
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.screening import ScreenedEffect
@@ -23,6 +22,7 @@ from islands.diagnosis.planning.pair_separation import PairSeparation, rate_sepa
 from islands.diagnosis.planning.planned_input import InputLimits, find_rate
 from islands.effects.interface.context import Signal
 from islands.parallel import ParallelMap
+from islands.records.dataset import Dataset
 
 #: Maximum number of samples of the input, and of the record with which it is compared.
 MAX_SAMPLES, MAX_RECORDED_SAMPLES = 5_000, 20_000

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.noise_floor import contrast_periods, explain_residual
 from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.errors import RecordError
-from islands.estimation.noise_model import fit_noise
+from islands.records.dataset import Dataset
+from islands.records.noise_model import fit_noise
 from islands.simulators.extended import ExtendedSimulator
 
 #: Largest noise relative to the output that is rounding.

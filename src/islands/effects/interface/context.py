@@ -7,8 +7,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import simplify_unit
-from islands.data.segments import find_bounds, map_segments
+from islands.records.channel_names import simplify_unit
+from islands.records.segments import find_bounds, map_segments
 
 Signal = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ from math import ceil, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.expressions.primitives import SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Mean in standard deviations from which a signal may be meant as a deviation from an operating point.

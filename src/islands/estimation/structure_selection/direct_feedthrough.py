@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 #: Part of the mean squared prediction error that the present input has to remove: in all, and in every fold.
 LEAST_GAIN, LEAST_GAIN_OF_FOLD = 0.25, 0.05

@@ -10,7 +10,6 @@ inputs of the ranking, as many as its size allows, and degree 1 in the others.
 from collections.abc import Sequence
 from math import log
 
-from islands.data.dataset import Dataset, join
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.structure_selection.input_delays import delay_inputs, expand_delays
@@ -18,6 +17,7 @@ from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.candidate_library import candidates, count_inputs, largest_degree
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
+from islands.records.dataset import Dataset, join
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Terms of the forward selection that ranks the inputs.

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.random import Generator, SeedSequence
 from threadpoolctl import threadpool_limits
 
-from islands.data.dataset import Dataset
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import fit_linear_systems, make_latent_model, make_odd
@@ -25,6 +24,7 @@ from islands.evolution.rng import Purpose
 from islands.evolution.settings import Settings
 from islands.models.latent import LatentModel
 from islands.progress import Steps
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Units of the first population.

@@ -6,7 +6,6 @@ from math import isinf
 
 import numpy as np
 
-from islands.data.channel_names import TEMPERATURES, parse_channel_name
 from islands.effects.catalogue import CATALOGUE, get_summary
 from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site
 from islands.effects.time_variation import GAIN_EFFECTS
@@ -23,6 +22,7 @@ from islands.export.equations.program_system import drop_force, read_system, ref
 from islands.export.equations.sampled_core import read_core, read_output_system
 from islands.expressions.primitives import EQUATION_FUNCTIONS, NEG
 from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol, substitute
+from islands.records.channel_names import TEMPERATURES, parse_channel_name
 from islands.simulators.mapped_input import count_sampled_maps
 from islands.simulators.ode.effects import (
     LAW_STATE,

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from islands.data.channel_names import parse_channel_name
 from islands.errors import ModelError
 from islands.expressions.primitives import ADD, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
+from islands.records.channel_names import parse_channel_name
 from islands.simulators.ode.equation_parser import FORCE
 from islands.simulators.ode.preparation import fill_units
 from islands.simulators.ode.system import OdeSystem

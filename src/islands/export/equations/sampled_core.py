@@ -9,8 +9,8 @@ from islands.export.equations.extended_system import NamedValue, SampledCore
 from islands.export.equations.program_system import refuse
 from islands.expressions.primitives import ADD, MUL, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
-from islands.io.models import model_from_json
 from islands.models.measured_signals import measured_block
+from islands.persistence.models import model_from_json
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.ode.output_system import SIMULATED, make_output_system
 from islands.simulators.ode.system import OdeSystem

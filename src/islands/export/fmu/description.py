@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from islands.data.channel_names import parse_unit
 from islands.models.block import Block
+from islands.records.channel_names import parse_unit
 
 #: Attributes of an FMU of either version.
 _CAPABILITIES = {

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from islands.data.channel_names import parse_unit
 from islands.errors import ModelError
 from islands.export.languages.bodies import function_name
 from islands.expressions.primitives import LARGEST_EXPONENT
 from islands.expressions.tree import Primitive
 from islands.models.block import Block
+from islands.records.channel_names import parse_unit
 
 _FILE = """\
 block NarxModel "NARX model of {title}"

@@ -10,15 +10,15 @@ from math import isfinite, lcm
 from types import MappingProxyType
 from typing import Any
 
-from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import BANDS, SearchResult
 from islands.facade.automatic.kind_trials import DEAD_TIMES, ROUNDING, KindTrials, percent, try_kinds
 from islands.facade.library_fit import CERTIFICATES, LibraryFit
 from islands.facade.trials.library import TrialLibrary
-from islands.inspection.rest import check_rest
 from islands.progress import Steps, StoppedError
+from islands.records.dataset import Dataset
+from islands.records.inspection.rest import check_rest
 from islands.validation.assessment import Assessment, average_errors
 from islands.validation.recommendation import describe_exclusion, list_rivals, measure_size, recommend
 

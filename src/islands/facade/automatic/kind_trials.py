@@ -9,12 +9,12 @@ from functools import partial
 from math import inf, isfinite
 from types import MappingProxyType
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
 from islands.facade.trials.held_out_error import hold_out, measure_library, measure_output_error
 from islands.facade.trials.library import TrialLibrary
-from islands.inspection.dead_time import estimate_dead_times
 from islands.progress import Steps
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
+from islands.records.inspection.dead_time import estimate_dead_times
 
 #: Kinds up to this factor of the least error are compared with larger models.
 PROMISING = 3.0

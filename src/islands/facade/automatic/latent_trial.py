@@ -6,14 +6,14 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from islands.data.dataset import Dataset
-from islands.data.split import Split
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.automatic.kind_choice import Choice, measure_share
 from islands.facade.automatic.kind_trials import percent
 from islands.facade.latent_identification import search_latent
 from islands.facade.library_fit import LibraryFit
 from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.records.split import Split
 from islands.validation.assessment import Assessment, average_errors
 from islands.validation.predictable_residual import ADEQUATE
 

@@ -5,8 +5,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from islands.data.dataset import Dataset
-from islands.data.split import Split, split_data
 from islands.errors import ModelError, RecordError, SettingsError, check_texts, lookup
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_delays import check_delays
@@ -17,6 +15,8 @@ from islands.facade.library_fit import FitSettings, LibraryFit, fit_library
 from islands.facade.trials.library import make_trial_library, take_library
 from islands.models.candidate_library import LIBRARIES
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
+from islands.records.dataset import Dataset
+from islands.records.split import Split, split_data
 
 #: Why latent models are not compared with models of hysteresis.
 _NO_CONTINUUM = "Latent models, which have no continuum of equilibria, were not compared."

@@ -5,11 +5,11 @@ from functools import partial
 
 import numpy as np
 
-from islands.data.coupled_record import CoupledSplit
 from islands.estimation.estimator_table import refinement_criterion
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.progress import Steps
+from islands.records.coupled import CoupledSplit
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import ValidatedModel, find_predicted, make_ensemble, mean_squares
 from islands.validation.prediction_bands import PredictionBands, calibrate_output_bands

@@ -9,10 +9,6 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Unpack
 
-from islands.data.averaging import AUTO, average_samples
-from islands.data.coupled_record import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
-from islands.data.dataset import Dataset
-from islands.data.split import Split, warn_of_extrapolation
 from islands.errors import SettingsError, lookup
 from islands.estimation.refinement import refine
 from islands.evolution.engine import Engine
@@ -38,8 +34,6 @@ from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
-from islands.io.data_frames import as_record
-from islands.io.records.reading_options import DEFAULT_READING, take_reading
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import require_narx
 from islands.progress import (
@@ -50,10 +44,16 @@ from islands.progress import (
     ignore_progress,
     never_stop,
 )
+from islands.records.averaging import AUTO, average_samples
+from islands.records.coupled import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
+from islands.records.dataset import Dataset
+from islands.records.reading.data_frames import as_record
+from islands.records.reading.options import DEFAULT_READING, take_reading
+from islands.records.split import Split, warn_of_extrapolation
 from islands.simulation.outcome import EvaluationOutcome
 
 if TYPE_CHECKING:
-    from islands.io.data_frames import FrameLike, ReadingLike
+    from islands.records.reading.data_frames import FrameLike, ReadingLike
 
 #: Largest number of accepted steps of the common refinement over each interval.
 _STEPS = 20

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from islands.data.coupled_record import CoupledSplit
-from islands.data.input_lead import advance_all_inputs
 from islands.errors import ModelError
 from islands.facade.coupled.result import CoupledResult
 from islands.facade.results.identification import Result
@@ -13,6 +11,8 @@ from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
+from islands.records.coupled import CoupledSplit
+from islands.records.input_lead import advance_all_inputs
 from islands.validation.ensemble import Ensemble
 from islands.validation.prediction_bands import PredictionBands
 

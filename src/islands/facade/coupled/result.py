@@ -11,37 +11,37 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.coupled_record import CoupledRecord, CoupledSplit, match_coupled
-from islands.data.signal_map import match_rate
-from islands.data.split import measure_input_ranges
 from islands.errors import ModelError
 from islands.export import export_or_write
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
-from islands.figures.names import FREE_RUN, OVERVIEW
-from islands.inspection.noise import measure_output_noise
-from islands.io.checkpoints.writing import replace_file
-from islands.io.ensembles import (
+from islands.models.coupled_latent import CoupledLatentModel
+from islands.models.coupled_narx import CoupledModel, coupled_signals
+from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.ensembles import (
     bands_document,
     bands_from_document,
     ensemble_document,
     ensemble_from_document,
 )
-from islands.io.models import model_json
-from islands.io.result_folder import (
+from islands.persistence.models import model_json
+from islands.progress import Steps
+from islands.records.coupled import CoupledRecord, CoupledSplit, match_coupled
+from islands.records.inspection.noise import measure_output_noise
+from islands.records.signal_map import match_rate
+from islands.records.split import measure_input_ranges
+from islands.report.documents.result_folder import (
     finite,
     list_failures,
     record_document,
     residual_structure_document,
     terms_in_result,
 )
-from islands.io.result_text.coupled_statements import describe_coupled
-from islands.io.result_text.text_layout import term_table, wrap
-from islands.models.coupled_latent import CoupledLatentModel
-from islands.models.coupled_narx import CoupledModel, coupled_signals
-from islands.progress import Steps
-from islands.reports.origin import REPORT_FILE
+from islands.report.figures.names import FREE_RUN, OVERVIEW
+from islands.report.pages.origin import REPORT_FILE
+from islands.report.text.coupled_statements import describe_coupled
+from islands.report.text.layout import term_table, wrap
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics, metrics
@@ -265,7 +265,7 @@ class CoupledResult(FittedCoupledModel):
 
     def plot(self, output: str) -> "Figure":
         """Draw the free run of one output on the validation data, with its 90 % band."""
-        from islands.figures.free_run import draw_free_run  # noqa: PLC0415 - matplotlib takes half a second
+        from islands.report.figures.free_run import draw_free_run  # noqa: PLC0415 - matplotlib takes half a second
 
         place = self.model.output_names.index(output)
         data, run = self.split.validation, self.simulate(self.split.validation)
@@ -306,7 +306,7 @@ class CoupledResult(FittedCoupledModel):
         replace_file([f"{json.dumps(self.document(), indent=2)}\n".encode()], folder / "result.json")
 
     def _draw_figure(self, output: str, path: Path) -> None:
-        from islands.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+        from islands.report.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
 
         path.parent.mkdir(exist_ok=True)
         save(self.plot(output), path)

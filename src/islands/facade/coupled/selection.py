@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
-from islands.data.coupled_record import CoupledRecord
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
+from islands.records.coupled import CoupledRecord
 from islands.simulation.predictors import free_run
 
 #: Excess of the error over the least, as a fraction, that never justifies another term.

@@ -6,18 +6,18 @@ from html import escape
 from math import isfinite, nan
 from typing import TYPE_CHECKING
 
-from islands.data.signal_map import match_rate
 from islands.errors import SettingsError
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import record_of_model
-from islands.io.result_text.statements import BEFORE_REFIT
+from islands.records.signal_map import match_rate
+from islands.report.text.statements import BEFORE_REFIT
 from islands.validation.metrics import Metrics, metrics
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from islands.io.data_frames import RecordLike
+    from islands.records.reading.data_frames import RecordLike
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class ResultComparison:
         ax : Axes, optional
             Axes to draw into.
         """
-        from islands.figures.convergence import draw_fronts  # noqa: PLC0415
+        from islands.report.figures.convergence import draw_fronts  # noqa: PLC0415
 
         names = dict.fromkeys(each.result for each in self.models)
         fronts = {
@@ -88,7 +88,7 @@ class ResultComparison:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        from islands.figures.style import image_html  # noqa: PLC0415
+        from islands.report.figures.style import image_html  # noqa: PLC0415
 
         head, *rows = (
             "".join(f'<t{kind} style="text-align: left">{escape(cell)}</t{kind}>' for cell in line)

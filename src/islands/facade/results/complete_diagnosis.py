@@ -10,27 +10,27 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from islands.diagnosis.detectability import SelfTest
-from islands.diagnosis.documents.experiment_json import NEXT_EXPERIMENT_FILE, get_suggested_input
-from islands.diagnosis.documents.extension_json import extended_document, extended_json
-from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.result import Diagnosis
 from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
-from islands.io.checkpoints.writing import replace_file
-from islands.io.records.writer import input_csv
-from islands.io.result_text.diagnosis_statements import describe_diagnosis
 from islands.parallel import ParallelMap
+from islands.persistence.checkpoints.writing import replace_file
 from islands.progress import Steps
-from islands.reports.origin import REPORT_FILE, Origin
+from islands.records.writer import input_csv
+from islands.report.documents.diagnosis_json import as_json, diagnosis_document
+from islands.report.documents.experiment_json import NEXT_EXPERIMENT_FILE, get_suggested_input
+from islands.report.documents.extension_json import extended_document, extended_json
+from islands.report.pages.origin import REPORT_FILE, Origin
+from islands.report.text.diagnosis_statements import describe_diagnosis
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from islands.io.data_frames import RecordLike
+    from islands.records.reading.data_frames import RecordLike
 
 #: Document of a folder.
 DIAGNOSIS_FILE = "discrepancy.json"
@@ -106,7 +106,7 @@ class DiagnosisResult(Diagnosis):
 
     def write_report(self, origin: Origin, parallel_map: ParallelMap = map) -> bytes:
         """Return ``report.html``, with the name of the record: sentences, numbers and figures."""
-        from islands.reports.diagnosis import diagnosis_report  # noqa: PLC0415 - many results have no report
+        from islands.report.pages.diagnosis import diagnosis_report  # noqa: PLC0415 - many results have no report
 
         return diagnosis_report(origin, self, self.tested, self.formula, parallel_map)
 
@@ -165,7 +165,7 @@ class DiagnosisResult(Diagnosis):
         Parameters
         ----------
         kind : str
-            A key of ``islands.figures.diagnosis.DIAGNOSIS_FIGURES``: ``over-time``, ``loops``,
+            A key of ``islands.report.figures.diagnosis.DIAGNOSIS_FIGURES``: ``over-time``, ``loops``,
             ``residual`` or ``ladder``.
 
         Raises
@@ -173,7 +173,7 @@ class DiagnosisResult(Diagnosis):
         SettingsError
             There is no such figure.
         """
-        from islands.figures.diagnosis import DIAGNOSIS_FIGURES  # noqa: PLC0415 - matplotlib
+        from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES  # noqa: PLC0415 - matplotlib
 
         return lookup(DIAGNOSIS_FIGURES, kind, "figure")(self)
 

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.dataset import Dataset
-from islands.data.signal_map import match_rate
 from islands.errors import ModelError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
@@ -18,11 +16,13 @@ from islands.export import export_or_write
 from islands.facade.results.model_analysis import linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
-from islands.io.result_text.statements import BEFORE_REFIT, is_refitted
 from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.models.sympy_expression import to_sympy
+from islands.records.dataset import Dataset
+from islands.records.signal_map import match_rate
+from islands.report.text.statements import BEFORE_REFIT, is_refitted
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
 from islands.simulation.step_response import StepResponse, step_response
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import RecordLike
+    from islands.records.reading.data_frames import RecordLike
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -180,7 +180,7 @@ class FittedModel:
         ModelError
             As in `static_characteristic`, or the model has several inputs.
         """
-        from islands.figures.model_responses import draw_static_characteristic  # noqa: PLC0415 - matplotlib
+        from islands.report.figures.model_responses import draw_static_characteristic  # noqa: PLC0415 - matplotlib
 
         if self.model.inputs > 1:
             raise ModelError(
@@ -212,7 +212,7 @@ class FittedModel:
         ax : Axes, optional
             Axes to draw into; by default those of a new figure.
         """
-        from islands.figures.model_responses import draw_step_response  # noqa: PLC0415 - matplotlib
+        from islands.report.figures.model_responses import draw_step_response  # noqa: PLC0415 - matplotlib
 
         return draw_step_response(self.step_response(start, end, y, samples), ax)
 
@@ -364,8 +364,9 @@ class FittedModel:
         Parameters
         ----------
         kind : str
-            A key of ``islands.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in ``metrics``),
-            ``loop``, ``hold``, ``residuals``; of latent models ``structure``, ``curves`` and ``bode``.
+            A key of ``islands.report.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in
+            ``metrics``), ``loop``, ``hold``, ``residuals``; of latent models ``structure``, ``curves``
+            and ``bode``.
         record : Dataset or data frame, optional
             Record that is drawn; by default the validation data, with the parameters that the errors on them
             belong to. A frame has the columns of the model.
@@ -388,7 +389,7 @@ class FittedModel:
             what the figure shows, as units.
         """
         # matplotlib takes half a second to import, which every process of a cluster would pay.
-        from islands.figures.registry import FIGURES, draw_record_figure  # noqa: PLC0415
+        from islands.report.figures.registry import FIGURES, draw_record_figure  # noqa: PLC0415
 
         kind = kind.replace("_", "-")
         if record is None and ax is None:

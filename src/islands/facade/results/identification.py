@@ -15,12 +15,12 @@ from islands.evolution.search_result import SearchResult, state_steps
 from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
-from islands.figures.names import OVERVIEW, RESPONSES
-from islands.io.result_folder import content_sha256, result_document, write_result
-from islands.io.result_text.statements import describe
-from islands.io.result_text.summary_text import summary
 from islands.progress import Steps
-from islands.reports.origin import REPORT_FILE
+from islands.report.documents.result_folder import content_sha256, result_document, write_result
+from islands.report.figures.names import OVERVIEW, RESPONSES
+from islands.report.pages.origin import REPORT_FILE
+from islands.report.text.statements import describe
+from islands.report.text.summary import summary
 from islands.simulation.predictors import Simulation
 from islands.validation.recommendation import Recommendation
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import RecordLike
+    from islands.records.reading.data_frames import RecordLike
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -213,9 +213,9 @@ class Result:
             The figures are optional steps, which a stop request leaves out, and whose failures the texts and
             ``result.json`` state.
         figures : sequence of str
-            Names from ``islands.figures.names.ALL_FIGURES``. A figure that the result does not have, such as
-            the loop of a record without one, is left out. Figures and a report of an earlier result are
-            removed.
+            Names from ``islands.report.figures.names.ALL_FIGURES``. A figure that the result does not have,
+            such as the loop of a record without one, is left out. Figures and a report of an earlier
+            result are removed.
         """
         folder, steps, found = Path(folder), steps or Steps(), self.search_result
         folder.mkdir(parents=True, exist_ok=True)
@@ -230,9 +230,9 @@ class Result:
         return folder
 
     def _draw_figures(self, folder: Path, names: Sequence[str], steps: Steps) -> None:
-        from islands.figures.model_responses import draw_responses  # noqa: PLC0415
-        from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
-        from islands.figures.style import save  # noqa: PLC0415
+        from islands.report.figures.model_responses import draw_responses  # noqa: PLC0415
+        from islands.report.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
+        from islands.report.figures.style import save  # noqa: PLC0415
 
         folder.mkdir(parents=True, exist_ok=True)
         drawn: dict[str, Callable[[], Figure]] = {

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.data.dataset import Dataset, join
-from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError, lookup, suggest
-from islands.io.data_frames import as_record, column_names, states_time
-from islands.io.records.column_names import find_column
 from islands.models.protocol import DynamicModel
+from islands.records.dataset import Dataset, join
+from islands.records.reading.column_names import find_column
+from islands.records.reading.data_frames import as_record, column_names, states_time
+from islands.records.signal_map import match_rate
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
@@ -19,7 +19,7 @@ from islands.simulation.predictors import Simulation, multiple_shooting
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
 
-    from islands.io.data_frames import RecordLike
+    from islands.records.reading.data_frames import RecordLike
     from islands.simulators.specification.table import LocalSpec, SimulationSpec
 
 #: Samples of a shooting interval (case 1 of the paper), unless a setting or a result states another number.

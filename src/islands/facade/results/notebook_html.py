@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from islands.io.result_text.text_layout import write_html
 from islands.models.protocol import DynamicModel
+from islands.report.text.layout import write_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ def render_sentences(
     paragraphs = "".join(f"<p>{write_html(sentence)}</p>" for sentence in sentences)
     image = ""
     if figure is not None:
-        from islands.figures.style import image_html  # noqa: PLC0415 - matplotlib takes half a second
+        from islands.report.figures.style import image_html  # noqa: PLC0415 - matplotlib takes half a second
 
         image = image_html(figure, alternative)
     return f"<div>{heading}{paragraphs}{image}</div>"

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.export import FILE_EXPORTS, export_or_write
 from islands.export.closed_form import closed_form
 from islands.facade.results.model_simulation import simulate
 from islands.facade.results.notebook_html import render_sentences
-from islands.io.data_frames import as_record
-from islands.io.result_text.diagnosis_statements import describe_diagnosis
+from islands.records.dataset import Dataset
+from islands.records.reading.data_frames import as_record
+from islands.report.text.diagnosis_statements import describe_diagnosis
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.table import ColumnSpec, LocalExtendedSpec, innermost
 
 if TYPE_CHECKING:
-    from islands.io.data_frames import RecordLike
+    from islands.records.reading.data_frames import RecordLike
 
 
 @dataclass(frozen=True, slots=True)

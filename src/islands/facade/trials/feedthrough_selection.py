@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.input_lead import advance_inputs, check_feedthrough
-from islands.data.split import Split
 from islands.errors import RecordError
 from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import compute_errors
+from islands.records.channel_names import parse_channel_name
+from islands.records.input_lead import advance_inputs, check_feedthrough
+from islands.records.split import Split
 
 #: Largest error on the validation data relative to that of models without feedthrough.
 LARGEST_RATIO = 0.98

@@ -4,8 +4,6 @@ from collections.abc import Iterator, Sequence
 from math import inf
 
 from islands.available_cpus import count_cpus
-from islands.data.dataset import Dataset, join
-from islands.data.split import Split
 from islands.errors import IslandsError
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import (
@@ -26,6 +24,8 @@ from islands.evolution.swap_search import swap_search
 from islands.facade.trials.library import TrialLibrary
 from islands.models.regressor import Regressor
 from islands.progress import Steps, StoppedError
+from islands.records.dataset import Dataset, join
+from islands.records.split import Split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run_error

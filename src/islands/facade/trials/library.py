@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from islands.data.averaging import count_means
-from islands.data.dataset import Dataset
 from islands.errors import check_integers
 from islands.estimation.estimate import FittedStructure
 from islands.estimation.output_error import fit_output_error
@@ -13,6 +11,8 @@ from islands.estimation.structure_selection.input_ranking import screen_candidat
 from islands.evolution.settings import Settings
 from islands.models.candidate_library import get_library
 from islands.models.regressor import Regressor
+from islands.records.averaging import count_means
+from islands.records.dataset import Dataset
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,6 @@ from math import inf, isfinite, lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.averaging import AUTO, average_samples, check_average
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
-from islands.data.split import Split, average_split
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import constraint
@@ -26,9 +22,13 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.facade.trials.library import TrialLibrary
-from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.models.narx import Model
 from islands.progress import Steps
+from islands.records.averaging import AUTO, average_samples, check_average
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
+from islands.records.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
+from islands.records.split import Split, average_split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation

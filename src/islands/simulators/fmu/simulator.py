@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from islands.data.channel_names import is_unit, normalise_unit
-from islands.data.dataset import Dataset
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.errors import RecordError
 from islands.expressions.tree import FMU, Apply, Expression, Symbol
+from islands.records.channel_names import is_unit, normalise_unit
+from islands.records.dataset import Dataset
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.fmu.fmi_description import FmiInterface
 from islands.simulators.fmu.instance import FmuRun

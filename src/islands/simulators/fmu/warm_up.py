@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.simulators.fmu.fmi_calls import FmiFunctions
 from islands.simulators.fmu.fmi_description import FmiDescription, FmiInterface, FmiVariable
 from islands.simulators.fmu.instance import FmuLane, FmuRun, call_kernel

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.expressions.tree import Symbol
+from islands.records.dataset import Dataset
 from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.ode.record_channels import find_channel, make_nominal_context
 from islands.simulators.ode.shooting import make_shots

@@ -5,10 +5,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from islands.data.channel_names import parse_channel_name
-from islands.data.dataset import Dataset
 from islands.effects.interface.context import Signal, SimulationContext
 from islands.errors import RecordError, suggest
+from islands.records.channel_names import parse_channel_name
+from islands.records.dataset import Dataset
 from islands.simulators.ode.sampled_signal import SampledSignal, interpolate_linearly
 
 

@@ -11,11 +11,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
-from islands.data.segments import map_segments
 from islands.effects.interface.context import Signal
 from islands.errors import RecordError
 from islands.expressions.tree import Symbol
+from islands.records.dataset import Dataset
+from islands.records.segments import map_segments
 from islands.simulators.ode.interval_simulation import IntervalSimulation
 from islands.simulators.ode.lane_values import LaneInput
 from islands.simulators.ode.program import OdeProgram

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect
-from islands.io.models import model_json
+from islands.persistence.models import model_json
 from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

@@ -9,13 +9,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from islands.data.compatibility import ColumnReference, match_record
-from islands.data.dataset import Dataset, same_dt
-from islands.data.magnitudes import check_magnitudes
-from islands.data.masked_values import fill_masked
-from islands.data.preprocessing_steps import NO_STEPS, PreprocessingSteps
-from islands.data.segments import fill_gaps
-from islands.data.split import estimation_part
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.errors import (
@@ -27,11 +20,18 @@ from islands.errors import (
     name_without_value,
     suggest,
 )
-from islands.io.models import model_from_json
 from islands.models.narx import Model, measured_model
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel, no_model_error
 from islands.models.signal_statement import describe_values
+from islands.persistence.models import model_from_json
+from islands.records.compatibility import ColumnReference, match_record
+from islands.records.dataset import Dataset, same_dt
+from islands.records.magnitudes import check_magnitudes
+from islands.records.masked_values import fill_masked
+from islands.records.preprocessing_steps import NO_STEPS, PreprocessingSteps
+from islands.records.segments import fill_gaps
+from islands.records.split import estimation_part
 from islands.simulators.fmu.simulator import make_fmu_simulator
 from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.interface import Simulator
@@ -278,7 +278,7 @@ def _read_as_recorded(model: M, name: str, record: Dataset) -> M:
 
 
 def _list_steps(steps: PreprocessingSteps) -> str:
-    """Return steps as arguments of `islands.data.preprocessing.preprocess`."""
+    """Return steps as arguments of `islands.records.preprocessing.preprocess`."""
     given = {name: value for name, value in asdict(steps).items() if value != getattr(NO_STEPS, name)}
     return "".join(f", {name}={value!r}" for name, value in given.items())
 

@@ -13,9 +13,9 @@ from islands.benchmarks.definition import (
     list_other_files,
     read_data,
 )
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError, command_line_names
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 
 #: SHA-256 of no bytes.
 EMPTY = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"

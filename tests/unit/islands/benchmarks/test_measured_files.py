@@ -6,7 +6,7 @@ import pytest
 from islands.benchmarks import measured_files
 from islands.benchmarks.catalogue import MEASURED
 from islands.benchmarks.definition import list_other_files, read_data
-from islands.data.coupled_record import CoupledRecord
+from islands.records.coupled import CoupledRecord
 from support.repository import RECORDS, measured_record
 
 

@@ -6,10 +6,10 @@ import pytest
 import islands
 from islands.benchmarks.definition import CLASSES, LATENT, LINEAR, NARX
 from islands.benchmarks.model_searches import MODEL_SEARCHES, count_terms
-from islands.data.dataset import Dataset
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel
 from islands.progress import ignore_progress, never_stop
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.coupled_systems import TWO_MASSES
 from support.latent_systems import curves_record, make_coupled_latent_model, make_model, smooth_input

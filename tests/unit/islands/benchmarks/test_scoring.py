@@ -7,11 +7,11 @@ import pytest
 
 from islands.benchmarks.definition import BenchmarkTest
 from islands.benchmarks.scoring import measure_coverage, measure_rmse
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset, join
 from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset, join
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.prediction_bands import LEVELS, PredictionBands
 from support.coupled_systems import TWO_MASSES, make_coupled_record

@@ -13,13 +13,13 @@ import pytest
 import islands
 from islands.cli import options
 from islands.cli.output_folder import check_folder
-from islands.data.dataset import Dataset
 from islands.errors import IslandsError, SettingsError
 from islands.expressions.parsing import parse
-from islands.io.models import read_model, write_model
-from islands.io.records import write_record
-from islands.io.records.row_range import parse_rows
 from islands.models.narx import make_model
+from islands.persistence.models import read_model, write_model
+from islands.records.dataset import Dataset
+from islands.records.reading.row_range import parse_rows
+from islands.records.writer import write_record
 from support.command_line import succeed
 from support.undrawn import undrawn_figures
 

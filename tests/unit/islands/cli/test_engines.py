@@ -9,7 +9,7 @@ import pytest
 from islands.cli.engines import open_pool, start_engine
 from islands.errors import EngineError
 from islands.evolution.engine import SerialEngine
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from support.identify_runs import COLUMNS, STEPWISE, record
 from support.processes import descendants
 

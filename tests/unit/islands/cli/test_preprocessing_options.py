@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.signal_map import match_rate
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.records.signal_map import match_rate
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.factory import make_simulator

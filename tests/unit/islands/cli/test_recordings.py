@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from islands.cli.recordings import Recordings, state_extrapolation
-from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_inputs
-from islands.data.preprocessing_steps import PreprocessingSteps
 from islands.errors import RecordError, SettingsError
-from islands.io.records import write_record
+from islands.records.dataset import Dataset
+from islands.records.input_lead import advance_inputs
+from islands.records.preprocessing_steps import PreprocessingSteps
+from islands.records.writer import write_record
 
 
 def record(samples=120, seed=0):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.procedure import diagnose
+from islands.records.dataset import Dataset
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 

@@ -28,7 +28,7 @@ from islands.diagnosis.surrogates import (
     make_surrogates,
 )
 from islands.effects.interface.effect import Effect, Signal, SimulationContext
-from islands.estimation.noise_model import fit_noise
+from islands.records.noise_model import fit_noise
 from islands.simulators.recorded_output import RecordedOutput
 from islands_measurements.detection.injection.measurement import inject
 from islands_measurements.detection.trial import TOLERANCE

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.data.dataset import join
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import cross_validate_gain
@@ -19,7 +18,8 @@ from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import choose_reference_fit
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
-from islands.estimation.noise_model import fit_noise
+from islands.records.dataset import join
+from islands.records.noise_model import fit_noise
 from islands.simulators.context import make_context as make_record_context
 from islands.simulators.coordinates import input_coordinate, output_coordinate
 from islands.simulators.extended import ExtendedSimulator

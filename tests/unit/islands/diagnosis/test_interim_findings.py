@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from islands.diagnosis import procedure
-from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
@@ -27,6 +26,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.report.documents.diagnosis_json import as_json, diagnosis_document
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave
 

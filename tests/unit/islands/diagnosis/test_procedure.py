@@ -6,19 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.split import HOLDOUT_FRACTION
 from islands.diagnosis import assembly as diagnosis_assembly
 from islands.diagnosis import procedure as diagnosis
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.preparation import MIN_SAMPLES
-from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference.finding import describe_effects
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
+from islands.records.dataset import Dataset
+from islands.records.split import HOLDOUT_FRACTION
+from islands.report.documents.diagnosis_json import as_json, diagnosis_document
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput

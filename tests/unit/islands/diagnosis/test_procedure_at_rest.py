@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
-from islands.figures.diagnosis import DIAGNOSIS_FIGURES
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document
+from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
 from support.simulated_records import recorded
 
 SAMPLES, DT = 400, 0.1

@@ -7,14 +7,14 @@ import pytest
 import scipy
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.segments import count_runs, fill_gaps, find_runs, split_at_gaps
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.inference.noise_floor import noise_variance_from_periods
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.facade.explain_residual import explain_residual
-from islands.figures.diagnosis import DIAGNOSIS_FIGURES
+from islands.records.dataset import Dataset
+from islands.records.segments import count_runs, fill_gaps, find_runs, split_at_gaps
+from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
 from support.simulated_records import recorded, wave
 
 RNG = np.random.default_rng(3)

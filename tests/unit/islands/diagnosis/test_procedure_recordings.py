@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.split import MIN_RECORDING_SAMPLES, estimation_part
 from islands.diagnosis.calibration.preparation import count_fitted_samples
-from islands.diagnosis.documents.extension_json import extended_document
-from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.surrogates import make_surrogates
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
+from islands.records.dataset import Dataset
+from islands.records.split import MIN_RECORDING_SAMPLES, estimation_part
+from islands.report.documents.diagnosis_json import diagnosis_document
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.specification.factory import make_simulator
 from support.joined_oscillator import DT, SIGMA, STATES, oscillator_recordings
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import IslandsError, RecordError, SettingsError
+from islands.records.dataset import Dataset
 from islands.simulators.specification.table import LocalSpec, PhysicalSpec
 from support.simulated_records import MODEL_SPEC, PROGRAM_SPEC, recorded, wave
 

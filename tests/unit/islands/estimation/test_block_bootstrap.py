@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
 from islands.expressions.parsing import parse
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
 
 
 def terms(*texts):

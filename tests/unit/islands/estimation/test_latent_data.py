@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset, join
 from islands.estimation.fitted_state_space import Draft
 from islands.estimation.latent_data import SignalScales, make_latent_data, measure_held_out
 from islands.models.latent import StateSpaceLayout
+from islands.records.dataset import Dataset, join
 from islands.simulation.initial_states import Segment, simulate_errors
 from support.latent_systems import spring_record
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import (
@@ -15,6 +14,7 @@ from islands.estimation.latent_models import (
 )
 from islands.models.latent import StateSpaceLayout
 from islands.progress import Steps
+from islands.records.dataset import Dataset
 from support.latent_systems import spring_record
 
 #: Frequencies of the resonances, as parts of the sampling rate.

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import join
-from islands.data.flat_extremes import NO_LIMITS, SensorLimits, find_limits
-from islands.data.input_lead import advance_all_inputs
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.latent_refit import refit_latent
+from islands.records.dataset import join
+from islands.records.flat_extremes import NO_LIMITS, SensorLimits, find_limits
+from islands.records.input_lead import advance_all_inputs
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record

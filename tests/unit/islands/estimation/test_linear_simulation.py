@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from islands.estimation.linear_simulation import LinearProblem, find_start, minimise, project, solve
-from islands.estimation.noise_model import NoiseModel
 from islands.expressions.tree import Lagged
+from islands.records.noise_model import NoiseModel
 
 A, B = np.array([-1.5, 0.7]), [0.1, 0.15]
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_inputs
 from islands.estimation.linear_state_space import fit_linear_state_space
 from islands.kernels.state_space import simulate_state_space
+from islands.records.dataset import Dataset
+from islands.records.input_lead import advance_inputs
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = pytest.mark.ci

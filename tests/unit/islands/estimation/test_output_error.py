@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset, join
-from islands.data.input_lead import advance_inputs
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR
 from islands.estimation.output_error import fit_output_error
 from islands.estimation.refinement import refine
+from islands.records.dataset import Dataset, join
+from islands.records.input_lead import advance_inputs
 from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, TANK_NOISE, make_battery, make_tank
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.quantity_errors import with_quantity_errors
 from islands.estimation.refinement import refine
 from islands.models.latent import StateSpaceLayout
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.latent_systems import make_model, smooth_input, spring_record
 

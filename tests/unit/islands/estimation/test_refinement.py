@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset, join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.damped_least_squares import approximate_jacobian, normal_equations
 from islands.estimation.estimate import estimate
@@ -17,6 +16,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import Apply, Lagged
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
+from islands.records.dataset import Dataset, join
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.err_targets import ERR_TARGETS
@@ -17,6 +16,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import height
 from islands.kernels.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import multiple_shooting
 from islands.systems.catalogue import make_record

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.evolution.gene_structure import with_phi
@@ -18,6 +17,7 @@ from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, height, walk
 from islands.models.candidate_library import candidates
 from islands.models.narx import canonical_order
+from islands.records.dataset import Dataset
 from support.searches import distinct_genes
 
 SETTINGS = Settings(library="phi-polynomial", library_degree=3, library_lags=3)

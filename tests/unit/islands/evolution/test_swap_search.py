@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
 from islands.evolution import swap_search as module
 from islands.evolution.evaluation import Evaluator
@@ -16,6 +15,7 @@ from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.models.candidate_library import candidates
+from islands.records.dataset import Dataset
 from support.searches import record
 
 HYSTERESIS = Settings(

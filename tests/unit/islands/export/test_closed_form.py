@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import ModelError
 from islands.export.closed_form import closed_form
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.extended_simulations import extended
 from support.simulated_records import DT, MODEL, wave

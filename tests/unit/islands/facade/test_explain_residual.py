@@ -6,12 +6,12 @@ from warnings import warn
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.inference.verdict import Verdict
 from islands.errors import ExtrapolationWarning
 from islands.expressions.parsing import parse
 from islands.facade import explain_residual as module
 from islands.models.narx import make_model
+from islands.records.dataset import Dataset
 
 RNG = np.random.default_rng(3)
 INPUT = RNG.standard_normal(200)

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.facade.final_models import completed_parts, screen
 from islands.models.narx import make_model
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 
 SETTINGS = Settings(shifts=(1, 2), max_height=3, max_terms=3, initial_terms=(1, 3), shooting=20)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.facade.fit import fit_record
 from islands.facade.identify import identify_record
-from islands.figures.names import ALL_FIGURES
-from islands.io.result_folder import record_document, result_document, result_json
-from islands.io.result_text.statements import describe
 from islands.models.equations import equation, latex_equation
 from islands.progress import StoppedError
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import record_document, result_document, result_json
+from islands.report.figures.names import ALL_FIGURES
+from islands.report.text.statements import describe
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from islands.validation.physics import check_physics
 from support.known_records import RUNAWAY, runaway

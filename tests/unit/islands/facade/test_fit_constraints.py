@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.estimate import estimate
@@ -16,6 +15,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.models.narx import canonical_order
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.identifications import BUDGET, identify, record
 

@@ -8,10 +8,10 @@ from time import process_time
 import pytest
 
 import islands
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
 from islands.facade.coupled.identification import StoppedCouplingError
 from islands.progress import Stop, StoppedError
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
 from islands.systems.catalogue import make_record
 
 #: Seconds of CPU between two calls. Two seconds are promised; slower machines and the saving need the rest.

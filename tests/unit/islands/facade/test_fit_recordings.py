@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
 from islands.expressions.printing import plain
+from islands.records.dataset import Dataset, join
 
 TANK = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-1)^2": -0.2}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 #: Law of a drive with dry friction, in the order of its terms.
 FRICTION = {"y(k-1)": 0.98, "u1(k-1)": 0.1, "sign(y(k-1))": -0.03}

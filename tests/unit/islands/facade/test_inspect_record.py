@@ -7,9 +7,9 @@ import pytest
 import islands
 from islands.cli.options import columns
 from islands.errors import RecordError
-from islands.inspection.findings import SCHEMA
-from islands.io.inspection_text import WIDTH, format_inspection
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.inspection.findings import SCHEMA
+from islands.records.reading.options import ReadingOptions
+from islands.report.text.inspection import WIDTH, format_inspection
 from support.known_records import delay, lag, measure, steps
 from support.parsed_files import list_parsed
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.facade.identify import identify_record
 from islands.progress import StoppedError
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.latent_systems import smooth_input, spring_record
 

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from islands.data.split import split_data
 from islands.facade.library_fit import FitSettings, fit_library
 from islands.facade.trials.library import take_library
+from islands.records.split import split_data
 from support.portfolio_records import KINDS
 
 

@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 import islands
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.io.models import write_model
-from islands.io.records import write_record
+from islands.persistence.models import write_model
+from islands.records.writer import write_record
 from islands.systems.published_models import PUBLISHED
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record

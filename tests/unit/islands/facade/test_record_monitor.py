@@ -7,18 +7,18 @@ import pytest
 import scipy
 from benchmarks.monitor import run
 
-from islands.diagnosis.documents.monitor_json import describe_alarm, describe_status, monitor_document
-from islands.diagnosis.documents.monitor_state import (
+from islands.diagnosis.monitoring.record_follower import AlarmKind, MonitorSettings
+from islands.errors import RecordError, SettingsError
+from islands.facade.record_monitor import monitor_record
+from islands.report.documents.monitor_json import describe_alarm, describe_status, monitor_document
+from islands.report.documents.monitor_state import (
     head_to_json,
     monitor_from_head,
     monitor_from_json,
     monitor_to_json,
     record_to_json,
 )
-from islands.diagnosis.documents.monitor_text import describe_alarm_text, describe_last_record
-from islands.diagnosis.monitoring.record_follower import AlarmKind, MonitorSettings
-from islands.errors import RecordError, SettingsError
-from islands.facade.record_monitor import monitor_record
+from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
 
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.estimator_table import BOX_JENKINS, ESTIMATORS, OUTPUT_ERROR
 from islands.estimation.output_error import fit_output_error, refit_output_error
 from islands.facade.refit import join_data, refit_models
-from islands.figures.registry import FIGURES
-from islands.io.models import read_validated_model
-from islands.io.result_folder import result_document
-from islands.io.result_text.headlines import write_headline
-from islands.io.result_text.statements import BEFORE_REFIT, describe, name_statements
+from islands.persistence.models import read_validated_model
 from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import result_document
+from islands.report.figures.registry import FIGURES
+from islands.report.text.headlines import write_headline
+from islands.report.text.statements import BEFORE_REFIT, describe, name_statements
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.metrics import metrics
 from support.noisy_records import TERMS, TRUE, make_noisy_record
@@ -144,7 +144,7 @@ def test_latent_models_keep_their_wiring_and_reduce_the_error_on_all_data():
     assert best.is_refitted
     before = best.assessment.model
     assert best.model.wiring == before.wiring
-    data = islands.data.compatibility.match_record(before, record)
+    data = islands.records.compatibility.match_record(before, record)
     errors = [simulate_freely(each, data).mean_squared_error for each in (before, best.model)]
     assert errors[1] < errors[0]
 

@@ -13,7 +13,7 @@ USE = """
 import json
 import numpy as np
 from scipy.signal import lfilter
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from islands.facade.warm_up import warm_up

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
@@ -28,6 +27,7 @@ from islands.kernels.parameter_reduction import expand
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import arrange_rows, gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import link
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import OK
 
 # The kernels are compiled with the types of these tests; the evaluation of structures tests them as well.

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.structure_selection.froe import froe
 from islands.expressions.parsing import parse
@@ -35,6 +34,7 @@ from islands.models.narx import Model
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import TermPool
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound, multiple_shooting
 

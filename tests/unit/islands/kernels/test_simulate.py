@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.kernels.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
 from islands.models.narx import make_model
 from islands.program.term_pool import link
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 
 SAMPLES = 3 * CHUNK + 12

@@ -21,7 +21,7 @@ REGISTERS = {"nehalem": "xmm", "haswell": "ymm", "skylake-avx512": "zmm"}
 DIGEST = """
 import hashlib
 import numpy as np
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.estimation.structure_selection.froe import froe
 from islands.estimation.least_squares import factorise
 from islands.kernels import simulate as kernel

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import Dataset
-from islands.data.input_lead import advance_all_inputs
-from islands.data.preprocessing import preprocess
 from islands.errors import ModelError
 from islands.export import EXPORTS, export
-from islands.io.models import any_model_from_json, model_json, read_coupled
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
+from islands.persistence.models import any_model_from_json, model_json, read_coupled
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import Dataset
+from islands.records.input_lead import advance_all_inputs
+from islands.records.preprocessing import preprocess
 from islands.simulation.predictors import free_run
 from support.coupled_systems import TWO_MASSES
 from support.latent_systems import make_coupled_latent_model, smooth_input

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.flat_extremes import SensorLimits
 from islands.errors import ModelError
 from islands.export import export
-from islands.io.models import model_from_json, model_json
 from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.models.unit_functions import FUNCTIONS
+from islands.persistence.models import model_from_json, model_json
+from islands.records.dataset import Dataset
+from islands.records.flat_extremes import SensorLimits
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.models.linear_system import LinearSystem, describe_poles, find_resonances
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model
 

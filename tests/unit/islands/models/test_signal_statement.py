@@ -6,9 +6,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from islands.data.averaging import average_samples
-from islands.data.dataset import Dataset
-from islands.data.preprocessing import preprocess
 from islands.errors import ModelError
 from islands.export import export
 from islands.expressions.parsing import parse
@@ -16,6 +13,9 @@ from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import mathml_equation, named_signals
 from islands.models.narx import make_model
 from islands.models.signal_statement import describe_signals
+from islands.records.averaging import average_samples
+from islands.records.dataset import Dataset
+from islands.records.preprocessing import preprocess
 
 RATE = "k counts steps of 0.08 s: each value is the mean of 2 values, each one of 4 samples of 0.01 s behind"
 

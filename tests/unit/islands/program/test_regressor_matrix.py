@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
@@ -16,6 +15,7 @@ from islands.expressions.user_primitive import primitive
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
+from islands.records.dataset import Dataset
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value
 

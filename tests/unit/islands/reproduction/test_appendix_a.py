@@ -9,7 +9,7 @@ from scipy import stats
 
 from islands.evolution.presets import PRESETS
 from islands.facade.identify import identify
-from islands.figures.themes import THEMES
+from islands.report.figures.themes import THEMES
 from islands.reproduction import appendix_a
 from islands.reproduction.appendix_a import (
     PROBABILITIES,

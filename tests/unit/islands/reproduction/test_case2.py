@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
+from islands.records.dataset import Dataset
 from islands.reproduction import case2
 from islands.reproduction.case2 import remove_drift, simulate_substitute, take_record
 from islands.reproduction.tasks import ReproductionOptions, run_tasks

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from islands.figures.style import blank, finish
-from islands.figures.themes import THEMES, themed_style
+from islands.report.figures.style import blank, finish
+from islands.report.figures.themes import THEMES, themed_style
 from islands.reproduction.page import write_reproduction
 from islands.reproduction.section import ComparisonTable, Section, SectionFigure
 

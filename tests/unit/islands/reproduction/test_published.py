@@ -2,8 +2,8 @@
 
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
+from islands.records.dataset import Dataset
 from islands.reproduction.published import (
     assess_published,
     count_different,

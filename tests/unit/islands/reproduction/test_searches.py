@@ -2,7 +2,7 @@
 
 import pytest
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.reproduction.searches import measure_errors, model_document, read_document, search_island
 from islands.systems.bouc_wen import authors_estimation, authors_validation
 from islands.systems.published_models import PUBLISHED

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import join
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.records.dataset import join
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run
 from support.slow_processes import TANK_NOISE, make_tank

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset, join
-from islands.data.input_lead import advance_inputs
 from islands.export import export
 from islands.kernels.state_space import simulate_state_space
+from islands.records.dataset import Dataset, join
+from islands.records.input_lead import advance_inputs
 from islands.simulation.initial_states import (
     Segment,
     estimate_initial_states,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.simulate import WIDTHS
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 
 SEGMENTS = (230, 4, 5, 120, 6)

@@ -9,10 +9,10 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import ModelError
 from islands.expressions.tree import Symbol
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

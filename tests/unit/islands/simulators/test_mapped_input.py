@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Site
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

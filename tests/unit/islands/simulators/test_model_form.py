@@ -8,11 +8,11 @@ import pytest
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.model_form import CORE_SHAPE
 from islands.expressions.parsing import parse
-from islands.io.models import model_from_json
 from islands.models.narx import Model, make_model
+from islands.persistence.models import model_from_json
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.model_form import SLOPE

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.io.records import read_record, write_record
+from islands.records.reading import read_record
+from islands.records.writer import write_record
 from islands.systems.example_records import EXAMPLE_RECORDS
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset, join
-from islands.data.split import Split
 from islands.errors import RecordError
+from islands.records.dataset import Dataset, join
+from islands.records.split import Split
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from islands.validation.assessment import MODES, PARTS, assess, average_errors
 from islands.validation.metrics import metrics

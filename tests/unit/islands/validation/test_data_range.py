@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset, join
-from islands.data.preprocessing import preprocess
+from islands.records.dataset import Dataset, join
+from islands.records.preprocessing import preprocess
 from islands.validation.data_range import DataRange, measure_range
 
 #: Range of 2 of the output and of 4 of the only input.

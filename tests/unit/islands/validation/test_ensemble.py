@@ -6,14 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.split import split
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import LEAST_SQUARES
 from islands.expressions.parsing import parse
 from islands.facade.fit import fit
 from islands.models.narx import make_model
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
+from islands.records.split import split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
 from islands.validation import ensemble as ensemble_module

@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.split import split
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import LEAST_SQUARES
 from islands.expressions.parsing import parse
 from islands.facade.identify import identify
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
+from islands.records.split import split
 from islands.simulation.predictors import free_run
 from islands.systems.example_records import EXAMPLE_RECORDS
 from islands.validation.ensemble import ValidatedModel, make_ensemble

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.split import Split
-from islands.io.result_folder import result_document
-from islands.io.result_text.statements import describe
+from islands.records.dataset import Dataset
+from islands.records.split import Split
+from islands.report.documents.result_folder import result_document
+from islands.report.text.statements import describe
 from islands.validation.linear_comparison import fit_linear_comparison, is_linear
 from islands.validation.metrics import Metrics
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.validation.physics import LEVELS, ClusterSum, check_physics, cluster_sums, hold_response
 

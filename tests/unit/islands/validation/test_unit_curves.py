@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, EnsembleStructure
 from islands.validation.unit_curves import Abscissa, trace_unit_curves

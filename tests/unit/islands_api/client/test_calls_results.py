@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from islands.export import EXPORTS
-from islands.io.models import model_from_json
+from islands.persistence.models import model_from_json
 from islands_api.client import ServiceError
 from islands_api.schemas import HistoryPage, ModelView
 from islands_service.coordinator.identification_job import run_identification_job

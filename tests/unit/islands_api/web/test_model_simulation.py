@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.io.models import model_json
+from islands.persistence.models import model_json
 from islands_api.model_simulation_schemas import SimulatedOutput, SimulationRequest
 from islands_api.web.model_simulation import (
     SimulatedModel,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 from islands_measurements.speed.workload import monomial, random_workload, tree
 
 WARM_UP, INTERVAL = 26, 20

@@ -11,10 +11,10 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify
-from islands.io.checkpoints import history_document
-from islands.io.records import read_record
-from islands.io.records.preview import preview
-from islands.io.result_folder import result_document
+from islands.persistence.checkpoints import history_document
+from islands.records.reading import read_record
+from islands.records.reading.preview import preview
+from islands.report.documents.result_folder import result_document
 from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import Job, Submission
 from islands_service.liveness import StopRequest

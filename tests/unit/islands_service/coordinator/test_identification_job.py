@@ -12,9 +12,9 @@ import pytest
 import structlog
 
 from islands.evolution.engine import SerialEngine
-from islands.io.records.preview import preview
-from islands.io.result_folder import result_document
-from islands.io.result_text.statements import describe
+from islands.records.reading.preview import preview
+from islands.report.documents.result_folder import result_document
+from islands.report.text.statements import describe
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job

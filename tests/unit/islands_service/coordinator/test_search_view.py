@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
@@ -22,6 +21,7 @@ from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands_service.coordinator.search_view import (
     MAX_CHARACTERS,

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.preview import CalibrationPreview, preview_calibration
 from islands.errors import ModelError
+from islands.records.dataset import Dataset
 from islands.simulators.fmu.fmi_description import read_description
 from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.io.records import read_dataset
-from islands.io.records.reading_options import ReadingOptions
+from islands.records.reading import read_dataset
+from islands.records.reading.options import ReadingOptions
 from islands_service.intake import confined_file
 from islands_service.intake.record_reading import (
     RecordRequest,

@@ -4,7 +4,6 @@ import re
 import textwrap
 from collections.abc import Iterable, Sequence
 
-from islands.data.segments import MAX_RANGE_AT_REST
 from islands.export.equations.c.language import (
     EQUATION_FUNCTIONS,
     HEAD,
@@ -16,6 +15,7 @@ from islands.export.equations.extended_system import ExtendedEquations
 from islands.export.equations.program import EquationProgram, map_function
 from islands.expressions.printing import render
 from islands.expressions.tree import Symbol
+from islands.records.segments import MAX_RANGE_AT_REST
 
 
 def c_equations(equations: ExtendedEquations) -> str:

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from islands.data.segments import MAX_RANGE_AT_REST
 from islands.export.equations.extended_system import ExtendedEquations
 from islands.export.equations.matlab.language import MATLAB, REAL
 from islands.export.equations.program import EquationProgram, map_function
 from islands.expressions.tree import Symbol
+from islands.records.segments import MAX_RANGE_AT_REST
 
 #: Names that the arguments of the function cannot have.
 _TAKEN = frozenset(("y", "p", "r", "s", "c", "in", "initial", "shape", "step", "middle"))

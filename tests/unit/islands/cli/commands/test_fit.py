@@ -7,8 +7,8 @@ import pytest
 from openpyxl import Workbook
 from typer.testing import CliRunner
 
-from islands.data.dataset import Dataset
-from islands.io.records.writer import write_record
+from islands.records.dataset import Dataset
+from islands.records.writer import write_record
 from islands_api.cli.app import app
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from islands_api.cli.app import app
 from support.monitored_oscillator import ONSET, SIMULATION, TRAINING, make_records
 

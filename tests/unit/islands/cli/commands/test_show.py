@@ -3,9 +3,9 @@
 import pytest
 
 from islands.expressions.parsing import parse
-from islands.io.models import write_model
-from islands.io.records import write_record
 from islands.models.narx import make_model
+from islands.persistence.models import write_model
+from islands.records.writer import write_record
 from support.searches import record
 from support.undrawn import undrawn_figures
 

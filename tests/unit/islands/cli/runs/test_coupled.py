@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.coupled_record import CoupledRecord
+from islands.records.coupled import CoupledRecord
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
 from support.command_line import fail, succeed

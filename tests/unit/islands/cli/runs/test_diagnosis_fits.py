@@ -8,13 +8,13 @@ import pytest
 
 from islands.cli.runs.diagnosis_fits import CONTINUE, FITS, explain_continuation, keep_fits, write_fits
 from islands.cli.stop_requests import REPEAT
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.fit_journal import FitJournal
-from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference.screening import StartFinder
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.parallel import ParallelMap
+from islands.records.dataset import Dataset
+from islands.report.documents.diagnosis_json import as_json, diagnosis_document
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave
 

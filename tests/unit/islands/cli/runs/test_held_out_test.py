@@ -5,9 +5,9 @@ import json
 import numpy as np
 
 from islands.cli.runs.held_out_test import evaluate_test
-from islands.data.dataset import Dataset
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from support.identify_runs import record
 

@@ -11,8 +11,8 @@ from islands.cli.runs.plan import parse_excitation
 from islands.diagnosis.planning import decisive_experiment, experiment_setup
 from islands.diagnosis.planning.planned_input import InputForm
 from islands.errors import SettingsError
-from islands.io.records import read_record
-from islands.io.records.writer import write_input
+from islands.records.reading import read_record
+from islands.records.writer import write_input
 from support.planned import DT, take_effects, wave
 
 COMMAND = ("diagnose", "--plan", "--input", "u_V", "--out", "plan", "--workers", 1)

@@ -7,7 +7,6 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.intersample_selection import (
     enlarge_step,
     get_discretisation,
@@ -23,6 +22,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.timing import DELAY
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, estimate_deviations
 from islands.diagnosis.calibration.preparation import make_target
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.python_function import PythonFunctionSimulator

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.preview import choose_stretch, preview_calibration
+from islands.records.dataset import Dataset
 from islands.simulators.specification.factory import make_simulator
 
 

@@ -5,12 +5,12 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.resolution import is_unresolved, measure_resolution
 from islands.diagnosis.inference.resolved_effects import may_be_zero
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
+from islands.records.dataset import Dataset
 from islands.simulators.recorded_output import RecordedOutput
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.calibration.smoothing_widths import narrow_friction, narrow_steps
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.effects.baseline import JUMP
 from islands.effects.friction import COULOMB_FRICTION
 from islands.facade.results.saved_simulation import SavedSimulation
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

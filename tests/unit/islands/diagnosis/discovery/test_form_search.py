@@ -8,14 +8,14 @@ import pytest
 import islands
 from islands.diagnosis import procedure
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.diagnosis.documents.extension_json import extended_document
-from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.filters import low_pass
 from islands.effects.free_forms import FREE_FORMS
 from islands.effects.interface.context import SimulationContext
-from islands.figures.form_values import draw_free_forms
 from islands.kernels.curve import PLACES
+from islands.report.documents.diagnosis_json import diagnosis_document
+from islands.report.documents.extension_json import extended_document
+from islands.report.figures.form_values import draw_free_forms
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands_measurements.detection.trial import Trial, run_trial

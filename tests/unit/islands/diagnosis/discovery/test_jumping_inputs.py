@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
@@ -24,6 +23,7 @@ from islands.effects.hysteresis import stick as stick_between_samples
 from islands.effects.interface.effect import Signal
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.kernels.memory_operators import play_from
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.output_equation import add_output_equation

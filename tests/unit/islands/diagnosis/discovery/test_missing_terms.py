@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
@@ -24,8 +23,6 @@ from islands.diagnosis.discovery.candidate_terms import (
 )
 from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
-from islands.diagnosis.documents.extension_json import extended_json
-from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose as diagnose_simulator
 from islands.diagnosis.result import Diagnosis
@@ -35,8 +32,11 @@ from islands.effects.interface.effect import Effect
 from islands.export.fmu.compiler import find_compiler
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.kernels.lagrange import interpolate_at
-from islands.reports.diagnosis import diagnosis_report
-from islands.reports.origin import Origin
+from islands.records.dataset import Dataset
+from islands.report.documents.diagnosis_json import diagnosis_document
+from islands.report.documents.extension_json import extended_json
+from islands.report.pages.diagnosis import diagnosis_report
+from islands.report.pages.origin import Origin
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample

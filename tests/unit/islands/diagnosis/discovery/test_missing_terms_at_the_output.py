@@ -9,15 +9,15 @@ import pytest
 import scipy
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
 from islands.export.extension import export_extended
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_json
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput

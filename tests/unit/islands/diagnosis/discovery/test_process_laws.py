@@ -9,16 +9,16 @@ import pytest
 import scipy
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.discovery.candidate_terms import list_candidate_terms, write_rate_size
 from islands.diagnosis.discovery.process_laws import describe_law
 from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
-from islands.diagnosis.documents.extension_json import extended_json
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_json
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.equations import OdeSpec

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.gross_errors.channel_admission import admit_channels
 from islands.effects.catalogue import CATALOGUE
+from islands.records.dataset import Dataset
+from islands.report.documents.diagnosis_json import diagnosis_document
 from support.simulated_records import recorded, wave
 
 RNG = np.random.default_rng(0)

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.gross_errors.channel_corrections import correct_swapped_channels
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
+from islands.records.dataset import Dataset
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator

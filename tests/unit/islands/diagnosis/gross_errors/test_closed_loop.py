@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.gross_errors.closed_loop import acts_at_once, measure_feedback
 from islands.diagnosis.inference.verdict import Verdict
+from islands.records.dataset import Dataset
 from support.simulated_records import recorded
 
 SAMPLES = 600

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.diagnosis.documents.result_json import as_json, diagnosis_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
-from islands.figures.diagnosis import DIAGNOSIS_FIGURES
+from islands.records.dataset import Dataset
+from islands.report.documents.diagnosis_json import as_json, diagnosis_document
+from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator

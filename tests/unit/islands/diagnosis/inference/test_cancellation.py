@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lsim
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.calibration.target import Target
@@ -23,6 +22,7 @@ from islands.diagnosis.inference.screening import bic_penalty
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput

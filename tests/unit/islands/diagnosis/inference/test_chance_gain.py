@@ -13,7 +13,7 @@ from islands.diagnosis.inference.screening import bic_penalty, screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
-from islands.estimation.noise_model import estimate_effective_samples
+from islands.records.noise_model import estimate_effective_samples
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.curve_ends import MAX_INCREASE, flatten_ends
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.effects.catalogue import CATALOGUE
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput

@@ -8,7 +8,6 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
@@ -16,6 +15,7 @@ from islands.diagnosis.gross_errors.closed_loop import acts_at_once
 from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_late_effects
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.output_equation import add_output_equation

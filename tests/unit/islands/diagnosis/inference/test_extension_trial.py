@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
@@ -24,6 +23,7 @@ from islands.diagnosis.inference.extension_trial import (
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
@@ -16,6 +15,7 @@ from islands.diagnosis.inference.jump_intervals import find_jump_intervals
 from islands.effects.hysteresis import STICTION, stick
 from islands.effects.interface.effect import Effect, Signal
 from islands.effects.quantiser import QUANTISED_INPUT
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.output_equation import add_output_equation

@@ -6,7 +6,6 @@ import cloudpickle
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.projection import Projection
 from islands.diagnosis.calibration.target import Target
@@ -15,6 +14,7 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.parallel import ParallelMap
 from islands.progress import ignore_progress
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.linear import LinearSimulator

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
@@ -23,6 +22,7 @@ from islands.diagnosis.inference.stepwise_search import MIN_GAIN, refine_by_swap
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

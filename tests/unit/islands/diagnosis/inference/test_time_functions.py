@@ -5,18 +5,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.split import hold_out
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.documents.result_json import diagnosis_document
 from islands.diagnosis.inference.time_functions import leave_out_contradicted_time
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
-from islands.io.result_text.diagnosis_statements import describe_details
+from islands.records.dataset import Dataset
+from islands.records.split import hold_out
+from islands.report.documents.diagnosis_json import diagnosis_document
+from islands.report.text.diagnosis_statements import describe_details
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.python_function import PythonFunctionSimulator

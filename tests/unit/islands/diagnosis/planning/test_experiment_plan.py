@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 import islands
-from islands.diagnosis.documents.plan_json import plan_document
-from islands.diagnosis.documents.plan_text import plan_text
-from islands.diagnosis.documents.result_json import as_json
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.planning import decisive_experiment
 from islands.diagnosis.planning.channel_noise import NoiseOrigin
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
-from islands.figures.separability import draw_separability
+from islands.report.documents.diagnosis_json import as_json
+from islands.report.documents.plan_json import plan_document
+from islands.report.figures.separability import draw_separability
+from islands.report.text.plan import plan_text
 from islands.simulators.recorded_output import RecordedOutput
 from support.planned import DT, amplifier, coloured_noise, input_record, take_effects, wave
 

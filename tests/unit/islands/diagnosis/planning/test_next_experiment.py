@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
-from islands.diagnosis.documents.experiment_json import (
+from islands.diagnosis.inference.screening import ScreenedEffect
+from islands.diagnosis.planning.next_experiment import NextExperiment, design_next_experiment
+from islands.effects.interface.effect import Signal
+from islands.records.dataset import Dataset
+from islands.report.documents.experiment_json import (
     describe_next_experiment,
     get_suggested_input,
     write_advice,
 )
-from islands.diagnosis.inference.screening import ScreenedEffect
-from islands.diagnosis.planning.next_experiment import NextExperiment, design_next_experiment
-from islands.effects.interface.effect import Signal
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.effects.interface.effect import Signal
 from islands.errors import RecordError
+from islands.records.dataset import Dataset
 from islands_measurements.detection.injection.noise import NOISES
 from support.planned import amplifier, input_record, wave
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from islands.data.segments import is_resting
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.channels import channel
 from islands.effects.filters import low_pass
@@ -20,6 +19,7 @@ from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.kernels.lagrange import interpolate_at
 from islands.kernels.memory_operators import lag_by_gap, lag_unevenly, limit_rate, play_from
+from islands.records.segments import is_resting
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.flat_extremes import SensorLimits
 from islands.errors import SettingsError
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.constraints.state_space import (
@@ -15,6 +14,7 @@ from islands.estimation.constraints.state_space import (
     take_system,
 )
 from islands.estimation.parameter_constraints import check_latent_constraints
+from islands.records.flat_extremes import SensorLimits
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 

@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import islands
-from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import make_selection_problem, select_forward
 from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.expressions.tree import Lagged
-from islands.io.result_folder import result_document
-from islands.io.result_text.summary_text import method_text
 from islands.models.candidate_library import candidates
 from islands.program.regressor_matrix import regressor_matrix
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import result_document
+from islands.report.text.summary import method_text
 from islands.simulation.predictors import multiple_shooting
 
 LAGS = 2

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.estimation.estimate import estimate
 from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
@@ -16,6 +15,7 @@ from islands.estimation.structure_selection.deviations import (
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.models.regressor import regressor
+from islands.records.dataset import Dataset
 
 STEPS = np.random.default_rng(3)
 U = np.repeat(STEPS.uniform(-1, 1, 100), 8) + 0.1 * STEPS.normal(size=800)

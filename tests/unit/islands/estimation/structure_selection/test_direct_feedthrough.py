@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
+from islands.records.dataset import Dataset
 
 
 def static(force, samples=2000, noise=0.02):

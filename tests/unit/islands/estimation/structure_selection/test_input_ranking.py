@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.structure_selection.input_ranking import rank_inputs, screen_candidates
 from islands.expressions.printing import plain
 from islands.models import candidate_library
 from islands.models.candidate_library import candidates
+from islands.records.dataset import Dataset
 
 #: Inputs of the records, of which the laws read two or one.
 INPUTS = 20

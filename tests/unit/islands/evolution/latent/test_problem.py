@@ -12,8 +12,8 @@ from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.latent.problem import make_latent_problem
 from islands.evolution.latent.selection import select_latent_elite
 from islands.evolution.presets import resolve_settings
-from islands.io.checkpoints.reading import archipelago_from_document
-from islands.io.checkpoints.writing import checkpoint_text
+from islands.persistence.checkpoints.reading import archipelago_from_document
+from islands.persistence.checkpoints.writing import checkpoint_text
 from islands.progress import Steps, never_stop
 from support.latent_systems import spring_record
 

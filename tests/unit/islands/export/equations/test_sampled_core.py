@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.input_lead import advance_all_inputs
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError
 from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler
-from islands.io.models import model_json
+from islands.persistence.models import model_json
+from islands.records.input_lead import advance_all_inputs
 from islands.simulation.predictors import free_run
 from islands.simulators.context import make_context
 from islands.simulators.ode.output_system import make_output_system

@@ -9,11 +9,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from islands_measurements.speed.compiled_c import compile_model

@@ -10,14 +10,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
-from islands.data.dataset import Dataset
 from islands.errors import ModelError, SettingsError
 from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
-from islands.io.models import model_json
 from islands.models.equations import mathml_equation
 from islands.models.regressor import Regressor
+from islands.persistence.models import model_json
+from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from support.programs import CASES, HOSTILE_NAMES, SAMPLES, bits, model, record, record_of

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.split import split
 from islands.errors import SettingsError
 from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
 from islands.facade.automatic.kind_choice import (
@@ -23,6 +21,8 @@ from islands.facade.library_fit import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import take_library
 from islands.progress import ignore_progress, never_stop
+from islands.records.dataset import Dataset
+from islands.records.split import split
 from support.assessments import with_changes
 from support.known_records import runaway
 from support.portfolio_records import KINDS as RECORDS

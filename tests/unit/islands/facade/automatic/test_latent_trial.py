@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.evolution.presets import resolve_latent
 from islands.facade.automatic import preset_choice
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.identify import identify_record
+from islands.records.dataset import Dataset
 from support.latent_systems import smooth_input
 
 SHORT = {"population": 6, "generations": 2, "migrate_every": 1}

@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.averaging import average_samples
-from islands.data.coupled_record import CoupledRecord
-from islands.data.dataset import join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.search_state import SearchState
 from islands.facade.coupled.identification import fit_coupled, identify_coupled
 from islands.facade.coupled.selection import measure_error
 from islands.facade.load import load
 from islands.facade.results.reader import read_result
-from islands.io.checkpoints import (
+from islands.persistence.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
     state_document,
     state_from_document,
 )
 from islands.progress import StoppedError
+from islands.records.averaging import average_samples
+from islands.records.coupled import CoupledRecord
+from islands.records.dataset import join
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.coupled_record import CoupledRecord
 from islands.errors import SettingsError
 from islands.facade.coupled.identification import StoppedCouplingError, fit_coupled, identify_coupled
-from islands.io.checkpoints import (
+from islands.models.coupled_latent import CoupledLatentModel
+from islands.persistence.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
     state_document,
     state_from_document,
 )
-from islands.models.coupled_latent import CoupledLatentModel
 from islands.progress import TimeLimit
+from islands.records.coupled import CoupledRecord
 from support.latent_systems import curves_record
 from support.undrawn import undrawn_figures
 

@@ -6,15 +6,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from islands.data.split import split
 from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.facade.results.model_simulation import SIMULATION_MODES
-from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.models.candidate_library import full_set
+from islands.persistence.checkpoints import read_checkpoint, write_checkpoint
+from islands.records.split import split
 from islands.validation.assessment import MODES
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics

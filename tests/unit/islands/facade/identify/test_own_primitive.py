@@ -10,9 +10,14 @@ import islands
 from islands.errors import ModelError, SettingsError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
-from islands.io.checkpoints import read_checkpoint, state_document, state_from_document, write_checkpoint
-from islands.io.result_folder import result_json
-from islands.io.result_text.summary_text import method_text
+from islands.persistence.checkpoints import (
+    read_checkpoint,
+    state_document,
+    state_from_document,
+    write_checkpoint,
+)
+from islands.report.documents.result_folder import result_json
+from islands.report.text.summary import method_text
 from support.own_primitive import DEAD_ZONE, LAW, SEARCH, record
 
 TABLE = PRIMITIVES | {"dead_zone": DEAD_ZONE}

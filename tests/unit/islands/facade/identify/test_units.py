@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
+from islands.records.dataset import Dataset
 
 CHANGES = {
     "preset": "narx",

@@ -5,13 +5,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
-from islands.data.split import split
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import LATENT
+from islands.records.dataset import Dataset
+from islands.records.split import split
 from islands.simulation.predictors import free_run
 from islands.systems import appendix
 from islands.validation.metrics import metrics

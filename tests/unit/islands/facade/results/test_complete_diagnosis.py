@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 import islands
 from islands.diagnosis.inference.verdict import Verdict
-from islands.io.records import write_record
 from islands.progress import Steps
+from islands.records.writer import write_record
 from support.command_line import succeed
 
 pytestmark = pytest.mark.ci

@@ -8,14 +8,14 @@ import pytest
 from scipy.signal import butter, lfilter
 
 import islands
-from islands.data.dataset import Dataset, join
-from islands.data.split import split
 from islands.errors import SettingsError
 from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.rate_selection import TrialLibrary
-from islands.io.models import model_from_json, model_json
-from islands.io.result_folder import result_json
+from islands.persistence.models import model_from_json, model_json
+from islands.records.dataset import Dataset, join
+from islands.records.split import split
+from islands.report.documents.result_folder import result_json
 from islands.systems.catalogue import make_record
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 5, "average": 1}

@@ -7,12 +7,12 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.data.averaging import average_samples
-from islands.data.dataset import Dataset, join
-from islands.data.split import average_split, split
 from islands.facade.trials.rate_selection import TrialLibrary, select_rate
-from islands.io.models import model_from_json, model_json
-from islands.io.result_folder import result_json, write_result
+from islands.persistence.models import model_from_json, model_json
+from islands.records.averaging import average_samples
+from islands.records.dataset import Dataset, join
+from islands.records.split import average_split, split
+from islands.report.documents.result_folder import result_json, write_result
 
 LIBRARY = {"library": "polynomial", "degree": 2, "max_terms": 4}
 TRIAL = TrialLibrary("polynomial", 2, 3, "none")

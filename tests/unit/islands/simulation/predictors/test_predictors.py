@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status
 from islands.simulation.predictors import (

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.averaging import average_samples
-from islands.data.coupled_record import CoupledRecord, match_coupled
-from islands.data.dataset import Dataset
-from islands.data.preprocessing import preprocess
-from islands.data.signal_map import match_rate
 from islands.errors import RecordError, SettingsError
 from islands.export import export
-from islands.io.models import read_coupled_model, write_model
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
+from islands.persistence.models import read_coupled_model, write_model
+from islands.records.averaging import average_samples
+from islands.records.coupled import CoupledRecord, match_coupled
+from islands.records.dataset import Dataset
+from islands.records.preprocessing import preprocess
+from islands.records.signal_map import match_rate
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record, simulate_scalar

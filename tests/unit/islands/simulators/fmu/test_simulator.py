@@ -11,17 +11,17 @@ import pytest
 from numpy.typing import NDArray
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.export import write_export
 from islands.export.fmu.compiler import find_compiler
-from islands.io.models import model_from_json
 from islands.models.narx import Model
+from islands.persistence.models import model_from_json
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.simulator import FmuSimulator

@@ -9,12 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
-from islands.diagnosis.documents.extension_json import extended_document
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
@@ -24,6 +22,8 @@ from islands.effects.interface.force import ForceLaw
 from islands.errors import ModelError
 from islands.export.closed_form import closed_form
 from islands.export.fmu.compiler import find_compiler
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.fmu.fmi_description import FmiVariable, read_description

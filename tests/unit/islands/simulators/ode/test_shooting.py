@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.ode.interval_simulation import IntervalSimulation

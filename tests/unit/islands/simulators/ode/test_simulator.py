@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 import islands
-from islands.data.dataset import Dataset
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, RecordError, SettingsError
+from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import BatchSimulator, SimulationRun, Simulator

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from islands.data.dataset import Dataset
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.documents.extension_json import extended_document, extended_json
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.export.extension import as_json
+from islands.records.dataset import Dataset
+from islands.report.documents.extension_json import extended_document, extended_json
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.ode.simulator import OdeSimulator

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
-from islands.data.preprocessing import preprocess
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.errors import RecordError
 from islands.expressions.parsing import parse
-from islands.io.models import model_json
 from islands.models.narx import make_model
+from islands.persistence.models import model_json
+from islands.records.dataset import Dataset
+from islands.records.preprocessing import preprocess
 from islands.simulation.predictors import free_run
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator

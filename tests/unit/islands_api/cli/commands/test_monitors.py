@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from islands.cli.watched_folder import hash_file
-from islands.diagnosis.documents.monitor_json import monitor_document
-from islands.diagnosis.documents.monitor_state import monitor_to_json
 from islands.facade.record_monitor import reject_record
+from islands.report.documents.monitor_json import monitor_document
+from islands.report.documents.monitor_state import monitor_to_json
 from islands_api.cli.service import client_options
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import MONITORING, JobOutcome, JobState, Submission

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import islands
-from islands.reports.saved_result import report_saved_result
+from islands.report.pages.saved_result import report_saved_result
 from islands_api.cli.commands import report as command
 from support.identifications import record
 

@@ -12,7 +12,7 @@ import structlog
 from islands.diagnosis.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.facade.explain_residual import FORMULA
-from islands.io.result_text.diagnosis_statements import describe_diagnosis, describe_headline
+from islands.report.text.diagnosis_statements import describe_diagnosis, describe_headline
 from islands_service.coordinator.diagnosis import job as diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document

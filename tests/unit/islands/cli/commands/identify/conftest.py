@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import pytest
 
 from islands.cli.runs import identify as command
-from islands.io.records import write_record
+from islands.records.writer import write_record
 from support.identify_runs import record
 from support.undrawn import undrawn_figures
 
@@ -19,8 +19,8 @@ def run(request, monkeypatch, command_line):
     """
     write_record(record(), "r.csv")
     if "with_figures" not in request.fixturenames:
-        monkeypatch.setattr("islands.figures.registry.model_figures", lambda _found, _model: ())
-        monkeypatch.setattr("islands.figures.registry.search_figures", lambda _findings: ())
+        monkeypatch.setattr("islands.report.figures.registry.model_figures", lambda _found, _model: ())
+        monkeypatch.setattr("islands.report.figures.registry.search_figures", lambda _findings: ())
 
     def call(*arguments):
         code, out, err = command_line("identify", *arguments)

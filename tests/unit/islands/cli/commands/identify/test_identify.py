@@ -8,9 +8,9 @@ from contextlib import contextmanager
 import pytest
 
 from islands.cli.runs import identify as command
-from islands.data.dataset import Dataset
-from islands.io.checkpoints import read_checkpoint, write_hall
-from islands.io.records import write_record
+from islands.persistence.checkpoints import read_checkpoint, write_hall
+from islands.records.dataset import Dataset
+from islands.records.writer import write_record
 from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused
 
 # Files of a run.

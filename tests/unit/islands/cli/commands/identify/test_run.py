@@ -15,8 +15,8 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.history import HistoryPoint
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
-from islands.io.checkpoints import read_checkpoint, state_document, write_checkpoint
-from islands.io.records import write_record
+from islands.persistence.checkpoints import read_checkpoint, state_document, write_checkpoint
+from islands.records.writer import write_record
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
 
 pytestmark = pytest.mark.ci

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Site
 from islands.effects.interface.map_equation import OPERATORS
@@ -17,6 +16,7 @@ from islands.export.equations.collection import CHANNEL_OPERATORS
 from islands.export.equations.matlab.operators import MATLAB_OPERATORS
 from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler
+from islands.records.dataset import Dataset
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system import OUTPUT
 from islands.simulators.ode.system_parts import OdeParameter

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Site
 from islands.export.extension import export_extended
+from islands.records.dataset import Dataset
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator

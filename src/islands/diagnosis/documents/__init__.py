@@ -1,1 +1,0 @@
-"""Results of a diagnosis, plans and states of monitoring as JSON, and as text for readers."""

@@ -1,4 +1,0 @@
-"""Reading and writing files: records, models, checkpoints and results.
-
-Start with `records` (measured data) and `models` (model files).
-"""

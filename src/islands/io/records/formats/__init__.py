@@ -1,1 +1,0 @@
-"""Readers of the file formats. Each one returns a `islands.io.records.table.Table`."""

@@ -1,1 +1,0 @@
-"""Text of a result for readers: the summary of the recommended model, and the method."""

@@ -1,0 +1,1 @@
+"""Files from which models, ensembles and searches are restored. Read `models` first."""

@@ -1,0 +1,174 @@
+"""Ensemble and prediction bands of a result as JSON values."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from islands.errors import ModelError
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.printing import plain
+from islands.expressions.tree import Primitive
+from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.narx import Model
+from islands.models.regressor import Regressor, regressor
+from islands.persistence.models import model_from_json, model_json, read_coupled
+from islands.validation.data_range import DataRange
+from islands.validation.ensemble import Ensemble, EnsembleStructure
+from islands.validation.prediction_bands import PredictionBands
+
+
+class StructureDocument(BaseModel):
+    """A structure of an ensemble: its weight, its terms or its model, and the parameters of its members.
+
+    ``law`` is the position of the structure with the same free run that this one counts as, if there is one.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    weight: Annotated[FiniteFloat, Field(gt=0, le=1)]
+    regressors: tuple[str, ...] = ()
+    model: dict[str, Any] | None = None
+    parameters: Annotated[tuple[tuple[FiniteFloat, ...], ...], Field(min_length=1)]
+    law: Annotated[int, Field(ge=0)] | None = None
+
+
+class RangeDocument(BaseModel):
+    """Range of the data outside of which bands widen, and how: see `DataRange`."""
+
+    model_config = ConfigDict(frozen=True)
+
+    output: tuple[FiniteFloat, FiniteFloat]
+    inputs: tuple[tuple[FiniteFloat, FiniteFloat], ...]
+    predictable: Annotated[FiniteFloat, Field(ge=0, le=1)]
+    memory: Annotated[FiniteFloat, Field(gt=0)]
+
+
+class BandsDocument(BaseModel):
+    """Width of the bands of a model: the noise, the median width, the factors by level, and the range."""
+
+    model_config = ConfigDict(frozen=True)
+
+    noise: Annotated[FiniteFloat, Field(ge=0)]
+    width: Annotated[FiniteFloat, Field(ge=0)]
+    levels: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
+    factors: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
+    coverage: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+    range: RangeDocument | None = None
+    independent_samples: Annotated[FiniteFloat, Field(gt=0)] | None = None
+
+
+def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
+    """Return the structures of an ensemble as JSON values, None for no ensemble."""
+    if ensemble is None:
+        return None
+    return [
+        {
+            "weight": each.weight,
+            **_structure_document(each.model),
+            "parameters": each.parameters.tolist(),
+            "law": each.law,
+        }
+        for each in ensemble.structures
+    ]
+
+
+def _structure_document(model: AnyModel) -> dict[str, Any]:
+    if isinstance(model, Model):
+        return {"regressors": [plain(item.expression, model.inputs) for item in model.regressors]}
+    return {"model": json.loads(model_json(model))}
+
+
+def ensemble_from_document(
+    document: Any, model: AnyModel, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> Ensemble | None:
+    """Return the ensemble of a document.
+
+    Parameters
+    ----------
+    document : list or None
+        Value made by `ensemble_document`.
+    model : DynamicModel or CoupledModel
+        A model of the result. It gives the names of the columns and the sampling time.
+    primitives : mapping
+        Primitives that expressions may contain.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    if document is None:
+        return None
+    try:
+        structures = [StructureDocument.model_validate(each) for each in document]
+        if any(each.law is not None and each.law >= len(structures) for each in structures):
+            raise ValueError("a structure has the law of one that is missing")
+        return Ensemble(tuple(_structure(each, model, primitives) for each in structures))
+    except (ModelError, TypeError, ValueError) as error:
+        raise ModelError(f"the ensemble of the result is damaged: {error}") from error
+
+
+def _structure(
+    document: StructureDocument, model: AnyModel, primitives: Mapping[str, Primitive]
+) -> EnsembleStructure:
+    parameters = np.array(document.parameters, dtype=np.float64)
+    found: AnyModel
+    if isinstance(model, Model):
+        terms = tuple(_regressor(text, primitives) for text in document.regressors)
+        found = replace(model, regressors=terms, theta=None, standard_errors=None)
+    elif isinstance(model, CoupledModel):
+        found = read_coupled(document.model or {}, "the ensemble", primitives)
+    else:
+        found = model_from_json(json.dumps(document.model), "the ensemble")
+    if parameters.shape[1] != found.size:
+        raise ValueError(f"{parameters.shape[1]} parameters for {found.size} terms")
+    return EnsembleStructure(found, document.weight, parameters, document.law)
+
+
+def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:
+    factor, item = regressor(parse(text, primitives))
+    if item is None or factor != 1.0:
+        raise ModelError(f"{text!r} is not a canonical term")
+    return item
+
+
+def bands_document(bands: PredictionBands | None) -> dict[str, Any] | None:
+    """Return the width of the bands of a model as JSON values, None for no bands."""
+    if bands is None:
+        return None
+    return {
+        "noise": bands.noise,
+        "width": bands.width,
+        "levels": list(bands.factors),
+        "factors": list(bands.factors.values()),
+        "coverage": bands.coverage,
+        "range": None if bands.data_range is None else asdict(bands.data_range),
+        "independent_samples": bands.independent_samples,
+    }
+
+
+def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionBands | None:
+    """Return the bands of a document and an ensemble; None if one of them is None.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    if document is None or ensemble is None:
+        return None
+    try:
+        found = BandsDocument.model_validate(document)
+        factors = dict(zip(found.levels, found.factors, strict=True))
+        data_range = None if found.range is None else DataRange(**found.range.model_dump())
+        return PredictionBands(
+            *(ensemble, found.noise, found.width, factors, found.coverage, data_range),
+            found.independent_samples,
+        )
+    except ValueError as error:
+        raise ModelError(f"the bands of the result are damaged: {error}") from error

@@ -1,0 +1,203 @@
+"""Files of models: JSON with a tag of the class, and the table of classes. Equal models give equal files."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from islands.errors import ModelError, lookup
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Primitive
+from islands.models.coupled_latent import CoupledLatentModel
+from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.latent import LatentModel
+from islands.models.narx import Model, require_narx
+from islands.models.parametric import ParametricModel
+from islands.models.protocol import DynamicModel, no_model_error
+from islands.persistence.narx_documents import SCHEMA, narx_json, read_narx
+from islands.persistence.result_models import read_preprocessing
+
+#: Schema of models of several outputs.
+COUPLED_SCHEMA = "islands.coupled-model/1"
+
+#: Tag of NARX models.
+NARX = Model.kind
+
+_CLASSES: dict[str, type[ParametricModel]] = {LatentModel.kind: LatentModel}
+
+#: Classes of models by tag that `fit` estimates by the error of the free run; NARX models are selected from a
+#: library or evolved.
+MODEL_CLASSES: Mapping[str, type[ParametricModel]] = MappingProxyType(_CLASSES)
+
+
+def model_json(model: AnyModel) -> str:
+    """Return a model as JSON text.
+
+    Raises
+    ------
+    ModelError
+        A number of the model is not finite; JSON cannot represent it.
+    """
+    match model:
+        case Model():
+            return narx_json(model)
+        case CoupledModel():
+            models = [json.loads(model_json(single)) for single in model.models]
+            coupled = {"schema": COUPLED_SCHEMA, **model.document(), "models": models}
+            return json.dumps(coupled, indent=2) + "\n"
+    document = {"schema": SCHEMA, "kind": model.kind, **model.document()}
+    try:
+        return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    except ValueError as error:
+        raise ModelError(f"the model cannot be written: {error}") from error
+
+
+def terms_document(model: AnyModel) -> list[dict[str, Any]]:
+    """Return the parameters of a model in the form of ``result.json``; a regressor is a term or a name."""
+    if isinstance(model, Model):
+        return list(model.document()["terms"])
+    errors = model.standard_errors or (None,) * model.size
+    return [
+        {"regressor": name, "parameter": parameter, "standard_error": error}
+        for name, parameter, error in zip(model.parameter_names, model.parameters, errors, strict=True)
+    ]
+
+
+def write_model(model: AnyModel, path: str | Path) -> None:
+    """Write a model file.
+
+    Raises
+    ------
+    ModelError
+        It is no model, a number of it is not finite, or the file cannot be written.
+    """
+    if not isinstance(model, Model | CoupledModel | ParametricModel):
+        raise no_model_error(model, ", or save the result by result.save(folder)")
+    text = model_json(model)
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"cannot write the model file {path}: {error.strerror}") from error
+
+
+def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> DynamicModel:
+    """Read a file of a model of one output.
+
+    Parameters
+    ----------
+    primitives : mapping
+        Primitives that expressions may contain; add your own with ``PRIMITIVES | {mine.name: mine}``.
+
+    Raises
+    ------
+    ModelError
+        The file does not exist or is not a model file. The message names the invalid field.
+    """
+    model = model_from_json(_read_text(path), str(path), primitives)
+    if isinstance(model, Model) and not model.preprocessing:
+        # Earlier versions wrote the preprocessing to result.json alone.
+        return replace(model, preprocessing=read_preprocessing(path))
+    return model
+
+
+def model_from_json(
+    text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> DynamicModel:
+    """Parse the text of a file of a model of one output. ``name`` is the name of the file in error messages.
+
+    Raises
+    ------
+    ModelError
+        As in `read_model`.
+    """
+    try:
+        document = json.loads(text)
+    except ValueError:
+        document = None  # reported as a damaged document of a NARX model
+    if isinstance(document, dict) and "kind" in document:
+        return lookup(MODEL_CLASSES, str(document["kind"]), f"class of models of {name}").read(document, name)
+    return read_narx(text, name, primitives)
+
+
+def read_validated_model(entry: Mapping[str, Any], model: DynamicModel) -> DynamicModel:
+    """Return the model that the errors of an entry of ``result.json`` belong to.
+
+    Parameters
+    ----------
+    entry : mapping
+    model : DynamicModel
+        Model of the entry. Its parameters are others if they were estimated again on all data.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    found = (entry.get("refit") or {}).get("validated_model")
+    return model if found is None else model_from_json(json.dumps(found), "the validated model of the result")
+
+
+def any_model_from_json(
+    text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> AnyModel:
+    """Parse the text of a file of a model of one or several outputs; see `model_from_json`."""
+    try:
+        document = json.loads(text)
+    except ValueError:
+        document = None
+    if isinstance(document, dict) and document.get("schema") == COUPLED_SCHEMA:
+        return read_coupled(document, name, primitives)
+    return model_from_json(text, name, primitives)
+
+
+def read_coupled(
+    document: Mapping[str, Any], name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> CoupledModel:
+    """Read the JSON values of a model of several outputs; see `model_from_json`."""
+    entries = document.get("models")
+    if not isinstance(entries, list):
+        raise ModelError(f"{name}: models: there is no list of models")
+    models = tuple(
+        model_from_json(json.dumps(entry), f"{name}: models.{place}", primitives)
+        for place, entry in enumerate(entries)
+    )
+    latent = tuple(model for model in models if isinstance(model, LatentModel))
+    return CoupledLatentModel(latent) if latent and len(latent) == len(models) else CoupledModel(models)
+
+
+def narx_from_json(text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:
+    """Parse the text of a NARX model of one output; other models raise `ModelError`."""
+    return require_narx(model_from_json(text, name, primitives))
+
+
+def read_coupled_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> CoupledModel:
+    """Read the file of a model of several outputs, or ``model.json`` of a result folder.
+
+    Parameters
+    ----------
+    primitives : mapping
+        As in `read_model`.
+
+    Raises
+    ------
+    ModelError
+        The file does not exist or is not a model of several outputs. The message names the invalid field.
+    """
+    file = Path(path)
+    file = file / "model.json" if file.is_dir() else file
+    try:
+        document = json.loads(_read_text(file))
+    except ValueError as error:
+        raise ModelError(f"cannot read the model file {file}: {error}") from error
+    if not isinstance(document, dict) or document.get("schema") != COUPLED_SCHEMA:
+        raise ModelError(f"{file} is not a coupled model of schema {COUPLED_SCHEMA}")
+    return read_coupled(document, str(file), primitives)
+
+
+def _read_text(path: str | Path) -> str:
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"cannot read the model file {path}: {error}") from error

@@ -1,0 +1,1 @@
+"""Results for readers: JSON documents, sentences, figures and HTML pages."""

@@ -1,0 +1,368 @@
+"""Result folder: ``result.json``, one file per model, and a text summary."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import partial
+from math import isfinite
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from islands.errors import RecordError
+from islands.estimation.estimator_table import Criterion
+from islands.evolution.search_result import SearchResult, state_steps, without_optional_steps
+from islands.models.coupled_narx import AnyModel
+from islands.models.equations import name_gains, named_signals, named_statement
+from islands.models.latent import LatentModel
+from islands.models.narx import Model
+from islands.models.parametric import ParametricModel
+from islands.models.protocol import DynamicModel
+from islands.models.signal_statement import describe_signals
+from islands.parallel import map_over_record
+from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.ensembles import bands_document, ensemble_document
+from islands.persistence.models import model_json, terms_document, write_model
+from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.records.flat_extremes import find_limits
+from islands.records.inspection.noise import measure_output_noise
+from islands.records.split import measure_input_ranges
+from islands.report.text.certificates import certificates_document
+from islands.report.text.summary import method_text, summary
+from islands.simulation.predictors import free_run
+from islands.validation.assessment import PARTS, Assessment
+from islands.validation.ensemble import Ensemble
+from islands.validation.physics import PhysicsChecks
+from islands.validation.predictable_residual import ResidualStructure
+from islands.validation.residual_tests import ResidualTests
+
+SCHEMA = "islands.result/1"
+
+
+def result_json(found: SearchResult) -> str:
+    """Return the text of ``result.json``."""
+    return _write_json(result_document(found))
+
+
+def _write_json(document: Mapping[str, Any]) -> str:
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def result_document(found: SearchResult) -> dict[str, Any]:
+    """Return a result as JSON values; NaN and infinity become null."""
+    # The checks of a model are made when they are first read.
+    list(map_over_record(attrgetter("final_physics", "residual_tests"), found.models, found.record.samples))
+    steps = Steps()
+    data = steps.attempt("facts about the data", partial(_data_document, found)) or {}
+    search, recommendation = found.search, found.recommendation
+    document = {
+        "schema": SCHEMA,
+        "record": record_document(found.record),
+        "preprocessing": {
+            "average": found.average,
+            "dt": found.split.estimation.dt,
+            "feedthrough": list(found.direct_inputs),
+            "shooting_interval": found.shooting_interval,
+            "steps": None if found.record.preprocessing is None else found.record.preprocessing.as_document(),
+        },
+        "seed": found.seed,
+        "settings": dict(found.settings),
+        "search": {
+            "evaluations": search.evaluations,
+            "evaluations_per_second": search.evaluations_per_second,
+            "wall_s": search.wall_s,
+            "outcomes": dict(search.outcomes),
+            "full_set": dict(search.full_set),
+            "generations": search.generations,
+            "ended_by": search.ended_by,
+            "left_out": list(search.left_out),
+            "duplicates": search.duplicates,
+            "feasible_share": search.feasible_share,
+            "certificates": certificates_document(found),
+            "caches": {
+                name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
+            },
+        },
+        "not_computed": _list_not_computed(state_steps(found, steps)),
+        "data": data,
+        "loop": found.has_loop,
+        "recommended": asdict(recommendation),
+        "models": [
+            _model_document(rank, entry, rank == recommendation.rank, found.ensemble)
+            for rank, entry in enumerate(found.models, start=1)
+        ],
+        "ensemble": ensemble_document(found.ensemble),
+        "linear": None if found.linear is None else _comparison_document(found.linear),
+    }
+    described: dict[str, Any] = finite(document)
+    return described
+
+
+def _list_not_computed(found: SearchResult) -> list[dict[str, str]]:
+    """Return the optional steps that failed, and the checks of models that did, each with the reason."""
+    steps = dict(found.search.not_computed)
+    failures = {
+        "physics checks": [entry.final_physics.not_computed for entry in found.models],
+        "residual tests": [entry.residual_structure.not_computed for entry in found.models],
+    }
+    for name, reasons in failures.items():
+        for reason in dict.fromkeys(filter(None, reasons)):
+            ranks = [str(rank) for rank, each in enumerate(reasons, start=1) if each == reason]
+            models = "" if len(ranks) == len(reasons) else f" of model {', '.join(ranks)}"
+            steps[name + models] = reason
+    return list_failures(steps)
+
+
+def list_failures(not_computed: Mapping[str, str]) -> list[dict[str, str]]:
+    """Return the steps that failed, each with the reason, as JSON values."""
+    return [{"step": step, "reason": reason} for step, reason in not_computed.items()]
+
+
+def record_document(record: Dataset) -> dict[str, Any]:
+    """Return the description of a record as JSON values."""
+    return {
+        "sha256": record.sha256 or content_sha256(record),
+        "samples": record.samples,
+        "dt": record.dt,
+        "start": record.start,
+        "names": {"inputs": list(record.input_names), "output": record.output_name},
+        "units": {"inputs": list(record.input_units), "output": record.output_unit},
+        "segments": list(record.segments),
+        "recordings": list(record.recordings),
+        "reading": list(record.reading),
+    }
+
+
+def _data_document(found: SearchResult) -> dict[str, Any]:
+    """Return the facts about the data that the statements about a result read."""
+    parts = {"estimation": found.split.estimation, "validation": found.split.validation}
+    return {
+        "missing_outputs": int(np.isnan(found.record.y).sum()),
+        "left_out": _measure_left_out(found),
+        "output_range": found.record.output_range,
+        "output_limits": list(find_limits(found.record.y, found.record.bounds)),
+        "noise": measure_output_noise(found.split.estimation),
+        "inputs": {part: measure_input_ranges(record) for part, record in parts.items()},
+    }
+
+
+def _measure_left_out(found: SearchResult) -> dict[str, Any] | None:
+    """Return the error of the recommended model over all samples without and with those that are left out.
+
+    None if no sample is left out, if the model has means of samples, or if its free run has no start or
+    diverges.
+    """
+    record, model = found.record, found.models[found.recommendation.rank - 1].model
+    if not record.left_out or found.average != 1:
+        return None
+    try:
+        run = free_run(model, record).y
+    except RecordError:  # an output is missing in a warm-up
+        return None
+    places, values = zip(*record.left_out, strict=True)
+    errors, others = record.y - run, np.array(values) - run[list(places)]
+    errors, others = errors[np.isfinite(errors)], others[np.isfinite(others)]
+    if not errors.size or not others.size:
+        return None
+    every = np.concatenate([errors, others])
+    with np.errstate(over="ignore"):
+        without, together = (float(np.sqrt(np.mean(each**2))) for each in (errors, every))
+    return {"samples": others.size, "rmse": without, "rmse_with": together}
+
+
+def content_sha256(record: Dataset) -> str:
+    """Return the SHA-256 of the samples, sampling time and segments, for records not read from a file."""
+    digest = hashlib.sha256(np.ascontiguousarray(record.u).tobytes())
+    digest.update(record.y.tobytes())
+    digest.update(repr((record.dt, record.segments)).encode())
+    return digest.hexdigest()
+
+
+def _model_document(
+    rank: int, assessment: Assessment, recommended: bool, ensemble: Ensemble | None
+) -> dict[str, Any]:
+    model, written = assessment.final_model, assessment.final_model.equation()
+    return {
+        **({} if isinstance(model, Model) else {"kind": model.kind}),
+        "rank": rank,
+        "recommended": recommended,
+        "size": model.size,
+        "equation": written.line,
+        "latex": written.latex,
+        "signals": describe_signals(model),
+        "named_equation": written.named,
+        "named_signals": named_signals(model),
+        "terms": terms_in_result(model, ensemble),
+        **({"quantities": model.list_quantities()} if isinstance(model, LatentModel) else {}),
+        "bands": bands_document(assessment.bands),
+        "recordings": {
+            part: {name: asdict(value) for name, value in by_name.items()}
+            for part, by_name in assessment.recordings.items()
+        },
+        "warm_up": assessment.warm_up,
+        "estimated_start": assessment.has_estimated_start,
+        "refit": _refit_document(assessment),
+        "information": asdict(assessment.information),
+        "constraints": [
+            {**asdict(entry), "named": _name_statement(entry.text, model)}
+            for entry in assessment.final_constraints
+        ],
+        **_assessment_document(assessment),
+    }
+
+
+def _name_statement(text: str, model: DynamicModel) -> str:
+    return named_statement(text, model) if isinstance(model, Model) else name_gains(text, model)
+
+
+def _refit_document(assessment: Assessment) -> dict[str, Any] | None:
+    """Return the estimate on all data as JSON values, with the model that the errors belong to."""
+    refit = assessment.refit
+    if refit is None:
+        return None
+    return {
+        "samples": refit.samples,
+        "discarded": refit.discarded or None,
+        "validated_model": None if refit.discarded else json.loads(model_json(assessment.model)),
+    }
+
+
+def _comparison_document(assessment: Assessment) -> dict[str, Any]:
+    """Return the linear model with which the models are compared as JSON values."""
+    written = assessment.model.equation()
+    return {
+        "size": assessment.model.size,
+        "equation": written.line,
+        "named_equation": written.named,
+        "model": json.loads(model_json(assessment.model)),
+        **_assessment_document(assessment),
+    }
+
+
+def _assessment_document(assessment: Assessment) -> dict[str, Any]:
+    return {
+        "criterion": criterion_document(assessment.criterion),
+        "metrics": {
+            part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
+        },
+        "outcomes": {
+            part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
+        },
+        "physics": physics_document(assessment.final_physics),
+        "residual_tests": residual_tests_document(assessment.residual_tests)
+        | residual_structure_document(assessment.residual_structure),
+    }
+
+
+def criterion_document(criterion: Criterion | None) -> dict[str, Any] | None:
+    """Return the error that the parameters of a model minimise as JSON values; null if they are given."""
+    return None if criterion is None else {**asdict(criterion), "error": criterion.error}
+
+
+def terms_in_result(model: AnyModel, ensemble: Ensemble | None) -> list[dict[str, Any]]:
+    """Return the terms of a model as JSON values, with their text for readers and their inclusion.
+
+    Parameters with names have no inclusion: a name has another meaning in another structure.
+    """
+    texts = zip(terms_document(model), model.equation().terms, model.parameter_names, strict=True)
+    counted = None if isinstance(model, ParametricModel) else ensemble
+    return [
+        {**term, "term": text, "inclusion": None if counted is None else counted.inclusion(name)}
+        for term, text, name in texts
+    ]
+
+
+def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
+    """Return the results of the physics checks as JSON values."""
+    return {
+        "property_1": physics.property_1,
+        "clusters": [asdict(entry) for entry in physics.clusters],
+        "hold_drift_percent": physics.hold_drift_percent,
+        "holds": [asdict(entry) for entry in physics.holds],
+        "excursions": [asdict(entry) for entry in physics.excursions],
+        "not_computed": physics.not_computed or None,
+        "extremes": [{**asdict(entry), "plausible": entry.plausible} for entry in physics.extremes],
+    }
+
+
+def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
+    """Return the results of the residual tests as JSON values."""
+    return {
+        "passed": tests.passed,
+        "whiteness_p": tests.whiteness_p,
+        "ljung_box": tests.ljung_box,
+        "tests": [
+            {
+                "name": test.name,
+                "input": test.input,
+                "passed": test.passed,
+                "inside_percent": test.inside_percent,
+                "limit": test.limit,
+                "largest": float(
+                    np.abs(test.values[test.lags != 0] if test.name == "xi_xi" else test.values).max()
+                ),
+                "note": test.note,
+            }
+            for test in tests.tests
+        ],
+    }
+
+
+def residual_structure_document(structure: ResidualStructure) -> dict[str, Any]:
+    """Return the predictable shares of the residuals and the verdict as JSON values."""
+    return {
+        "verdict": structure.verdict,
+        "predictable_share": {
+            "one_step_ahead": structure.one_step_share,
+            "free_run": structure.free_run_share,
+        },
+        "predictable_percent": structure.percent,
+        "not_computed": structure.not_computed or None,
+    }
+
+
+def write_result(found: SearchResult, folder: Path) -> None:
+    """Write ``models/NN.json``, ``summary.txt``, ``method.txt`` and, last, ``result.json``.
+
+    Remove the model files of an earlier result in the same folder. A text that fails is an optional step.
+    """
+    models = folder / "models"
+    models.mkdir(parents=True, exist_ok=True)
+    for rank, entry in enumerate(found.models, start=1):
+        write_model(entry.final_model, models / f"{rank:02d}.json")
+    for path in models.glob("[0-9][0-9]*.json"):
+        if int(path.stem) > len(found.models):
+            path.unlink()
+    steps = Steps()
+    document, best = result_document(found), found.recommended.final_model
+    texts = {
+        "summary.txt": partial(summary, document, best),
+        "method.txt": partial(method_text, found),
+    }
+    for name, write in texts.items():
+        text = steps.attempt(name, write)
+        if text is None:
+            text = f"{best.equation().line}\n\nNot computed: {name}: {steps.not_computed[name]}.\n"
+        (folder / name).write_text(text, encoding="utf-8")
+    document["not_computed"] += list_failures(steps.not_computed)
+    replace_file([_write_json(document).encode()], folder / "result.json")
+
+
+def write_interim_result(found: SearchResult, folder: Path) -> None:
+    """Write a result before its optional steps, so that the end of the process loses none of its models."""
+    write_result(without_optional_steps(found, "the command ended before this step"), folder)
+
+
+def finite(value: Any) -> Any:
+    """Return JSON values with null in place of NaN and infinity."""
+    if isinstance(value, np.generic):
+        return finite(value.item())
+    if isinstance(value, Mapping):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value

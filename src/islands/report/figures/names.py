@@ -1,0 +1,56 @@
+"""Names of the figures of a result.
+
+They are apart from the functions that draw them: the import of matplotlib would delay every command and every
+start of the service.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from islands.errors import SettingsError
+
+FREE_RUN = "free-run"
+
+#: The figure of a model that needs a loop.
+LOOP = "loop"
+
+#: The figure of a latent model that needs units.
+CURVES = "curves"
+
+#: Figures of a latent model: block diagram, curves of the units, frequency response of the linear part.
+LATENT_FIGURES = ("structure", CURVES, "bode")
+
+#: Figures of a model on its data; see `islands.report.figures.availability`.
+MODEL_FIGURES = (FREE_RUN, *LATENT_FIGURES, LOOP, "hold", "residuals")
+
+#: Figures of a search: ``convergence`` of an evolution, ``islands`` of several islands.
+SEARCH_FIGURES = ("record", "front", "convergence", "islands")
+
+#: Least number of islands of the searches that have a figure; others have it always.
+LEAST_ISLANDS: Mapping[str, int] = MappingProxyType({"convergence": 1, "islands": 2})
+
+#: Responses of a model; of a model with several equilibria, as of hysteresis, there are none.
+RESPONSES = ("characteristic", "step-response")
+
+ALL_FIGURES = (*MODEL_FIGURES, *SEARCH_FIGURES, *RESPONSES)
+
+#: The figure of a result that is drawn by default: measured output, free run with its band, and residual.
+OVERVIEW = (FREE_RUN,)
+
+
+def parse_figures(text: str) -> tuple[str, ...]:
+    """Return the figures that a text names: names separated by commas, ``all`` or ``none``.
+
+    Raises
+    ------
+    SettingsError
+        There is no figure of a name.
+    """
+    if text in ("all", "none"):
+        return ALL_FIGURES if text == "all" else ()
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in ALL_FIGURES:
+            known = ", ".join((*ALL_FIGURES, "all", "none"))
+            raise SettingsError(f"there is no figure {name!r}: take one or several of {known}")
+    return tuple(dict.fromkeys(names))

@@ -1,0 +1,1 @@
+"""Text for a terminal about results, diagnoses, inspections, plans and monitors."""

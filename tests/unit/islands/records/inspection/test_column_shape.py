@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+from islands.records.inspection.column_shape import (
+    find_computed,
+    is_derived,
+    is_feedback,
+    is_label,
+    is_product,
+    is_total,
+    measure_command,
+    measure_noise_level,
+    measure_precedence,
+    measure_roughness,
+)
+from support.known_records import lag, steps, white
+
+
+def test_commands_are_held_or_have_few_levels():
+    binary = np.random.default_rng(0).integers(0, 2, 1000) * 12.0
+    assert measure_command(binary) == 1.0
+    assert measure_command(steps(1000, 0)) > 0.8
+    assert measure_command(white(1000, 0)) == 0.0
+    assert measure_command(np.full(100, 3.0)) == 0.0
+
+
+def test_a_coarse_sensor_is_not_a_command():
+    temperature = np.round(20.0 + 5.0 * np.sin(np.arange(2000) / 300), 1)
+    assert np.mean(np.diff(temperature) == 0.0) > 0.8
+    assert measure_command(temperature) < 0.2
+
+
+def test_the_noise_level_is_that_of_added_noise():
+    smooth = np.sin(np.arange(4000) / 50)
+    noisy = smooth + 0.01 * smooth.std() * white(4000, 0)
+    assert measure_noise_level(noisy) == pytest.approx(-2.0, abs=0.1)
+    assert measure_noise_level(smooth) < -3.9
+
+
+def test_a_response_is_smoother_and_follows():
+    u = white(1000, 0)
+    y = lag(u, 10.0)
+    assert measure_roughness(y) < measure_roughness(u) - 0.3
+    assert measure_precedence(u, y) > 0.3
+    assert measure_precedence(u, y) == pytest.approx(-measure_precedence(y, u))
+
+
+@pytest.mark.parametrize("differentiate", [np.gradient, lambda y: np.diff(y, prepend=y[0])])
+def test_a_derivative_is_recognised(differentiate):
+    y = lag(steps(1000, 0), 20.0) + 0.01 * white(1000, 1)
+    assert is_derived(differentiate(y), y)
+    assert not is_derived(steps(1000, 0), y)
+    assert not is_derived(2.0 * y + 1.0, y)
+
+
+def test_a_total_of_one_sign_is_recognised():
+    current = steps(1000, 0) + 0.01 * white(1000, 1)
+    voltage = 3.5 + 0.1 * current
+    for sign in (1.0, -1.0):
+        charge = np.cumsum(np.maximum(sign * current, 0.0))
+        assert is_total(charge, current)
+        assert is_total(np.cumsum(np.maximum(sign * current * voltage, 0.0)), current)
+        assert not is_total(current, charge)
+    assert not is_total(np.cumsum(current), current)
+    assert not is_total(np.cumsum(np.maximum(white(1000, 2), 0.0)), current)
+
+
+def test_columns_of_a_controller_determine_each_other():
+    set_point, measured = steps(800, 0, 40), lag(steps(800, 0, 40), 20.0) + 0.01 * white(800, 1)
+    error = set_point - measured
+    manipulated = np.clip(2.0 * error + 0.1 * np.cumsum(error), -1.0, 1.0)
+    loop = np.array([set_point, manipulated, measured])
+    assert find_computed(loop) == (0, 1, 2)
+    assert find_computed(np.array([set_point, manipulated + 0.01 * white(800, 2), measured])) == ()
+
+
+def test_a_controller_with_rounded_columns_is_a_feedback_and_a_response_is_none():
+    set_point = steps(800, 0, 40)
+    measured = np.round(lag(set_point, 20.0) + 0.01 * white(800, 1), 2)
+    assert is_feedback(np.round(20.0 * (set_point - measured)), set_point, measured)
+    assert not is_feedback(2.0 * lag(set_point, 9.0), set_point, measured)
+    assert not is_feedback(white(800, 3), set_point, measured)
+
+
+def test_a_step_number_is_a_label_of_the_current():
+    current = np.round(4.0 * steps(2000, 0)) / 4.0
+    step = 1.0 + (current > 0.1) + 2.0 * (current < -0.6)
+    measured = current + 1e-3 * white(2000, 1)
+    assert is_label(step, measured)
+    assert not is_label(measured, step)
+
+
+def test_a_switched_command_is_no_label_of_its_response():
+    command = (steps(2000, 0) > 0.0).astype(float)
+    assert not is_label(command, command * 12.0 + 1e-3 * white(2000, 1))
+    assert not is_label(command, lag(command, 10.0))
+    slow = lag(white(2000, 2), 50.0)
+    assert not is_label((slow < 0.0).astype(float), slow)
+
+
+def test_a_power_is_the_product_of_voltage_and_current():
+    current = steps(2000, 0)
+    voltage = 3.7 + 0.1 * lag(current, 10.0)
+    power = np.round(voltage * current, 3)
+    assert is_product(power, voltage + 1e-3 * white(2000, 1), current)
+    assert not is_product(voltage, power, current)
+    assert not is_product(lag(power, 5.0), voltage, current)
+    assert not is_product(1.001 * current, np.ones(2000) + 1e-3 * white(2000, 2), current)

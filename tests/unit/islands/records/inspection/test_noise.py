@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from islands.records.dataset import Dataset
+from islands.records.inspection.channel import channels
+from islands.records.inspection.noise import measure_noise
+from islands.records.inspection.quantisation import find_quantisation
+from support.known_records import lag, measure, slow, steps, white
+
+
+def measure_output_noise(record):
+    channel = channels(record)[-1]
+    return measure_noise(channel, record, find_quantisation(channel))
+
+
+@pytest.mark.parametrize("level", [0.002, 0.02, 0.2])
+def test_level_is_found_within_20_percent(level):
+    for seed in range(5):
+        for u in (slow(3000, seed), np.sin(0.02 * np.arange(3000))):
+            y = lag(u, 30.0) / lag(u, 30.0).std()
+            fact = measure_output_noise(Dataset(u, y + level * white(3000, [seed, 7]), 1.0))
+            assert fact.value == pytest.approx(level, rel=0.2)
+            assert fact.interval[0] <= fact.value <= fact.interval[1]
+
+
+def test_steps_of_a_response_are_not_noise():
+    for seed in range(5):
+        u = steps(3000, seed)
+        y = lag(lag(u, 10.0), 10.0)
+        fact = measure_output_noise(measure(u, y / y.std(), 0.01, seed))
+        assert fact.value == pytest.approx(0.01, rel=0.2)
+
+
+def test_fast_signal_has_an_upper_bound_only():
+    u = white(3000, 0)
+    y = lag(u, 3.0) / lag(u, 3.0).std()
+    fact = measure_output_noise(measure(u, y, 0.01))
+    assert fact.value is None
+    assert "at most" in fact.sentence
+
+
+def test_noise_below_the_quantisation_step_is_not_stated():
+    u = slow(3000, 0)
+    y = np.round(u / u.std() + 1e-4 * white(3000, 1), 2)
+    fact = measure_output_noise(Dataset(u, y, 1.0))
+    assert fact.value is None
+    assert "below its quantisation step" in fact.sentence
+
+
+def test_interval_contains_the_level_of_most_records():
+    hits = 0
+    for seed in range(20):
+        u = slow(2000, seed)
+        fact = measure_output_noise(measure(u, u, 0.05, seed))
+        hits += fact.interval[0] <= 0.05 * u.std() <= fact.interval[1]
+    assert hits >= 16
+
+
+def test_rounding_is_not_noise():
+    u = np.sin(0.02 * np.arange(3000))
+    assert "no visible noise" in measure_output_noise(Dataset(u, 5.0 + u, 1.0)).sentence
+
+
+def test_signal_of_two_levels_has_no_visible_noise():
+    u = np.where(np.arange(3000) < 100, 0.0, 1.0)
+    assert "no visible noise" in measure_output_noise(Dataset(u, u, 1.0)).sentence

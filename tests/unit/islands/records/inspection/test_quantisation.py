@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from islands.records.dataset import Dataset
+from islands.records.inspection.channel import Channel
+from islands.records.inspection.excitation import measure_excitation
+from islands.records.inspection.quantisation import find_quantisation
+from support.known_records import slow, white
+
+
+def find(values):
+    return find_quantisation(Channel("y_V", "V", values, is_output=True))
+
+
+@pytest.mark.parametrize("step", [0.01, 5.0 / 4096.0, 0.3])
+@pytest.mark.parametrize("offset", [0.0, 0.123])
+def test_step_is_exact(step, offset):
+    for seed in range(3):
+        y = slow(2000, seed)
+        y = offset + step * np.round(y / y.std() / step)
+        assert find(y).value == pytest.approx(step, rel=1e-9)
+
+
+def test_step_is_the_divisor_of_all_differences():
+    assert find(np.tile([0.0, 0.4, 1.0], 20)).value == pytest.approx(0.2, rel=1e-9)
+
+
+def test_step_of_printed_values_is_found_despite_their_rounding():
+    exact = np.round(slow(2000, 0) / 5e-3) * 5e-3
+    printed = np.array([float(f"{value:.7g}") for value in exact])
+    assert find(printed).value == pytest.approx(5e-3, rel=1e-6)
+
+
+def test_continuous_signal_is_not_quantised():
+    for seed in range(3):
+        assert find(white(2000, seed)).value is None
+
+
+def test_more_levels_than_a_converter_has_are_no_quantisation():
+    assert find(np.round(white(2000, 0), 6)).value is None
+
+
+def test_two_levels_are_no_lattice():
+    fact = find(np.tile([0.0, 1.0], 50))
+    assert fact.value is None
+    assert fact.sentence == "y_V has two levels, 0 V and 1 V."
+
+
+def test_a_held_excitation_has_one_count_of_levels_and_no_converter():
+    force = 20.0 * np.random.default_rng(0).choice([0, 5, 19], 60).repeat(10)
+    channel = Channel("force_N", "N", force, is_output=False)
+    fact = find_quantisation(channel)
+    assert (fact.value, fact.sentence) == (None, "force_N is held at 3 levels from 0 N to 380 N.")
+    levels = measure_excitation(channel, Dataset(force, force, 1.0))[1]
+    assert levels.sentence == "force_N has 3 levels."
+
+
+def test_missing_values_are_left_out():
+    y = np.round(white(1000, 0), 2)
+    y[::7] = np.nan
+    assert find(y).value == pytest.approx(0.01, rel=1e-9)

@@ -1,0 +1,394 @@
+"""Preview: every column of a file, with the messages of `read_record` as its problems."""
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.records.reading import READERS, preview, read_columns, read_record
+
+SAMPLES = 60
+K = np.arange(SAMPLES)
+T, U, Y = K / 100, K % 7 - 3.0, K * K % 11 + 0.5
+
+
+def table(tmp_path, separator=",", comma=False, drop=(), **columns):
+    """Write t_s, u_V, y_um and further text columns; return the file."""
+    columns = {
+        name: column
+        for name, column in ({"t_s": T, "u_V": U, "y_um": Y} | columns).items()
+        if name not in drop
+    }
+    rows = [columns, *zip(*columns.values(), strict=True)]
+    cells = ([str(cell).replace(".", ",") if comma else str(cell) for cell in row] for row in rows)
+    (tmp_path / "r.csv").write_text("\n".join(map(separator.join, cells)))
+    return tmp_path / "r.csv"
+
+
+def archive(tmp_path, **arrays):
+    np.savez(tmp_path / "r.npz", **arrays)
+    return tmp_path / "r.npz"
+
+
+def cells(values, **changed):
+    """Return values as text cells, with some cells replaced: ``c5="off"``."""
+    texts = [str(value) for value in values]
+    for place, text in changed.items():
+        texts[int(place[1:])] = text
+    return texts
+
+
+def problems(file):
+    return {column.name: column.problem for column in preview(file).columns if column.problem}
+
+
+def refusal(file, inputs, output, **options):
+    with pytest.raises(RecordError) as caught:
+        read_record(file, inputs, output, **options)
+    return str(caught.value)
+
+
+def write_parquet(file, columns):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    parquet.write_table(pa.table(columns), file)
+
+
+def write_workbook(file, columns):
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    for row in [list(columns), *zip(*(column.tolist() for column in columns.values()), strict=True)]:
+        book.active.append(row)
+    book.save(file)
+
+
+def write_hdf5(file, columns):
+    import h5py
+
+    with h5py.File(file, "w", track_order=True) as opened:
+        for name, values in columns.items():
+            opened.create_dataset(name, data=values)
+
+
+def write_mdf(file, columns):
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as made:
+        made.append([Signal(columns[name], T, name=name) for name in ("u_V", "y_um")])
+        made.save(file.with_suffix(".mf4"), overwrite=True)
+    file.with_suffix(".mf4").rename(file)
+
+
+def write_tdms(file, columns):
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(file) as writer:
+        writer.write_segment([ChannelObject("Bench", name, values) for name, values in columns.items()])
+
+
+WRITERS = {
+    ".npz": lambda file, columns: np.savez(file, **columns),
+    ".parquet": write_parquet,
+    ".xlsx": write_workbook,
+    ".xlsm": write_workbook,
+    ".h5": write_hdf5,
+    ".hdf5": write_hdf5,
+    ".mf4": write_mdf,
+    ".mdf": write_mdf,
+    ".tdms": write_tdms,
+}
+
+
+def test_a_valid_file_is_described_without_problems(tmp_path):
+    seen = preview(table(tmp_path))
+    assert (seen.time, seen.dt, seen.samples, seen.warnings) == ("t_s", pytest.approx(0.01), SAMPLES, ())
+    assert [column.name for column in seen.columns] == ["t_s", "u_V", "y_um"]
+    assert [column.unit for column in seen.columns] == ["s", "V", "um"]
+    assert not any(column.problem for column in seen.columns)
+
+
+def test_the_statistics_are_those_of_the_samples(tmp_path):
+    column = preview(table(tmp_path)).columns[2]
+    assert (column.samples, column.minimum, column.maximum) == (SAMPLES, Y.min(), Y.max())
+    assert column.mean == pytest.approx(Y.mean())
+    assert column.deviation == pytest.approx(Y.std())
+
+
+SLOW = {".mf4", ".mdf", ".xlsx", ".xlsm"}  # their libraries are imported in up to two seconds
+
+
+@pytest.mark.parametrize(
+    "suffix", [pytest.param(each, marks=pytest.mark.ci if each in SLOW else ()) for each in READERS]
+)
+def test_every_format_gives_the_same_preview(tmp_path, save, suffix):
+    columns = {"t_s": T, "u_V": U, "y_um": Y}
+    file = tmp_path / f"r{suffix}"
+    if suffix == ".mat":
+        save("7", **columns)
+    elif suffix in WRITERS:
+        WRITERS[suffix](file, columns)
+    else:
+        table(tmp_path).rename(file)
+    assert preview(file) == preview(table(tmp_path))
+
+
+def test_a_preview_is_plain_data(tmp_path):
+    assert json.loads(json.dumps(asdict(preview(table(tmp_path)))))["columns"][1]["name"] == "u_V"
+
+
+# Problems of columns
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        cells(U, c5="off"),
+        [""] * SAMPLES,
+        cells(U, c5="inf"),
+        [2.5] * SAMPLES,
+        cells(U, c5="1,5", c6="0.5"),
+    ],
+    ids=["text", "empty", "infinite", "constant", "both marks"],
+)
+def test_a_problem_is_the_message_of_read_record(tmp_path, column):
+    file = table(tmp_path, separator=";", x=column)
+    message = refusal(file, ["x"], "y_um")
+    assert problems(file) == {"x": message}
+    assert preview(file).warnings == ()
+
+
+@pytest.mark.parametrize("empty", [[5], range(40, SAMPLES)], ids=["single", "at the end"])
+def test_missing_values_are_counted_and_are_no_problem_of_an_output(tmp_path, empty):
+    file = table(tmp_path, x=cells(U, **{f"c{k}": "" for k in empty}))
+    column, known = preview(file).columns[3], np.delete(U, empty)
+    assert (column.problem, column.missing, column.samples) == ("", len(empty), SAMPLES)
+    assert (column.minimum, column.maximum) == (known.min(), known.max())
+    assert read_record(file, ["u_V"], "x").samples == SAMPLES
+    assert "empty or NaN" in refusal(file, ["x"], "y_um")
+
+
+def test_a_column_with_an_invalid_sample_has_no_statistics(tmp_path):
+    file = table(tmp_path, b=cells(U, c5="inf"), c=[2.5] * SAMPLES, d=["x"] * SAMPLES)
+    *_, infinite, constant, text = preview(file).columns
+    for column in (infinite, text):
+        assert (column.minimum, column.maximum, column.mean, column.deviation) == (None, None, None, None)
+    assert text.samples is None
+    assert (constant.minimum, constant.maximum, constant.mean, constant.deviation) == (2.5, 2.5, 2.5, 0.0)
+
+
+def test_numbers_too_large_for_a_mean_have_no_statistics(tmp_path):
+    column = preview(table(tmp_path, x=[1.7e308] * (SAMPLES - 1) + [1.6e308])).columns[3]
+    assert (column.mean, column.problem) == (None, "")
+
+
+def test_a_ragged_line_is_the_problem_of_every_column(tmp_path):
+    file = table(tmp_path)
+    file.write_text(file.read_text() + "\n0.6,1")
+    message = refusal(file, ["u_V"], "y_um")
+    assert problems(file) == dict.fromkeys(("t_s", "u_V", "y_um"), message)
+    assert preview(file).samples == 0
+
+
+def test_unnamed_columns_are_omitted(tmp_path):
+    file = table(tmp_path)
+    file.write_text(file.read_text().replace("\n", ",\n") + ",")
+    assert [column.name for column in preview(file).columns] == ["t_s", "u_V", "y_um"]
+
+
+def test_an_array_of_unique_length_has_a_problem(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, short=U[:50], gain=2.0 * np.ones(1), dt=0.1)
+    found = problems(file)
+    assert set(found) == {"short", "gain", "dt"}
+    assert found["short"] == refusal(file, ["u"], "short")
+    assert (
+        found["short"]
+        == "r.npz: column u has 60 samples, column short 50: the channels of a record must have equal length"
+    )
+    assert preview(file).samples == SAMPLES
+
+
+def test_two_recordings_in_one_file_are_a_warning_not_a_problem(tmp_path):
+    file = archive(tmp_path, u_test=U[:50], y_test=Y[:50], u=U, y=Y, dt=0.1)
+    seen = preview(file)
+    assert "dt" in problems(file)
+    assert len(problems(file)) == 1
+    assert seen.samples == SAMPLES
+    assert seen.warnings == (refusal(file, ["u"], "u_test"),)
+    assert read_record(file, ["u_test"], "y_test").samples == 50
+
+
+def test_single_numbers_are_not_a_recording(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, gain=np.ones(1), offset=np.ones(1), dt=0.1)
+    assert {"gain", "offset"} <= set(problems(file))
+    assert preview(file).warnings == ()
+
+
+def test_an_array_of_another_shape_or_kind_is_a_problem(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, dt=0.1, cube=np.ones((2, 3, 4)), text=np.array(["a"] * SAMPLES))
+    assert problems(file)["cube"] == refusal(file, ["cube"], "y")
+    assert problems(file)["text"] == refusal(file, ["text"], "y")
+
+
+def test_a_file_without_channels_still_has_a_sampling_time(tmp_path):
+    seen = preview(archive(tmp_path, cube=np.ones((2, 3, 4)), fs=100.0))
+    assert (seen.samples, seen.dt, seen.warnings) == (0, pytest.approx(0.01), ())
+
+
+def test_an_empty_array_is_a_problem(tmp_path):
+    seen = preview(archive(tmp_path, x=np.empty(0), u=U, y=Y))
+    assert (seen.columns[0].samples, seen.columns[0].mean) == (0, None)
+    assert "column u has 60 samples, column x 0" in seen.columns[0].problem
+    seen = preview(archive(tmp_path, x=np.empty(0), u=np.empty(0)))
+    assert seen.columns[0].problem == "r.npz has no samples: use another record"
+
+
+# Warnings
+
+
+def test_few_samples_are_a_warning(tmp_path):
+    file = table(tmp_path)
+    file.write_text("\n".join(file.read_text().splitlines()[:21]))
+    assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
+    assert problems(file) == {}
+
+
+def test_columns_of_one_name_are_a_warning(tmp_path):
+    file = table(tmp_path)
+    file.write_text(file.read_text().replace("t_s,", "y_um,"))
+    assert refusal(file, ["u_V"], "y_um") in preview(file).warnings
+
+
+def test_a_decimal_comma_is_a_warning_that_shows_the_first(tmp_path):
+    seen = preview(table(tmp_path, separator=";", comma=True))
+    assert seen.warnings == ("the comma in r.csv, line 2, column t_s (0,0) is read as a decimal mark",)
+    assert seen.dt == pytest.approx(0.01)
+
+
+def test_commas_in_one_column_and_points_in_another_are_a_warning(tmp_path):
+    file = table(tmp_path, separator=";", x=[f"1,{100 + k}" for k in range(SAMPLES)])
+    assert preview(file).warnings == (refusal(file, ["x"], "y_um").replace("y_um (0.5)", "t_s (0.0)"),)
+
+
+# Time
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        cells(T, c30="0.3025"),
+        cells(T, c30="0.29"),
+        cells(T, c30=""),
+        cells(T, c0="10:15:00"),
+        list(T[:30]) + list(T[30:] + 0.05),
+    ],
+    ids=["uneven", "repeated", "missing", "text", "gap"],
+)
+def test_an_unusable_time_column_is_a_warning(tmp_path, time):
+    file = table(tmp_path, t_s=time)
+    seen = preview(file)
+    assert (seen.time, seen.dt) == ("t_s", None)
+    assert seen.warnings == (refusal(file, ["u_V"], "y_um"),)
+
+
+def test_a_constant_time_is_a_warning_not_a_constant_column(tmp_path):
+    seen = preview(table(tmp_path, t_s=[1.0] * SAMPLES))
+    assert "line 3, column t_s repeats the time stamp 1" in seen.warnings[0]
+    assert seen.columns[0].problem == ""
+
+
+def test_a_time_too_large_for_single_precision_is_checked_for_uniformity(tmp_path):
+    file = table(tmp_path, t_s=[k * 1e39 + (k == 30) * 1e38 for k in range(SAMPLES)])
+    assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
+
+
+def test_a_file_without_a_sampling_time_is_a_warning(tmp_path):
+    file = table(tmp_path, drop=["t_s"])
+    seen = preview(file)
+    assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
+
+
+def test_a_first_column_in_a_unit_of_time_that_increases_is_the_time(tmp_path):
+    """Oscilloscopes write the source of the channels above the time: ``Source,CH1,CH2``."""
+    rows = [f"{t - 0.1:+.7f},{u:.5f},{y:.5f}" for t, u, y in zip(T, U, Y, strict=True)]
+    file = tmp_path / "scope.csv"
+    file.write_text("\n".join(["Source,CH1,CH2", "Second,Volt,Volt", *rows]))
+    seen = preview(file)
+    assert (seen.time, seen.dt) == ("Source [s]", pytest.approx(T[1] - T[0]))
+    record = read_record(file, ["CH1"], "CH2")
+    assert (record.dt, record.start) == (pytest.approx(T[1] - T[0]), pytest.approx(-0.1))
+    for other in ("Source,CH1,CH2\nVolt,Volt,Volt", "Source,CH1,CH2\nSecond,Volt,Volt\n5,0,0"):
+        file.write_text("\n".join([other, *rows]))
+        assert preview(file).time is None
+
+
+def test_two_possible_time_columns_are_a_warning(tmp_path):
+    file = table(tmp_path, time_ms=T * 1000)
+    seen = preview(file)
+    assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
+
+
+def test_a_stated_sampling_time_is_shown_and_compared_with_the_time(tmp_path):
+    assert preview(archive(tmp_path, u=U, y=Y, fs=250.0)).dt == pytest.approx(0.004)
+    file = archive(tmp_path, u=U, y=Y, t=T, fs=250.0)
+    assert preview(file).dt is None
+    assert preview(file).warnings == (refusal(file, ["u"], "y"),)
+
+
+@pytest.mark.ci
+def test_an_invalid_stated_sampling_time_is_a_warning(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, dt=0.0)
+    assert read_columns(file) == ("u", "y", "dt")
+    assert preview(file).dt is None
+    assert preview(file).warnings == (refusal(file, ["u"], "y"),)
+
+
+def test_a_structure_is_shown_with_its_own_time(save):
+    seen = preview(save("7", a={"t": T[:50], "u": U[:50]}, b_1={"t": T * 2, "u_V": U, "y": Y}))
+    assert (seen.time, seen.dt, seen.samples) == ("b_1.t", pytest.approx(0.02), SAMPLES)
+    units = {column.name: column.unit for column in seen.columns}
+    assert (units["b_1.u_V"], units["b_1.y"]) == ("V", "")
+
+
+@pytest.mark.parametrize("content", [b"", b"t_s,u,y\n", b"\x89PNG\r\n\x1a\n" + bytes(range(256))])
+def test_an_unreadable_file_is_refused(tmp_path, content):
+    (tmp_path / "r.csv").write_bytes(content)
+    with pytest.raises(RecordError, match=r"r\.csv"):
+        preview(tmp_path / "r.csv")
+
+
+def test_one_sample_has_no_sampling_time(tmp_path):
+    (tmp_path / "r.csv").write_text("t_s,u,y\n0,1,2")
+    seen = preview(tmp_path / "r.csv")
+    assert (seen.samples, seen.dt, seen.time) == (1, None, "t_s")
+
+
+def test_readers_of_rare_formats_import_their_libraries_on_demand():
+    rare = ("asammdf", "h5py", "nptdms", "openpyxl", "pyarrow", "scipy")
+    program = f"import sys, islands.records.reading; print([m for m in {rare} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_a_column_has_the_sampling_time_of_its_samples(tmp_path):
+    rows = (f"{0.1 * k:.1f},{k % 7},{k % 5 if k % 4 == 0 else ''}" for k in range(400))
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *rows]))
+    found = {column.name: column.dt for column in preview(tmp_path / "a.csv").columns}
+    assert found == {"t_s": pytest.approx(0.1), "u": pytest.approx(0.1), "y": pytest.approx(0.4)}
+
+
+def test_only_warnings_that_prevent_reading_are_problems(tmp_path):
+    times = [*range(100), *range(150, 250)]
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *(f"{t},{t % 7},{t % 5}" for t in times)]))
+    found = preview(tmp_path / "a.csv")
+    assert found.problems == found.warnings
+    assert "gap" in found.problems[0]
+    days = (f"{45987.5 + k / 1440:.9f},{k % 7},{k % 5}" for k in range(100))
+    (tmp_path / "b.csv").write_text("\n".join(["Date,u,y", *days]))
+    found = preview(tmp_path / "b.csv")
+    assert (len(found.warnings), found.problems) == (1, ())

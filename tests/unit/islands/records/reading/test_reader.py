@@ -1,0 +1,428 @@
+"""Reading of records: every dialect and format gives back numbers, names, units and times."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from islands.errors import IslandsError, RecordError
+from islands.records.channel_names import parse_unit
+from islands.records.reading import READERS, fingerprint, read_columns, read_record
+from islands.records.reading.column_names import looks_like_time, time_column
+from support.bad_records import refusal
+
+SAMPLES = 50
+T = 0.01 * np.arange(SAMPLES)
+U = np.round(np.sin(7 * T), 4)
+Y = np.round(2.5 * np.cos(5 * T), 4)
+
+
+def written(
+    path: Path, separator: str = ",", comma: bool = False, end: str = "\n", name: str = "r.csv"
+) -> Path:
+    """Write T, U, Y as a text table in the given dialect."""
+    lines = [separator.join(("t_s", "u_V", "y_um"))]
+    for values in zip(T, U, Y, strict=True):
+        cells = (f"{value:.4f}" for value in values)
+        lines.append(separator.join(cell.replace(".", ",") if comma else cell for cell in cells))
+    file = path / name
+    file.write_bytes((end.join(lines) + end).encode())
+    return file
+
+
+def archive(path: Path, **arrays: object) -> Path:
+    """Write a NumPy archive with U and Y, which the given arrays replace or complete."""
+    file = path / "r.npz"
+    np.savez(file, **({"u": U, "y": Y} | arrays))
+    return file
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    ("separator", "comma"),
+    [
+        (",", False),
+        (";", False),
+        (";", True),
+        ("\t", False),
+        ("\t", True),
+        ("|", True),
+        (" ", False),
+        ("   ", True),
+    ],
+)
+def test_every_dialect_returns_the_written_numbers(tmp_path, separator, comma, end):
+    record = read_record(written(tmp_path, separator, comma, end), ["u_V"], "y_um")
+    assert record.u[:, 0].tolist() == U.tolist()
+    assert record.y.tolist() == Y.tolist()
+    assert record.dt == pytest.approx(0.01, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["r.csv", "r.txt", "r.tsv", "r.dat", "R.CSV"])
+def test_every_suffix_of_a_text_table_is_read(tmp_path, name):
+    assert read_record(written(tmp_path, name=name), ["u_V"], "y_um").samples == SAMPLES
+
+
+def test_a_record_carries_names_and_units_of_its_columns(tmp_path):
+    record = read_record(written(tmp_path), ["u_V"], "y_um")
+    assert (record.input_names, record.output_name) == (("u_V",), "y_um")
+    assert (record.input_units, record.output_unit) == (("V",), "um")
+    assert record.segments == (SAMPLES,)
+
+
+def test_inputs_keep_the_order_in_which_they_are_given(tmp_path):
+    record = read_record(written(tmp_path), ["y_um", "u_V"], "t_s", dt=1.0)
+    assert record.input_names == ("y_um", "u_V")
+    assert record.u[:, 0].tolist() == Y.tolist()
+    assert record.u[:, 1].tolist() == U.tolist()
+
+
+def test_a_single_input_may_be_given_by_its_bare_name(tmp_path):
+    assert read_record(written(tmp_path), "u_V", "y_um").input_names == ("u_V",)
+
+
+def test_a_path_may_be_a_string(tmp_path):
+    assert read_record(str(written(tmp_path)), ["u_V"], "y_um").samples == SAMPLES
+
+
+def test_a_byte_order_mark_and_trailing_blank_lines_are_accepted(tmp_path):
+    file = written(tmp_path)
+    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes() + b"\n  \n,,\n\n")
+    record = read_record(file, ["u_V"], "y_um")
+    assert record.samples == SAMPLES
+    assert record.dt == pytest.approx(0.01)
+
+
+def test_a_separator_at_the_end_of_every_line_is_accepted(tmp_path):
+    file = written(tmp_path, ";", comma=True)
+    file.write_text(file.read_text().replace("\n", ";\n"))
+    assert read_record(file, ["u_V"], "y_um").y.tolist() == Y.tolist()
+
+
+def test_a_file_of_numpy_savetxt_is_read(tmp_path):
+    np.savetxt(tmp_path / "r.txt", np.column_stack([T, U, Y]), header="t_s u_V y_um")
+    record = read_record(tmp_path / "r.txt", ["u_V"], "y_um")
+    assert record.u[:, 0].tolist() == U.tolist()
+
+
+def test_a_name_may_contain_an_unused_separator(tmp_path):
+    file = written(tmp_path)
+    file.write_text(file.read_text().replace("u_V", "u (a;b)"))
+    assert read_columns(file) == ("t_s", "u (a;b)", "y_um")
+    assert read_record(file, ["u (a;b)"], "y_um").u[:, 0].tolist() == U.tolist()
+
+
+def test_quoted_names_may_contain_the_separator_and_blanks(tmp_path):
+    file = written(tmp_path)
+    file.write_text(file.read_text().replace("u_V", '"drive, left (V)"'))
+    record = read_record(file, ["drive, left (V)"], "y_um")
+    assert record.input_units == ("V",)
+    assert record.u[:, 0].tolist() == U.tolist()
+
+
+def test_quoted_numbers_may_have_decimal_commas_between_commas(tmp_path):
+    rows = (f'"{t:.4f}","{u:.4f}","{y:.4f}"'.replace(".", ",") for t, u, y in zip(T, U, Y, strict=True))
+    (tmp_path / "r.csv").write_text("\n".join(["t_s,u_V,y_um", *rows]))
+    assert read_record(tmp_path / "r.csv", ["u_V"], "y_um").y.tolist() == Y.tolist()
+
+
+def test_an_unused_text_column_does_no_harm(tmp_path):
+    lines = written(tmp_path).read_text().splitlines()
+    text = [lines[0] + ",note", *(f"{line},n.a. 1_000" for line in lines[1:])]
+    (tmp_path / "r.csv").write_text("\n".join(text))
+    assert read_record(tmp_path / "r.csv", ["u_V"], "y_um").u[:, 0].tolist() == U.tolist()
+
+
+# Time
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"),
+    [
+        ("t", 1.0),
+        ("T", 1.0),
+        ("time", 1.0),
+        ("t_s", 1.0),
+        ("T_s", 1.0),
+        ("t_ms", 1e-3),
+        ("time_us", 1e-6),
+        ("TIME_NS", 1e-9),
+        ("t_min", 60.0),
+        ("time_h", 3600.0),
+        ("Time (ms)", 1e-3),
+        ("t [us]", 1e-6),
+        ("Temps (ms)", 1e-3),
+        ("Время (мин)", 60.0),
+        ("时间（秒）", 1.0),
+        ("時間[ms]", 1e-3),
+        ("Tiempo", 1.0),
+        ("Test_Time(s)", 1.0),
+        ("Laufzeit / ms", 1e-3),
+    ],
+)
+def test_a_time_column_is_read_in_its_unit(tmp_path, name, seconds):
+    file = written(tmp_path)
+    file.write_text(file.read_text().replace("t_s", name))
+    record = read_record(file, ["u_V"], "y_um", rows=slice(5, None))
+    assert record.dt == pytest.approx(0.01 * seconds, rel=1e-12)
+    assert record.start == pytest.approx(0.05 * seconds, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "T_K",
+        "T_degC",
+        "T_in_C",
+        "temperature",
+        "tank",
+        "test",
+        "T (K)",
+        "temps",
+        "tempo_Hz",
+        "Horatio",
+        "test_time",
+        "rise time (s)",
+    ],
+)
+def test_a_column_with_another_name_is_not_the_time(name):
+    assert not looks_like_time(name)
+
+
+def test_a_timestamp_column_next_to_the_time_does_no_harm():
+    assert time_column(["timestamp", "t_s", "T_K"], "r.csv") == "t_s"
+    assert time_column(["timestamp"], "r.csv") == "timestamp"
+    assert time_column(["Run Time (s)", "timestamp"], "r.csv") == "timestamp"
+    assert time_column(["Test_Time(s)", "Step_Time(s)"], "r.csv") == "Test_Time(s)"
+    assert time_column(["T_K", "t_weeks", "k"], "r.csv") is None
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("u_V", "V"),
+        ("y_um", "um"),
+        ("T_K", "K"),
+        ("u_est_V", "V"),
+        ("u", ""),
+        ("force", ""),
+        ("u_1", ""),
+        ("u_", ""),
+        ("u [V]", "V"),
+        ("flow (m^3/s)", "m^3/s"),
+        ("电压（V）", "V"),
+    ],
+)
+def test_a_unit_follows_the_last_underscore_or_is_in_brackets(name, unit):
+    assert parse_unit(name) == unit
+
+
+@pytest.mark.ci
+def test_time_printed_with_five_digits_is_uniform(tmp_path):
+    t = 2.13e-4 * np.arange(40_001)
+    rows = (f"{value:.5g},{k % 7},{k % 11}" for k, value in enumerate(t))
+    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *rows]))
+    assert read_record(tmp_path / "r.csv", ["u"], "y").dt == pytest.approx(2.13e-4, rel=1e-5)
+
+
+def test_time_printed_with_few_decimals_is_uniform_to_half_of_the_last(tmp_path):
+    t = 0.00317 * np.arange(2000)
+    rows = (f"{value:.3f},{k % 7},{k % 11}" for k, value in enumerate(t))
+    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *rows]))
+    assert read_record(tmp_path / "r.csv", ["u"], "y").dt == pytest.approx(0.00317, rel=1e-4)
+
+
+def test_time_in_single_precision_is_uniform(tmp_path):
+    t = (np.arange(100_000) / 610.35).astype(np.float32)
+    file = archive(tmp_path, t=t, u=np.arange(100_000) % 7, y=np.arange(100_000) % 11)
+    assert read_record(file, ["u"], "y").dt == pytest.approx(1 / 610.35, rel=1e-6)
+
+
+def test_seconds_since_1970_are_a_time_like_any_other(tmp_path):
+    rows = (f"{1_700_000_000 + k * 0.01:.2f},{k % 7},{k % 11}" for k in range(100))
+    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *rows]))
+    record = read_record(tmp_path / "r.csv", ["u"], "y")
+    assert record.dt == pytest.approx(0.01, rel=1e-5)
+    assert record.start == 1_700_000_000
+
+
+def test_the_given_sampling_time_is_used_without_a_time_column(tmp_path):
+    file = written(tmp_path)
+    file.write_text(file.read_text().replace("t_s", "k"))
+    record = read_record(file, ["u_V"], "y_um", dt=0.25, rows=slice(4, 44))
+    assert (record.dt, record.start, record.samples) == (0.25, 1.0, 40)
+
+
+def test_the_time_column_takes_precedence_over_a_similar_sampling_time(tmp_path):
+    assert read_record(written(tmp_path), ["u_V"], "y_um", dt=0.01005).dt == pytest.approx(0.01, rel=1e-12)
+
+
+# Rows
+
+
+@pytest.mark.parametrize(
+    ("rows", "first", "last"),
+    [
+        (slice(10, 45), 10, 45),
+        (slice(0, 40), 0, 40),
+        (slice(None, 40), 0, 40),
+        (slice(15, None), 15, 50),
+        (slice(-35, -1), 15, 49),
+    ],
+)
+def test_rows_select_samples_counted_from_zero_without_the_header(tmp_path, rows, first, last):
+    for file, columns in ((written(tmp_path), (["u_V"], "y_um")), (archive(tmp_path, dt=0.01), (["u"], "y"))):
+        record = read_record(file, *columns, rows=rows)
+        assert record.y.tolist() == Y[first:last].tolist()
+        assert record.start == pytest.approx(0.01 * first)
+
+
+def test_samples_outside_the_selected_rows_are_not_checked(tmp_path):
+    lines = written(tmp_path).read_text().splitlines()
+    lines[1:4] = ["5.0,nan,text", "too,short", ""]
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    record = read_record(tmp_path / "r.csv", ["u_V"], "y_um", rows=slice(3, None))
+    assert record.u[:, 0].tolist() == U[3:].tolist()
+
+
+# A missing output
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "NaN", " NA "])
+def test_a_missing_output_after_the_warm_up_is_accepted_on_request(tmp_path, cell):
+    lines = written(tmp_path).read_text().splitlines()
+    lines[11:] = [line.rpartition(",")[0] + "," + cell for line in lines[11:]]
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    record = read_record(tmp_path / "r.csv", ["u_V"], "y_um", missing_output=True)
+    assert record.y[:10].tolist() == Y[:10].tolist()
+    assert np.isnan(record.y[10:]).all()
+
+
+def test_missing_cells_and_decimal_commas_may_be_combined(tmp_path):
+    lines = written(tmp_path, ";", comma=True).read_text().splitlines()
+    lines[20] = lines[20].rpartition(";")[0] + ";"
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    record = read_record(tmp_path / "r.csv", ["u_V"], "y_um", missing_output=True)
+    assert np.flatnonzero(np.isnan(record.y)).tolist() == [19]
+    assert record.y[20] == Y[20]
+
+
+def test_a_constant_output_is_accepted_on_request(tmp_path):
+    file = archive(tmp_path, y=np.zeros(SAMPLES), dt=0.01)
+    assert read_record(file, ["u"], "y", missing_output=True).output_range == 0.0
+
+
+# NumPy archives
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("dt", 0.004), ("Ts", 0.004), ("fs", 250), ("fs", np.array([[250.0]]))]
+)
+def test_an_archive_may_state_its_sampling(tmp_path, name, value):
+    record = read_record(archive(tmp_path, **{name: value}), ["u"], "y", rows=slice(10, None))
+    assert record.dt == pytest.approx(0.004)
+    assert record.start == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 1), (1, SAMPLES)])
+def test_an_array_with_one_long_axis_is_a_channel(tmp_path, shape):
+    record = read_record(archive(tmp_path, u=U.reshape(shape), dt=1.0), ["u"], "y")
+    assert record.u.shape == (SAMPLES, 1)
+    assert record.u[:, 0].tolist() == U.tolist()
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int16, np.uint8, np.bool_])
+def test_arrays_of_other_numbers_become_double_precision(tmp_path, kind):
+    u = (np.arange(SAMPLES) % 2).astype(kind)
+    record = read_record(archive(tmp_path, u=u, dt=1.0), ["u"], "y")
+    assert record.u.dtype == np.float64
+    assert record.u[:3, 0].tolist() == [0.0, 1.0, 0.0]
+
+
+def test_an_unused_array_does_no_harm(tmp_path):
+    file = archive(tmp_path, dt=1.0, extra=np.array([{"a": 1}], dtype=object), short=np.ones(3))
+    assert read_record(file, ["u"], "y").samples == SAMPLES
+
+
+# Column names and fingerprints
+
+
+def test_columns_are_listed_in_the_files_order(tmp_path):
+    assert read_columns(written(tmp_path, ";")) == ("t_s", "u_V", "y_um")
+    assert read_columns(archive(tmp_path, fs=10.0)) == ("u", "y", "fs")
+
+
+def test_a_fingerprint_is_the_sha_256_of_the_bytes(tmp_path):
+    file = written(tmp_path)
+    assert fingerprint(file) == hashlib.sha256(file.read_bytes()).hexdigest()
+    other = written(tmp_path, end="\r\n", name="other.csv")
+    assert fingerprint(other) != fingerprint(file)
+
+
+def test_a_fingerprint_of_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(RecordError, match="there is no file"):
+        fingerprint(tmp_path / "none.csv")
+
+
+def test_every_known_suffix_is_lower_case_with_its_dot():
+    assert set(READERS) >= {".csv", ".txt", ".tsv", ".dat", ".npz"}
+    assert all(suffix == suffix.lower() and suffix.startswith(".") for suffix in READERS)
+
+
+def test_an_input_with_the_suffix_plus_one_is_read_one_sample_early(tmp_path):
+    file = tmp_path / "record.csv"
+    file.write_text("t_s,u_V,y_um\n" + "\n".join(f"{k / 10:g},{k * k},{k}" for k in range(40)))
+    early, plain = (read_record(file, [name], "y_um") for name in ("u_V+1", "u_V"))
+    assert early.input_names == ("u_V+1",)
+    assert early.input_units == ("V",)
+    assert np.array_equal(early.u[:-1], plain.u[1:])
+    assert np.array_equal(early.y, plain.y)
+
+
+def test_a_column_name_with_the_suffix_plus_one_is_not_shifted(tmp_path):
+    file = tmp_path / "record.csv"
+    file.write_text("t_s,u,u+1,y\n" + "\n".join(f"{k / 10:g},{k},{-k},{k % 7}" for k in range(40)))
+    assert read_record(file, ["u+1"], "y").u[3, 0] == -3.0
+
+
+# Invalid files
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(RecordError, match=r"there is no file .*none\.csv: check the path"):
+        read_record(tmp_path / "none.csv", ["u"], "y")
+
+
+def test_a_folder_is_refused(tmp_path):
+    with pytest.raises(RecordError, match="is a folder: give the path of the file in it"):
+        read_record(tmp_path, ["u"], "y")
+
+
+def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
+    (tmp_path / "file.csv").write_text("t,u,y")
+    with pytest.raises(RecordError, match=r"cannot be opened \(Not a directory\): check path"):
+        read_record(tmp_path / "file.csv" / "bad.csv", ["u"], "y")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"dt": "0.1"}, "the sampling time dt must be a positive number of seconds, got '0.1'"),
+        ({"resample": "0.1"}, "resample must be a positive number of seconds, got '0.1'"),
+        ({"rows": (0, 30)}, r"rows is a slice such as slice\(0, 50\), got \(0, 30\)"),
+    ],
+)
+def test_an_argument_of_another_type_is_refused(tmp_path, given, words):
+    with pytest.raises(IslandsError, match=words):
+        read_record(written(tmp_path), ["u_V"], "y_um", **given)
+
+
+def test_names_may_be_one_text_as_on_the_command_line(tmp_path):
+    assert read_record(written(tmp_path), "a", ["b"], names="t, a, b").input_names == ("a",)
+
+
+def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path):
+    message = refusal(tmp_path, ["a letter", "of two lines"], name="bad.docx")
+    assert "bad.docx: files ending in '.docx' are not supported" in message
+    assert all(suffix in message for suffix in READERS)

@@ -1,0 +1,260 @@
+"""Records: validation, read-only arrays, segments, slices and joins."""
+
+import warnings
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.records.channel_names import parse_unit
+from islands.records.dataset import Dataset, join
+
+
+def record(samples: int = 10, **changes: object) -> Dataset:
+    fields: dict[str, object] = {
+        "u": np.arange(samples, dtype=float),
+        "y": np.arange(samples, dtype=float) ** 2,
+        "dt": 0.5,
+    }
+    return Dataset(**(fields | changes))
+
+
+def error_message(**changes: object) -> str:
+    with pytest.raises(RecordError) as caught:
+        record(**changes)
+    return str(caught.value)
+
+
+def test_single_input_may_be_a_vector():
+    made = record()
+    assert made.u.shape == (10, 1)
+    assert (made.samples, made.inputs, len(made)) == (10, 1, 10)
+    assert (made.input_names, made.input_units, made.segments) == (("u",), ("",), (10,))
+
+
+def test_several_inputs_without_names_are_numbered_from_one():
+    made = record(u=np.ones((10, 3)))
+    assert made.input_names == ("u1", "u2", "u3")
+    assert made.input_units == ("", "", "")
+
+
+def test_names_and_units_keep_the_inputs_order():
+    made = record(u=np.ones((10, 2)), input_names=("u_V", "T_K"), input_units=("V", "K"))
+    assert made.input_names == ("u_V", "T_K")
+    assert made.input_units == ("V", "K")
+
+
+def test_integers_and_single_precision_become_double_precision():
+    made = record(u=np.arange(10, dtype=np.int16), y=np.arange(10, dtype=np.float32))
+    assert made.u.dtype == made.y.dtype == np.float64
+
+
+def test_record_copies_its_arrays():
+    u, y = np.zeros(10), np.ones(10)
+    made = record(u=u, y=y)
+    u[3] = y[3] = 7.0
+    assert made.u[3, 0] == 0.0
+    assert made.y[3] == 1.0
+
+
+def test_record_is_read_only():
+    made = record()
+    with pytest.raises(ValueError, match="read-only"):
+        made.u[0, 0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        made.y[0] = 1.0
+    with pytest.raises(FrozenInstanceError):
+        made.dt = 1.0
+
+
+@pytest.mark.parametrize(
+    ("u", "y"),
+    [
+        (np.ones(9), np.ones(10)),
+        (np.ones((2, 10)), np.ones(10)),
+        (np.ones((10, 1, 1)), np.ones(10)),
+        (np.ones(10), np.ones((10, 1))),
+    ],
+)
+def test_error_for_inconsistent_arrays_shows_their_shapes(u, y):
+    message = error_message(u=u, y=y)
+    assert f"got {u.shape} and {y.shape}" in message
+    assert "(samples, inputs)" in message
+
+
+def test_record_without_samples_is_refused():
+    assert "0 samples" in error_message(samples=0)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, float("nan"), float("inf")])
+def test_sampling_time_that_is_not_positive_and_finite_is_refused(dt):
+    message = error_message(dt=dt)
+    assert "positive number of seconds" in message
+    assert str(dt) in message
+
+
+@pytest.mark.parametrize("segments", [(4, 5), (11,), (10, 0), (12, -2)])
+def test_segments_must_be_positive_and_sum_to_the_samples(segments):
+    message = error_message(segments=segments)
+    assert str(segments) in message
+    assert "10 samples" in message
+
+
+def test_names_or_units_that_do_not_match_the_inputs_are_refused():
+    two = np.ones((10, 2))
+    assert "2 inputs need 2 names, got ('a', 'b', 'c')" in error_message(u=two, input_names=("a", "b", "c"))
+    assert "2 inputs need 2 units, got ('V',)" in error_message(u=two, input_units=("V",))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_error_for_a_non_finite_input_names_input_and_sample(value):
+    u = np.ones((10, 2))
+    u[6, 1] = value
+    message = error_message(u=u, input_names=("a_V", "b_V"))
+    assert "input b_V is not finite at sample 6" in message
+    assert "repair or cut" in message
+
+
+def test_error_for_an_infinite_output_names_output_and_sample():
+    y = np.ones(10)
+    y[4] = -np.inf
+    message = error_message(y=y, output_name="y_um")
+    assert "output y_um is infinite at sample 4" in message
+
+
+def test_missing_output_is_kept_as_nan():
+    y = np.ones(10)
+    y[7:] = np.nan
+    assert np.isnan(record(y=y).y).tolist() == [False] * 7 + [True] * 3
+
+
+def test_time_begins_at_the_start_of_the_record_and_steps_by_dt():
+    made = record(samples=4, start=3.0)
+    assert made.time.tolist() == [3.0, 3.5, 4.0, 4.5]
+
+
+def test_bounds_of_segments_are_contiguous():
+    assert record(segments=(3, 5, 2)).bounds == ((0, 3), (3, 8), (8, 10))
+
+
+def test_output_range_ignores_missing_values():
+    y = np.array([2.0, np.nan, -1.0, 5.0, np.nan])
+    assert record(samples=5, y=y).output_range == 6.0
+
+
+def test_output_range_of_a_missing_output_is_nan_without_a_warning():
+    made = record(samples=5, y=np.full(5, np.nan))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(made.output_range)
+
+
+def test_slice_is_a_record_with_a_later_start():
+    part = record()[4:7]
+    assert part.u[:, 0].tolist() == [4.0, 5.0, 6.0]
+    assert part.y.tolist() == [16.0, 25.0, 36.0]
+    assert part.start == 2.0
+    assert part.segments == (3,)
+
+
+def test_slice_cuts_segments_and_joins_none():
+    made = record(segments=(3, 5, 2))
+    assert made[1:9].segments == (2, 5, 1)
+    assert made[3:8].segments == (5,)
+    assert made[:4].segments == (3, 1)
+
+
+def test_slice_counts_negative_samples_from_the_end():
+    assert record()[-3:].u[:, 0].tolist() == [7.0, 8.0, 9.0]
+
+
+@pytest.mark.parametrize("rows", [slice(5, 5), slice(7, 3), slice(20, 30), slice(None, None, 2)])
+def test_slice_that_is_empty_or_skips_samples_is_refused(rows):
+    with pytest.raises(RecordError, match="non-empty slice of step 1 of the record's 10 samples"):
+        record()[rows]
+
+
+def test_joined_recordings_remain_separate_segments():
+    joined = join((record(samples=4, start=1.0), record(samples=6, segments=(2, 4))))
+    assert joined.segments == (4, 2, 4)
+    assert joined.y.tolist() == [0.0, 1.0, 4.0, 9.0, 0.0, 1.0, 4.0, 9.0, 16.0, 25.0]
+    assert joined.start == 1.0
+
+
+def test_cutting_and_joining_at_a_boundary_returns_the_record():
+    made = record(segments=(3, 7))
+    again = join((made[:3], made[3:]))
+    assert again.segments == made.segments
+    assert again.recordings == ("1", "2")
+    assert np.array_equal(again.u, made.u)
+    assert np.array_equal(again.y, made.y)
+
+
+def test_joined_recordings_have_different_names():
+    named = [record(recordings=(name,)) for name in ("a.csv", "b.csv", "a.csv", "")]
+    joined = join((*named, record(segments=(4, 6), recordings=("b.csv", "c.csv"))))
+    assert joined.recordings == ("a.csv", "b.csv", "a.csv (3)", "4", "b.csv (5)", "c.csv")
+    assert joined[5:25].rows_by_recording == {
+        "a.csv": slice(0, 5),
+        "b.csv": slice(5, 15),
+        "a.csv (3)": slice(15, 20),
+    }
+
+
+def test_a_step_of_reading_has_the_names_of_its_recordings():
+    common, own = "time in column t", "level is flat in 5 % of the samples"
+    one, two = (
+        replace(record(20), recordings=(name,), reading=(common, *steps))
+        for name, steps in (("a.csv", ()), ("b.csv", (own,)))
+    )
+    assert join((one, two)).reading == (common, f"b.csv: {own}")
+    assert join((two,)).reading == two.reading
+    third = replace(record(20), recordings=("c.csv",))
+    assert join((join((one, two)), third)).reading == (f"a.csv, b.csv: {common}", f"b.csv: {own}")
+
+
+def test_recordings_with_different_columns_or_units_are_not_joined():
+    for change in ({"output_name": "z"}, {"output_unit": "um"}, {"input_names": ("v",)}):
+        with pytest.raises(RecordError, match="same columns and units: rename or convert"):
+            join((record(), record(**change)))
+
+
+def test_recordings_with_different_sampling_times_are_not_joined():
+    with pytest.raises(RecordError, match=r"sampled at 0\.5 s and 0\.501 s: resample"):
+        join((record(), record(dt=0.501)))
+
+
+def test_recordings_whose_sampling_times_differ_by_rounding_are_joined():
+    assert join((record(), record(dt=0.5 * (1 + 1e-5)))).dt == 0.5
+
+
+def test_join_without_recordings_is_refused():
+    with pytest.raises(RecordError, match="there is no recording to join"):
+        join(())
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("y_um", "mm"), ("y (V)", "mV"), ("speed_rad_s", "rpm"), ("p/bar", "Pa")],
+)
+def test_a_unit_that_contradicts_the_name_is_refused(name, unit):
+    """It was accepted; the model took the unit of the name and refused its own record."""
+    expected = f"{name} is named in {parse_unit(name)}, but its unit is {unit}: rename the column"
+    assert expected in error_message(output_name=name, output_unit=unit)
+    assert expected in error_message(input_names=(name,), input_units=(unit,))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("y_um", "\u00b5m"), ("T_C", "\u00b0C"), ("y_um", ""), ("y", "mm"), ("y_um", "counts"), ("y_est", "mm")],
+)
+def test_a_unit_that_agrees_with_the_name_is_kept(name, unit):
+    made = record(output_name=name, output_unit=unit)
+    assert (made.output_name, made.output_unit) == (name, unit)
+
+
+def test_sampling_times_are_stated_as_they_were_meant():
+    recordings = [record(dt=0.3 - 0.2), record(dt=0.2)]
+    with pytest.raises(RecordError, match=r"sampled at 0\.1 s and 0\.2 s"):
+        join(recordings)

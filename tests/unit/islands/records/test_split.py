@@ -1,0 +1,153 @@
+"""Split of records: the parts are disjoint, complete and from one system."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError, SettingsError
+from islands.records.dataset import Dataset, join
+from islands.records.split import Split, hold_out, share_samples, split, split_data
+
+
+def record(samples: int = 100, inputs: int = 1, **changes: object) -> Dataset:
+    return Dataset(u=np.ones((samples, inputs)), y=np.arange(float(samples)), **({"dt": 0.1} | changes))
+
+
+def test_default_validation_part_is_a_quarter_of_the_record():
+    parts = split(record())
+    assert (parts.estimation.samples, parts.validation.samples) == (75, 25)
+
+
+@pytest.mark.parametrize(("samples", "fraction"), [(100, 0.1), (101, 0.5), (7, 0.3), (2, 0.5)])
+def test_parts_of_a_split_together_are_the_record_in_order(samples, fraction):
+    parts = split(record(samples), fraction)
+    both = np.concatenate([parts.estimation.y, parts.validation.y])
+    assert both.tolist() == list(range(samples))
+
+
+def test_validation_part_is_the_end_of_the_record_and_keeps_its_time():
+    parts = split(record(start=2.0), 0.2)
+    assert parts.validation.y[0] == 80.0
+    assert parts.validation.start == pytest.approx(10.0)
+    assert parts.estimation.start == 2.0
+
+
+def test_segment_across_the_split_boundary_is_cut():
+    parts = split(record(segments=(50, 40, 10)), 0.25)
+    assert parts.estimation.segments == (50, 25)
+    assert parts.validation.segments == (15, 10)
+
+
+@pytest.mark.parametrize("fraction", [0.0, 1.0, -0.1, 1.5, float("nan")])
+def test_fraction_outside_zero_and_one_is_refused(fraction):
+    with pytest.raises(SettingsError, match=f"between 0 and 1, got {fraction}"):
+        split(record(), fraction)
+
+
+@pytest.mark.parametrize("fraction", [0.001, 0.999])
+def test_fraction_that_leaves_a_part_empty_is_refused(fraction):
+    with pytest.raises(SettingsError, match=f"{fraction} of 100 samples leaves a part empty"):
+        split(record(), fraction)
+
+
+def test_validation_inputs_take_the_order_of_the_estimation_data():
+    columns = np.arange(6.0).reshape(3, 2)
+    estimation = Dataset(columns, np.zeros(3), 0.1, ("a", "b"))
+    parts = Split(estimation, Dataset(columns[:, ::-1], np.ones(3), 0.1, ("b", "a")))
+    assert parts.validation.u.tolist() == columns.tolist()
+    assert parts.validation.input_names == ("a", "b")
+
+
+def test_parts_that_do_not_match_are_refused():
+    with pytest.raises(
+        RecordError, match=r"estimation data has a sampling time of 0\.1 s, the validation data"
+    ):
+        Split(record(), record(dt=0.1005))
+
+
+# Data for a search.
+
+
+def drawn(samples: int = 50, seed: int = 0, **changes: object) -> Dataset:
+    u, y = np.random.default_rng(seed).normal(size=(2, samples))
+    return Dataset(u, y, 0.1, **changes)
+
+
+def test_estimation_data_are_refused_as_validation_data():
+    data = drawn()
+    for validation in (
+        data,
+        replace(data, start=7.0),
+        replace(data, output_name="y_val"),
+        data[30:],
+        data[:20],
+    ):
+        with pytest.raises(SettingsError, match="has samples that are used for estimation: give another"):
+            split_data(data, validation)
+    with pytest.raises(SettingsError, match="used for estimation"):
+        split_data(data[10:40], data)
+
+
+def test_other_data_are_accepted_as_validation_data():
+    data = drawn()
+    assert split_data(data[:30], data[30:]).validation.samples == 20
+    assert split_data(data, drawn(seed=1)).validation.samples == 50
+    # Two recordings that begin at rest have equal first samples.
+    u = np.concatenate([np.zeros(10), np.ones(10)])
+    early, late = Dataset(u, u, 0.1), Dataset(u, u + (u > 0), 0.1, start=-1.0)
+    assert not share_samples(early, late)
+
+
+def test_samples_of_one_file_are_shared_if_the_rows_and_the_column_are():
+    whole = drawn(sha256="a" * 64)
+    # An input that is read one sample early repeats its last value.
+    first, second = whole[:30], replace(whole[20:], u=whole.u[20:] + 1.0)
+    assert share_samples(first, second)
+    assert not share_samples(first, whole[30:])
+    assert not share_samples(first, replace(drawn(seed=1), output_name="y_val", sha256="a" * 64))
+
+
+def test_samples_without_an_output_separate_segments_of_both_parts():
+    data, other = drawn(), drawn(seed=1)
+    y = other.y.copy()
+    y[17:19] = np.nan
+    holed = replace(other, y=y)
+    for parts, cut in ((split_data(data, holed), 1), (split_data(holed, data), 0)):
+        record = (parts.estimation, parts.validation)[cut]
+        assert record.segments == (17, other.samples - 19)
+        assert record.y.tolist() == [*other.y[:17], *other.y[19:]]
+    assert split_data(holed, 0.2).estimation.segments == (17, round(0.8 * other.samples) - 19)
+
+
+def test_every_recording_gives_its_end_to_the_validation_data():
+    joined = join((drawn(seed=1)[:40], drawn(seed=2)[:20], drawn(seed=3)[:1]))
+    parts = split(joined, 0.25)
+    assert parts.estimation.rows_by_recording == {"1": slice(0, 30), "2": slice(30, 45), "3": slice(45, 46)}
+    assert parts.validation.rows_by_recording == {"1": slice(0, 10), "2": slice(10, 15)}
+    assert parts.validation.y.tolist() == [*drawn(seed=1).y[30:40], *drawn(seed=2).y[15:20]]
+
+
+def test_a_recording_among_several_is_found_again():
+    one, other, third = (drawn(seed=seed) for seed in (1, 2, 3))
+    assert share_samples(join((one, other)), other)
+    assert not share_samples(join((one, other)), third)
+
+
+def test_recording_that_is_held_out_follows_the_others():
+    first, second = record(300), record(100, start=50.0)
+    joined = hold_out(first, second)
+    assert (joined.samples, joined.held_out, joined.segments) == (400, 100, (300, 100))
+    assert np.array_equal(joined.y[300:], second.y)
+    assert [joined[rows].held_out for rows in (slice(0, 300), slice(250, 390), slice(300, 400))] == [0, 90, 0]
+
+
+def test_recording_that_is_held_out_has_no_sample_of_the_others():
+    whole = record(300)
+    with pytest.raises(SettingsError, match="has samples of the record"):
+        hold_out(whole, whole[100:200])
+
+
+def test_part_that_is_held_out_begins_with_a_recording():
+    with pytest.raises(RecordError, match="cannot be divided so that 50 are held out"):
+        replace(join((record(300), record(100, start=50.0))), held_out=50)

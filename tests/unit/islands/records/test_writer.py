@@ -1,0 +1,130 @@
+"""Writing of records and simulations: files are read back exactly."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.errors import RecordError
+from islands.records.dataset import Dataset
+from islands.records.reading import read_record
+from islands.records.writer import write_record, write_simulation
+
+NAMES = {"input_names": ("u_V", "T_K"), "output_name": "y_um"}
+
+
+def record(samples=50, dt=0.01, **changes):
+    rng = np.random.default_rng(3)
+    return Dataset(rng.normal(size=(samples, 2)), rng.normal(size=samples), dt, **(NAMES | changes))
+
+
+def read(path, **options):
+    return read_record(path, ["u_V", "T_K"], "y_um", **options)
+
+
+def test_a_record_is_read_back_exactly(tmp_path):
+    written = record(start=1.25)
+    write_record(written, tmp_path / "r.csv")
+    found = read(tmp_path / "r.csv")
+    assert np.array_equal(found.u, written.u)
+    assert np.array_equal(found.y, written.y)
+    assert (found.input_names, found.output_name) == (written.input_names, written.output_name)
+    assert (found.input_units, found.output_unit) == (("V", "K"), "um")
+    assert found.dt == pytest.approx(written.dt, rel=1e-12)
+    assert found.start == 1.25
+    assert found.segments == (50,)
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=30, max_size=40, unique=True))
+def test_every_number_is_read_back_exactly(tmp_path_factory, values):
+    file = tmp_path_factory.mktemp("writer") / "r.csv"
+    write_record(Dataset(np.array(values), np.array(values[::-1]), 1.0), file)
+    found = read_record(file, ["u"], "y", outliers="keep")
+    assert found.u[:, 0].tolist() == values
+    assert found.y.tolist() == values[::-1]
+
+
+@pytest.mark.parametrize(
+    ("dt", "start"),
+    [
+        (1e-3, 0.0),
+        (1 / 610.35, 0.0),
+        (2e-8, 0.0),
+        (3600.0, 0.0),
+        (1e-3, 1.7e9),  # seconds since 1970
+        (1e-6, -4e3),
+        (0.1, 0.1 + 0.2),
+    ],
+)
+def test_sampling_time_and_start_survive_at_any_ratio(dt, start, tmp_path):
+    write_record(record(2000, dt, start=start), tmp_path / "r.csv")
+    found = read(tmp_path / "r.csv")
+    assert found.samples == 2000
+    # A number of seconds near 2e9 has no digits beyond a quarter of a microsecond.
+    assert found.dt == pytest.approx(dt, rel=1e-9, abs=np.spacing(abs(start)) / 1000)
+    assert found.start == pytest.approx(start, rel=1e-12, abs=1e-6 * dt)
+
+
+def test_times_are_written_without_rounding_errors(tmp_path):
+    write_record(record(50, 0.1), tmp_path / "r.csv")
+    times = [line.split(",")[0] for line in (tmp_path / "r.csv").read_text().splitlines()]
+    assert times[:5] == ["t_s", "0.0", "0.1", "0.2", "0.3"]
+    assert max(len(cell) for cell in times) == 3
+
+
+def test_a_file_has_a_header_and_one_line_per_sample_on_any_platform(tmp_path):
+    write_record(record(40), tmp_path / "r.csv")
+    raw = (tmp_path / "r.csv").read_bytes()
+    assert raw.startswith(b"t_s,u_V,T_K,y_um\n")
+    assert raw.count(b"\n") == 41
+    assert b"\r" not in raw
+
+
+def test_a_name_that_needs_quotes_is_quoted(tmp_path):
+    odd = record(input_names=('u, "left"', "µ_µm"))
+    write_record(odd, tmp_path / "r.csv")
+    found = read_record(tmp_path / "r.csv", ['u, "left"', "µ_µm"], "y_um")
+    assert np.array_equal(found.u, odd.u)
+
+
+def test_a_missing_output_stays_missing(tmp_path):
+    y = record().y.copy()
+    y[10:] = math.nan
+    holed = Dataset(record().u, y, 0.01, **NAMES)
+    write_record(holed, tmp_path / "r.csv")
+    assert np.array_equal(read(tmp_path / "r.csv").y, y, equal_nan=True)
+
+
+def test_several_recordings_do_not_fit_into_one_table(tmp_path):
+    with pytest.raises(RecordError) as caught:
+        write_record(record(segments=(20, 30)), tmp_path / "r.csv")
+    assert str(caught.value) == "a CSV file holds one recording: write each segment to a separate file"
+    assert not (tmp_path / "r.csv").exists()
+
+
+def test_a_simulation_has_a_row_for_every_sample_of_the_record(tmp_path):
+    data = record(start=2.0)
+    simulated = np.sin(np.arange(50.0))
+    simulated[:3] = math.nan
+    write_simulation(data, simulated, tmp_path / "s.csv")
+    lines = (tmp_path / "s.csv").read_text().splitlines()
+    assert lines[0] == "time,y_sim"
+    assert lines[1:4] == ["2.0,nan", "2.01,nan", "2.02,nan"]
+    found = np.array([float(line.split(",")[1]) for line in lines[1:]])
+    assert np.array_equal(found, simulated, equal_nan=True)
+
+
+def test_a_simulation_of_several_recordings_concatenates_their_samples(tmp_path):
+    write_simulation(record(segments=(20, 30)), np.arange(50.0), tmp_path / "s.csv")
+    table = np.genfromtxt(tmp_path / "s.csv", delimiter=",", names=True)
+    assert table["time"].tolist() == pytest.approx((0.01 * np.arange(50)).tolist())
+    assert table["y_sim"].tolist() == list(range(50))
+
+
+@pytest.mark.parametrize("write", [write_record, lambda data, path: write_simulation(data, data.y, path)])
+def test_an_unwritable_file_is_refused_with_its_path(write, tmp_path):
+    with pytest.raises(RecordError) as caught:
+        write(record(), tmp_path / "nowhere" / "r.csv")
+    assert str(caught.value) == f"cannot write {tmp_path / 'nowhere' / 'r.csv'}: No such file or directory"

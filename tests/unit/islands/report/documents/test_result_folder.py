@@ -1,0 +1,282 @@
+"""Result folder: all fields of the contract, only JSON numbers, no files of earlier results."""
+
+import hashlib
+import json
+from dataclasses import asdict, replace
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+import islands
+from islands.estimation.estimator_table import Criterion
+from islands.persistence.models import read_model, terms_document
+from islands.persistence.result_models import read_criterion
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import content_sha256, result_document, result_json, write_result
+from islands.report.text.summary import summary
+from islands.simulation.outcome import EvaluationOutcome, Status
+from support.assessments import with_changes
+
+LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
+
+
+def record(samples=300, seed=0, **changes):
+    rng = np.random.default_rng(seed)
+    u, y = np.cumsum(rng.normal(size=samples)) / 5, np.zeros(samples)
+    for k in range(2, samples):
+        y[k] = y[k - 1] + 0.5 * (u[k - 1] - u[k - 2]) - 0.1 * y[k - 1] * abs(u[k - 1] - u[k - 2])
+    y += 0.01 * rng.normal(size=samples)
+    return Dataset(u, y, **({"dt": 0.1} | changes))
+
+
+@pytest.fixture(scope="module")
+def findings():
+    data = record(input_names=("u_V",), output_name="y_um", input_units=("V",), output_unit="um")
+    return islands.fit(data, library="phi-polynomial", max_terms=4, seed=7).with_wall_time(0.5).search_result
+
+
+def refuse(word):
+    raise AssertionError(f"{word} is no JSON")
+
+
+def loaded(findings):
+    return json.loads(result_json(findings), parse_constant=refuse)
+
+
+def with_best(findings, **changes):
+    """Return the result with changed fields of the best model."""
+    best, *others = findings.models
+    return replace(findings, models=(with_changes(best, **changes), *others))
+
+
+# The contract: the fields that issue 2 lists, and those that docs/reference/result-json.md adds.
+
+
+def test_a_result_has_every_field_of_the_contract(findings):
+    result = loaded(findings)
+    assert list(result) == [
+        *("schema", "record", "preprocessing", "seed", "settings", "search", "not_computed", "data", "loop"),
+        *("recommended", "models", "ensemble", "linear"),
+    ]
+    assert result["schema"] == "islands.result/1"
+    assert list(result["record"]) == [
+        *("sha256", "samples", "dt", "start", "names", "units", "segments", "recordings", "reading")
+    ]
+    contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
+    assert list(result["search"])[:5] == contract
+    assert set(result["data"]) == {
+        "left_out",
+        "missing_outputs",
+        "output_range",
+        "output_limits",
+        "noise",
+        "inputs",
+    }
+    assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
+    for model in result["models"]:
+        assert list(model) == [
+            *("rank", "recommended", "size", "equation", "latex", "signals", "named_equation"),
+            *("named_signals", "terms", "bands", "recordings", "warm_up", "estimated_start", "refit"),
+            *("information", "constraints", "criterion", "metrics", "outcomes", "physics"),
+            "residual_tests",
+        ]
+        for term in model["terms"]:
+            assert list(term) == ["regressor", "parameter", "standard_error", "term", "inclusion"]
+        for named, inner in (("metrics", {"mape", "r2", "rmse", "fit_percent"}), ("outcomes", None)):
+            assert set(model[named]) == {"estimation", "validation"}
+            for modes in model[named].values():
+                assert set(modes) == {"one_step_ahead", "multiple_shooting", "free_run"}
+                assert all(inner is None or set(mode) == inner for mode in modes.values())
+        assert set(model["information"]) == {"aic", "bic", "fpe"}
+        (check,) = model["constraints"]
+        text = "hysteresis"
+        assert check == {"text": text, "target": 0.0, "value": check["value"], "met": True, "named": text}
+        assert check["value"] <= 1e-9
+
+
+def test_a_result_states_the_error_that_the_parameters_minimise(findings):
+    squares = {"estimator": "least-squares", "interval": 1, "error": "one_step_ahead"}
+    free_run = {"estimator": "free-run", "interval": None, "error": "free_run"}
+    assert all(model["criterion"] in (squares, free_run) for model in loaded(findings)["models"])
+    given = with_best(findings, criterion=None)
+    assert loaded(given)["models"][0]["criterion"] is None
+    criteria = {
+        ("shooting", 500): "multiple_shooting",
+        ("free-run", None): "free_run",
+        ("output-error", None): "free_run",
+    }
+    for (estimator, interval), error in criteria.items():
+        found = with_best(findings, criterion=Criterion(estimator, interval))
+        expected = {"estimator": estimator, "interval": interval, "error": error}
+        entry = loaded(found)["models"][0]
+        assert entry["criterion"] == expected
+        assert read_criterion(entry) == Criterion(estimator, interval)
+    assert read_criterion({}) is None
+
+
+def test_a_result_names_the_recommended_model_with_reasons(findings):
+    result = loaded(findings)
+    found = findings.recommendation
+    assert result["recommended"] == json.loads(json.dumps(asdict(found)))
+    assert found.excluded
+    assert [model["rank"] for model in result["models"] if model["recommended"]] == [found.rank]
+
+
+def test_a_result_has_the_reason_that_ended_an_evolution(findings):
+    assert loaded(findings)["search"]["ended_by"] is None
+    evolved = replace(findings, search=replace(findings.search, ended_by="target error"))
+    assert loaded(evolved)["search"]["ended_by"] == "target error"
+
+
+def test_a_result_lists_physics_checks_and_residual_tests(findings):
+    for model in loaded(findings)["models"]:
+        physics, tests = model["physics"], model["residual_tests"]
+        assert set(physics) == {
+            *("property_1", "clusters", "hold_drift_percent", "holds", "excursions", "extremes"),
+            "not_computed",
+        }
+        assert physics["not_computed"] is tests["not_computed"] is None
+        assert physics["property_1"] is True
+        assert physics["clusters"] == [{"cluster": "y", "sum": pytest.approx(1.0), "target": 1.0}]
+        assert len(physics["holds"]) == 10
+        assert set(physics["holds"][0]) == {"level", "loading", "bounded", "constant", "drift_percent"}
+        assert len(physics["excursions"]) == 4
+        assert set(tests) == {
+            *("passed", "whiteness_p", "ljung_box", "tests"),
+            *("verdict", "predictable_share", "predictable_percent", "not_computed"),
+        }
+        assert tests["verdict"] in ("adequate", "minor", "inadequate")
+        assert all(0.0 <= share <= 1.0 for share in tests["predictable_share"].values())
+        assert [test["name"] for test in tests["tests"]] == ["xi_xi", "u_xi", "xi_xiu", "u2_xi", "u2_xi2"]
+        for test in tests["tests"]:
+            assert set(test) == {"name", "input", "passed", "inside_percent", "limit", "largest", "note"}
+            assert test["passed"] is (test["largest"] <= test["limit"])
+            assert 0.0 < test["largest"] < 1.0
+
+
+def test_a_result_has_the_settings_and_the_search_statistics(findings):
+    result = loaded(findings)
+    assert result["seed"] == 7
+    assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
+    assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
+    assert (result["record"]["samples"], result["record"]["dt"]) == (300, 0.1)
+    assert result["record"]["segments"] == [300]
+    count = findings.search.evaluations
+    assert result["search"]["evaluations"] == count >= 4
+    assert result["search"]["evaluations_per_second"] == pytest.approx(2.0 * count)
+    assert result["search"]["outcomes"] == {"ok": count}
+    # Equation (5): C(6 + 5, 5) terms of 3 + 3 lags to degree 5, over 225 rows less 3.
+    assert result["search"]["full_set"] == {"candidates": 462, "bytes": 8 * 462 * 222}
+
+
+def test_models_are_in_rank_order_with_their_numbers(findings):
+    result = loaded(findings)
+    assert [model["rank"] for model in result["models"]] == [1, 2, 3, 4]
+    for model, entry in zip(result["models"], findings.models, strict=True):
+        assert model["size"] == entry.model.size == len(model["terms"])
+        for term, expected in zip(model["terms"], terms_document(entry.model), strict=True):
+            assert term == {**expected, "term": term["term"], "inclusion": term["inclusion"]}
+        free_run = entry.metrics["validation"]["free_run"]
+        assert model["metrics"]["validation"]["free_run"]["mape"] == free_run.mape
+        assert model["physics"]["hold_drift_percent"] == entry.physics.hold_drift_percent
+        assert model["outcomes"]["validation"]["free_run"] == "ok"
+        assert model["warm_up"] == entry.warm_up == 3
+
+
+def test_numbers_that_json_cannot_represent_become_null(findings):
+    best = findings.models[0]
+    lost = replace(best.metrics["validation"]["free_run"], mape=nan, r2=-inf, rmse=inf)
+    metrics = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": lost}}
+    outcomes = {**best.outcomes, "validation": {**best.outcomes["validation"], "free_run": LOST}}
+    holds = (replace(best.physics.holds[0], bounded=False, drift_percent=inf), *best.physics.holds[1:])
+    changed = with_best(
+        findings,
+        metrics=metrics,
+        outcomes=outcomes,
+        information=replace(best.information, aic=-inf, bic=nan),
+        physics=replace(best.physics, holds=holds),
+    )
+    model = loaded(changed)["models"][0]
+    found = model["metrics"]["validation"]["free_run"]
+    assert (found["mape"], found["r2"], found["rmse"]) == (None, None, None)
+    assert found["fit_percent"] == lost.fit_percent
+    assert model["outcomes"]["validation"]["free_run"].startswith("diverged: |y| left 1e+06 at sample 17; ")
+    assert (model["information"]["aic"], model["information"]["bic"]) == (None, None)
+    assert model["physics"]["hold_drift_percent"] is None
+    assert model["physics"]["holds"][0]["drift_percent"] is None
+    assert model["physics"]["property_1"] is False
+
+
+def test_numpy_numbers_in_settings_are_written_as_numbers(findings):
+    settings = {"max_terms": np.int64(4), "validation": np.float64(0.25), "flag": np.bool_(True), "x": np.nan}
+    result = loaded(replace(findings, settings={"constraints": "none", "shooting": 500} | settings))
+    assert result["settings"] == {
+        "constraints": "none",
+        "shooting": 500,
+        "max_terms": 4,
+        "validation": 0.25,
+        "flag": True,
+        "x": None,
+    }
+
+
+# The record's hash.
+
+
+def test_a_record_from_a_file_has_the_hash_of_the_file(findings):
+    named = replace(findings, record=replace(findings.record, sha256="ab" * 32))
+    assert loaded(named)["record"]["sha256"] == "ab" * 32
+    assert loaded(findings)["record"]["sha256"] == content_sha256(findings.record)
+
+
+def test_a_record_without_a_file_has_the_hash_of_its_numbers():
+    plain = content_sha256(record())
+    assert plain == content_sha256(record(output_name="z", input_units=("V",)))
+    assert len(plain) == len(hashlib.sha256().hexdigest())
+    y = record().y.copy()
+    y[-1] += 1e-15
+    others = [record(seed=1), record(dt=0.2), record(segments=(100, 200)), Dataset(record().u, y, 0.1)]
+    assert len({plain, *map(content_sha256, others)}) == 5
+
+
+# The folder.
+
+
+def test_the_folder_has_a_file_per_model_a_summary_and_a_result(findings, tmp_path):
+    write_result(findings, tmp_path / "out")
+    files = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*.*"))
+    assert files == [
+        "method.txt",
+        *(f"models/0{rank}.json" for rank in range(1, 5)),
+        *("result.json", "summary.txt"),
+    ]
+    for rank, entry in enumerate(findings.models, start=1):
+        assert read_model(tmp_path / "out" / "models" / f"0{rank}.json") == entry.model
+    assert (tmp_path / "out" / "result.json").read_text() == result_json(findings)
+    assert (tmp_path / "out" / "summary.txt").read_text() == summary(
+        result_document(findings), findings.recommended.model
+    )
+
+
+def test_only_the_models_of_an_earlier_result_are_removed(findings, tmp_path):
+    write_result(findings, tmp_path)
+    (tmp_path / "models" / "mine.json").write_text("{}")
+    write_result(replace(findings, models=findings.models[:2]), tmp_path)
+    assert sorted(path.name for path in (tmp_path / "models").iterdir()) == [
+        "01.json",
+        "02.json",
+        "mine.json",
+    ]
+    assert len(json.loads((tmp_path / "result.json").read_text())["models"]) == 2
+
+
+def test_model_files_do_not_depend_on_the_folder_or_the_clock(findings, tmp_path, monkeypatch):
+    for name, seconds in (("here", 1.0), ("there", 2.0)):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        write_result(replace(findings, search=replace(findings.search, wall_s=seconds)), tmp_path / name)
+    names = ["summary.txt", "method.txt", *(f"models/0{rank}.json" for rank in range(1, 5))]
+    for name in names:
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+    assert str(tmp_path) not in "".join((tmp_path / "here" / name).read_text() for name in names)

@@ -1,0 +1,186 @@
+"""Figures of a search: convergence, islands, and error by size."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from islands.evolution.history import HistoryPoint
+from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
+from islands.report.figures.registry import search_figures
+from islands.report.figures.style import save
+
+
+def make_result(history=(), models=()):
+    """Return a stub of a result with the attributes that the figures read."""
+    entries = tuple(
+        SimpleNamespace(
+            model=SimpleNamespace(size=size),
+            metrics={
+                part: {"free_run": SimpleNamespace(mape=error)}
+                for part, error in (("estimation", estimation), ("validation", validation))
+            },
+        )
+        for size, estimation, validation in models
+    )
+    search = SimpleNamespace(history=tuple(history))
+    return SimpleNamespace(search=search, models=entries, recommended=entries[-1] if entries else None)
+
+
+#: Two sizes from the start, a third from generation 2 on; squared errors.
+HISTORY = (
+    HistoryPoint(0, 10, {1: 4.0, 3: 0.04}, (0.04,)),
+    HistoryPoint(1, 20, {1: 4.0, 3: 0.01}, (0.01,)),
+    HistoryPoint(2, 30, {1: 1.0, 2: 0.09, 3: 0.01}, (0.01,)),
+)
+
+#: Three islands; the last one has a model from generation 1 on.
+ISLANDS_HISTORY = (
+    HistoryPoint(4, 10, {1: 4.0}, (4.0, 9.0, np.inf)),
+    HistoryPoint(5, 20, {1: 1.0}, (4.0, 1.0, 16.0)),
+    HistoryPoint(6, 30, {1: 0.25}, (0.25, 1.0, 16.0)),
+)
+MODELS = ((3, 0.2, 0.3), (1, 20.0, 30.0), (2, 2.0, 1.0))
+
+
+def get_axes(figure):
+    (axes,) = figure.axes
+    return axes
+
+
+def get_lines(figure):
+    return {line.get_label(): line.get_xydata().tolist() for line in get_axes(figure).lines}
+
+
+def integer_ticks(axes):
+    low, high = axes.get_xlim()
+    shown = [tick for tick in axes.get_xticks() if low <= tick <= high]
+    assert shown
+    assert all(tick == int(tick) for tick in shown)
+    return shown
+
+
+def test_convergence_shows_the_rmse_of_every_size_over_generations():
+    figure = draw_convergence(make_result(HISTORY))
+    assert get_lines(figure) == {
+        "1": [[0.0, 2.0], [1.0, 2.0], [2.0, 1.0]],
+        "2": [[2.0, 0.3]],
+        "3": [[0.0, 0.2], [1.0, 0.1], [2.0, 0.1]],
+    }
+    axes = get_axes(figure)
+    assert axes.get_yscale() == "log"
+    assert integer_ticks(axes) == [0, 1, 2]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["1", "2", "3"]
+
+
+def test_size_with_one_generation_is_drawn_as_a_point():
+    figure = draw_convergence(make_result(HISTORY))
+    markers = {line.get_label(): line.get_marker() for line in get_axes(figure).lines}
+    assert markers == {"1": "", "2": "o", "3": ""}
+
+
+def test_search_of_one_generation_has_points_over_an_integer_tick():
+    figure = draw_convergence(make_result(HISTORY[:1]))
+    assert {line.get_marker() for line in get_axes(figure).lines} == {"o"}
+    assert integer_ticks(get_axes(figure)) == [0]
+
+
+def test_front_shows_both_parts_over_the_number_of_terms():
+    figure = draw_front(make_result(models=MODELS))
+    assert get_lines(figure) == {
+        "estimation": [[1.0, 20.0], [2.0, 2.0], [3.0, 0.2]],
+        "validation": [[1.0, 30.0], [2.0, 1.0], [3.0, 0.3]],
+        "recommended": [[2.0, 1.0]],
+    }
+    assert integer_ticks(get_axes(figure)) == [1, 2, 3]
+
+
+def test_front_of_one_model_has_an_integer_tick():
+    assert integer_ticks(get_axes(draw_front(make_result(models=MODELS[:1])))) == [3]
+
+
+@pytest.mark.parametrize("errors", [(2.7, 4.2), (0.051, 0.062), (9.5, 10.5), (0.01, 100.0)])
+def test_error_axis_has_tick_labels_for_every_range(errors):
+    """A range within one decade may contain no power of ten, so minor ticks need labels."""
+    figure = draw_front(make_result(models=((2, errors[0], errors[0]), (3, errors[1], errors[1]))))
+    axes = get_axes(figure)
+    low, high = axes.get_ylim()
+    figure.draw_without_rendering()
+    ticks = [*axes.yaxis.get_major_ticks(), *axes.yaxis.get_minor_ticks()]
+    numbers = [
+        float(tick.label1.get_text())
+        for tick in ticks
+        if low <= tick.get_loc() <= high and tick.label1.get_text()
+    ]
+    assert numbers
+    assert all(low * 0.99 <= number <= high * 1.01 for number in numbers)
+
+
+def test_diverged_and_exact_models_do_not_affect_the_error_axis():
+    models = ((1, np.nan, 30.0), (2, 2.0, 0.0), (3, 0.2, 0.3))
+    figure = draw_front(make_result(models=models))
+    low, high = get_axes(figure).get_ylim()
+    assert 0.0 < low < 0.2
+    assert 30.0 < high < 1000.0
+
+
+@pytest.mark.parametrize("sizes", [1, 9, 30])
+def test_legend_of_many_sizes_stays_inside_the_figure(sizes):
+    history = [
+        HistoryPoint(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)}, (1.0 / sizes,))
+        for generation in (0, 1, 2)
+    ]
+    figure = draw_convergence(make_result(history))
+    legend = get_axes(figure).get_legend()
+    assert len(legend.get_texts()) == sizes
+    box = legend.get_window_extent()
+    assert figure.bbox.x0 <= box.x0
+    assert box.x1 <= figure.bbox.x1
+    assert figure.bbox.y0 <= box.y0
+    assert box.y1 <= figure.bbox.y1
+    assert get_axes(figure).get_position().width > 0.4
+    assert box.x0 >= get_axes(figure).get_window_extent().x1
+
+
+def test_islands_figure_has_a_line_per_island_and_one_for_the_best():
+    figure = draw_islands(make_result(ISLANDS_HISTORY))
+    *islands, best = (line.get_xydata() for line in get_axes(figure).lines)
+    expected = [[2.0, 2.0, 0.5], [3.0, 1.0, 1.0], [np.nan, 4.0, 4.0]]
+    assert len(islands) == 3
+    for line, errors in zip([*islands, best], [*expected, [2.0, 1.0, 0.5]], strict=True):
+        assert line[:, 0].tolist() == [4.0, 5.0, 6.0]
+        np.testing.assert_array_equal(line[:, 1], errors)
+    axes = get_axes(figure)
+    assert axes.get_yscale() == "log"
+    assert integer_ticks(axes) == [4, 5, 6]
+    # One legend entry is enough for all islands.
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["one island", "best island"]
+
+
+def test_generation_without_models_is_left_empty():
+    blank = (HistoryPoint(0, 1, {}, (np.inf, np.inf)), *ISLANDS_HISTORY)
+    figure = draw_islands(make_result([HistoryPoint(p.generation, 1, {}, p.islands[:2]) for p in blank]))
+    best = get_axes(figure).lines[-1].get_xydata()[:, 1]
+    np.testing.assert_array_equal(best, [np.nan, 2.0, 1.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("history", "names"),
+    [
+        ((), ("record", "front")),
+        (HISTORY, ("record", "front", "convergence")),
+        (ISLANDS_HISTORY, ("record", "front", "convergence", "islands")),
+    ],
+)
+def test_search_figures_depend_on_the_history(history, names):
+    assert search_figures(make_result(history)) == names
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [draw_convergence, *(pytest.param(each, marks=pytest.mark.ci) for each in (draw_front, draw_islands))],
+)
+def test_saving_twice_gives_the_same_bytes(draw, tmp_path):
+    for name in ("first", "second"):
+        save(draw(make_result(HISTORY, MODELS)), tmp_path / f"{name}.svg")
+    assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()

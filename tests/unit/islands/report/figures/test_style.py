@@ -1,0 +1,136 @@
+"""Style of figures: labels, matplotlib settings, reproducible files."""
+
+import hashlib
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from islands.records.dataset import Dataset
+from islands.report.figures.free_run import draw_free_run
+from islands.report.figures.style import WIDTH, blank, house_style, label, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def example() -> "Figure":
+    u = np.sin(np.arange(300) / 10)
+    return draw_free_run(
+        Dataset(u, 2 * u, 0.1, ("u_V",), "y_um", ("V",), "um"), 1.9 * u, "the same $ content_"
+    )
+
+
+@pytest.fixture
+def matplotlib() -> ModuleType:
+    return import_module("matplotlib")
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "expected"),
+    [
+        ("y_um", "um", "y (um)"),
+        ("u_est_V", "V", "u_est (V)"),
+        ("force [N]", "N", "force (N)"),
+        ("force (N)", "N", "force (N)"),
+        ("y", "um", "y (um)"),
+        ("y_um", "m", "y_um (m)"),
+        ("y_um", "", "y_um"),
+        ("_V", "V", "(V)"),
+    ],
+)
+def test_label_is_the_name_with_the_unit_in_parentheses(name, unit, expected):
+    assert label(name, unit) == expected
+
+
+def test_matplotlib_settings_are_restored_after_drawing(matplotlib):
+    before = dict(matplotlib.rcParams.copy())
+    example()
+    with house_style():
+        assert matplotlib.rcParams["svg.hashsalt"] == "islands"
+    assert dict(matplotlib.rcParams.copy()) == before
+
+
+def test_matplotlib_settings_are_restored_after_an_exception(matplotlib):
+    with pytest.raises(ZeroDivisionError), house_style():
+        raise ZeroDivisionError
+    assert matplotlib.rcParams["svg.hashsalt"] is None
+
+
+def test_figure_has_the_width_of_an_article_column():
+    assert blank(3.0).get_size_inches().tolist() == [WIDTH, 3.0]
+
+
+def test_long_title_is_wrapped_and_line_breaks_are_kept():
+    assert blank(3.0, "word " * 40 + "\nend").get_suptitle().count("\n") == 3
+
+
+@pytest.mark.ci
+def test_equal_content_gives_equal_bytes(tmp_path):
+    figure = example()
+    save(figure, tmp_path / "first.svg")
+    figure.savefig(tmp_path / "between.png")
+    save(figure, tmp_path / "again.svg")
+    save(example(), tmp_path / "redrawn.svg")
+    first = (tmp_path / "first.svg").read_bytes()
+    assert (tmp_path / "again.svg").read_bytes() == first
+    assert (tmp_path / "redrawn.svg").read_bytes() == first
+
+
+def test_different_curves_give_different_bytes(tmp_path):
+    save(example(), tmp_path / "one.svg")
+    other = example()
+    other.axes[0].lines[0].set_ydata(np.zeros(300))
+    save(other, tmp_path / "other.svg")
+    assert (tmp_path / "one.svg").read_bytes() != (tmp_path / "other.svg").read_bytes()
+
+
+def test_matplotlib_settings_of_the_user_have_no_effect(tmp_path, matplotlib):
+    save(example(), tmp_path / "plain.svg")
+    with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "none"}):
+        save(example(), tmp_path / "expected.svg")
+    assert (tmp_path / "expected.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
+
+
+def test_file_has_no_date_no_image_and_no_font(tmp_path, matplotlib):
+    save(example(), str(tmp_path / "figure.svg"))
+    text = (tmp_path / "figure.svg").read_text(encoding="utf-8")
+    assert text.count("<svg ") == 1
+    for unwanted in ("dc:date", "<image", "<text", "font-family", matplotlib.__version__):
+        assert unwanted not in text
+
+
+@pytest.mark.ci
+def test_another_process_writes_equal_bytes_without_pyplot(tmp_path):
+    code = """
+import hashlib, importlib.util, pkgutil, sys
+import islands.report.figures
+for module in pkgutil.iter_modules(islands.report.figures.__path__):
+    importlib.import_module("islands.report.figures." + module.name)
+assert "islands.report.figures.hold" in sys.modules
+spec = importlib.util.spec_from_file_location("tests_of_style", sys.argv[1])
+tests = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(tests)
+tests.save(tests.example(), sys.argv[2])
+print("matplotlib.pyplot" in sys.modules)
+"""
+    expected, actual = tmp_path / "expected.svg", tmp_path / "actual.svg"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, __file__, str(expected)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    assert done.stdout == "False\n"
+    save(example(), actual)
+    assert digest(expected) == digest(actual)
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

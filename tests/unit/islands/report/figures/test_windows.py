@@ -1,0 +1,58 @@
+"""Parts of a record that figures show: last loops and representative section."""
+
+import numpy as np
+
+from islands.records.dataset import Dataset
+from islands.records.loops import loop_starts
+from islands.report.figures.windows import LOOPS, last_loops, representative_window
+
+
+def sine(periods: int, length: int = 100, **changes: object) -> Dataset:
+    k = np.arange(periods * length)
+    u = np.sin(2 * np.pi * k / length - 0.5)
+    return Dataset(u, 2 * u, 0.01, **changes)
+
+
+def test_last_loops_are_complete_periods_at_the_end():
+    rows = last_loops(sine(40))
+    assert rows.stop - rows.start == 100 * LOOPS + 1
+    assert rows.stop > 3900
+
+
+def test_record_of_few_loops_is_shown_completely():
+    assert last_loops(sine(LOOPS)) == slice(0, 100 * LOOPS)
+
+
+def test_section_is_needed_for_more_than_twenty_loops():
+    assert representative_window(sine(20), np.ones(2000)) is None
+    assert representative_window(sine(21), np.ones(2100)) is not None
+
+
+def test_short_record_is_shown_completely_for_any_number_of_loops():
+    record = sine(60, length=3)
+    assert len(loop_starts(record)) > 20
+    assert representative_window(record, np.ones(record.samples)) is None
+
+
+def test_section_has_the_median_residual():
+    record = sine(25)
+    residual = np.repeat([5.0, 1.0, 4.0, 3.0, 2.0], 500)
+    assert representative_window(record, residual) == slice(1500, 2000)
+
+
+def test_section_with_missing_residuals_is_never_selected():
+    record = sine(25)
+    residual = np.repeat([5.0, np.nan, np.nan, np.nan, 2.0], 500)
+    assert representative_window(record, residual) == slice(0, 500)
+
+
+def test_first_section_is_selected_if_all_residuals_are_missing():
+    assert representative_window(sine(25), np.full(2500, np.nan)) == slice(0, 500)
+
+
+def test_sections_do_not_cross_segments_that_are_long_enough():
+    record = sine(30, segments=(700, 1300, 1000))
+    section = representative_window(record, np.arange(3000.0))
+    assert section is not None
+    assert any(begin <= section.start and section.stop <= end for begin, end in record.bounds)
+    assert section == slice(1200, 1700)

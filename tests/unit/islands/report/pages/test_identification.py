@@ -1,0 +1,97 @@
+"""HTML report of an identification: order, parameters, other models."""
+
+import re
+from html import unescape
+
+import pytest
+
+import islands
+from islands.models.equations import named_term
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import result_document
+from islands.report.pages.identification import identification_report
+from islands.report.pages.origin import Origin
+from support.identifications import record
+
+FIGURES = {
+    f"{name}.svg": f"<svg>{name}</svg>".encode() for name in ("free-run", "residuals", "loop", "front")
+}
+
+
+@pytest.fixture(scope="module")
+def found():
+    data = record(300)
+    named = Dataset(data.u, data.y, 0.01, ("u_V",), "y_um", ("V",), "um")
+    return islands.fit(named, library="polynomial", degree=1, lags=1, max_terms=2, certificate=0, average=1)
+
+
+def write(found, figures=FIGURES, **changes):
+    document = result_document(found.search_result) | changes
+    return identification_report(
+        Origin("job"), document, found.best.model.equation().mathml, figures
+    ).decode()
+
+
+def test_terms_have_the_names_of_the_columns(found):
+    page = unescape(write(found))
+    for place in range(found.best.model.size):
+        term = named_term(found.best.model, place)
+        assert re.search(r"[uy]_(V|um)\(k", term)
+        assert f'<th scope="row">{term}</th>' in page
+
+
+def test_headline_with_the_error_and_the_free_run_precede_everything_else(found):
+    page = write(found)
+    error = found.best.metrics["validation"]["free_run"].mape
+    order = [
+        f"error of {error:.3g}\u00a0% of its range",
+        "Free run of",
+        "<math",
+        "95 % interval",
+        "Validation",
+    ]
+    order += ["Correlations of", "Appendix", "Error against size"]
+    places = [page.index(each) for each in order]
+    assert places == sorted(places)
+
+
+def test_figures_of_hysteresis_are_in_the_report_of_a_model_of_hysteresis_alone(found):
+    assert "Output over input" not in write(found)
+    settings = {**found.settings, "constraints": ["hysteresis"]}
+    assert "Output over input" in write(found, settings=settings)
+
+
+def test_appendix_has_the_equations_of_the_other_models_and_all_settings(found):
+    page = unescape(write(found))
+    main, appendix = page.split('<section class="appendix">')
+    others = [each for each in found.models if each.rank != found.best.rank]
+    assert others
+    for each in others:
+        equation = each.model.equation().named
+        assert equation in appendix
+        assert equation not in main
+    for name in ("max_terms", "library", "SHA-256", "seed"):
+        assert f"<dt>{name}</dt>" in appendix
+
+
+def test_names_of_columns_are_text(found):
+    document = result_document(found.search_result)
+    names = {"inputs": ["<u>"], "output": "<script>"}
+    page = write(found, record={**document["record"], "names": names})
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_diverged_free_run_has_no_number(found):
+    document = result_document(found.search_result)
+    (entry, *_) = document["models"]
+    lost = dict.fromkeys(entry["metrics"]["validation"]["free_run"])
+    validation = {**entry["metrics"]["validation"], "free_run": lost}
+    outcomes = {
+        **entry["outcomes"],
+        "validation": {**entry["outcomes"]["validation"], "free_run": "diverged"},
+    }
+    changed = {**entry, "metrics": {**entry["metrics"], "validation": validation}, "outcomes": outcomes}
+    page = write(found, models=[changed], recommended={"rank": 1, "reasons": []})
+    assert "diverges on the validation data" in page
+    assert '<th scope="row">free run, validation data</th><td>diverged</td>' in page
