@@ -173,7 +173,7 @@ def restore_backup(
     BackupError
         The backup is incomplete or damaged, or the database is not empty.
     StoreError
-        A newer version of islands wrote the backup.
+        Another version of islands wrote the backup, and this one cannot migrate it.
     """
     manifest = verify_backup(source, report)
     with database.read() as connection:

@@ -1,7 +1,6 @@
 """Backups of a store: complete at one moment, verifiable, and restorable into either kind of database."""
 
 import gzip
-import hashlib
 import json
 import threading
 from collections.abc import Callable, Iterator
@@ -16,8 +15,7 @@ from islands_service.backup import MANIFEST, BackupError, create_backup, restore
 from islands_service.domain.job import Job, ProgressReport, Requester
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import Database
-from islands_service.store.migrations.upgrade import upgrade
+from islands_service.store.database import Database, StoreError
 from islands_service.store.tables import jobs, metadata
 from support.stores import ALICE, BOB, FOUND, asked, claimed, submitted
 
@@ -92,32 +90,17 @@ def test_a_restored_store_equals_the_stored_one(
         assert len(again.audit.entries()) == audited + 1
 
 
-def test_a_backup_of_an_earlier_revision_is_migrated(tmp_path: Path, sqlite_database: str) -> None:
+def test_a_backup_of_an_unknown_version_is_refused(tmp_path: Path, sqlite_database: str) -> None:
     with Store(sqlite_database) as store:
-        job = submitted(store)
-        backup = tmp_path / "backup"
-        create_backup(store.database, Blobs(tmp_path / "blobs"), backup)
-    old = Database(f"sqlite:///{tmp_path / 'old.db'}")
-    with old.exclusive() as connection:
-        upgrade(connection, "0001")
-        columns = {each["name"] for each in connection.exec_driver_sql("PRAGMA table_info(jobs)").mappings()}
-    old.close()
-    manifest = json.loads((backup / MANIFEST).read_text())
-    path = backup / "tables/jobs.jsonl.gz"
-    rows = read_rows(backup)
-    with gzip.open(path, "wt") as stream:
-        for row in rows:
-            stream.write(json.dumps({name: row[name] for name in columns}) + "\n")
-    _resign(backup, manifest, "jobs", revision="0001")
-    with restored(backup, f"sqlite:///{tmp_path / 'new.db'}", Blobs(tmp_path / "restored")) as again:
-        assert again.jobs.get(ALICE, job.id).spec == job.spec
-
-
-def _resign(backup: Path, manifest: dict[str, Any], table: str, **changes: Any) -> None:
-    """Store the hash of a changed table in the manifest."""
-    path = backup / f"tables/{table}.jsonl.gz"
-    manifest["tables"][table]["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
-    (backup / MANIFEST).write_text(json.dumps({**manifest, **changes}))
+        create_backup(store.database, Blobs(tmp_path / "blobs"), tmp_path / "backup")
+    path = tmp_path / "backup" / MANIFEST
+    path.write_text(json.dumps({**json.loads(path.read_text()), "revision": "0012"}))
+    target = Database(f"sqlite:///{tmp_path / 'new.db'}")
+    with pytest.raises(StoreError, match="the revision 0012"):
+        restore_backup(tmp_path / "backup", target, Blobs(tmp_path / "restored"))
+    with target.read() as connection:
+        assert not connection.dialect.get_table_names(connection)
+    target.close()
 
 
 def test_a_backup_has_the_checkpoints_of_its_moment(store: Store, blobs: Blobs, tmp_path: Path) -> None:

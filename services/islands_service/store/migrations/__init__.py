@@ -1,1 +1,1 @@
-"""Alembic migrations of the store, one file per revision."""
+"""Alembic migrations of the store, one file for each release that changes the schema."""

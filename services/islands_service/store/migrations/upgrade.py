@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, inspect, text
 
+from islands_service.domain.job import ISLANDS_VERSION
 from islands_service.store.backends import dialect
 from islands_service.store.database import Database, StoreError
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 #: Revision that the code is written for. Importing Alembic takes a quarter of a second, and a database of
 #: this revision does not need it. A test compares this constant with the migrations.
-HEAD = "0012"
+HEAD = "0.2.0"
 
 
 def prepare(database: Database) -> None:
@@ -23,7 +24,7 @@ def prepare(database: Database) -> None:
     Raises
     ------
     StoreError
-        The database was written by a newer version of islands.
+        Another version of islands made the database, and this one cannot migrate it.
     """
     with database.read() as connection:
         if revision(connection) == HEAD:
@@ -41,26 +42,27 @@ def revision(connection: Connection) -> str | None:
     return found
 
 
-def upgrade(connection: Connection, to: str = "head") -> None:
+def upgrade(connection: Connection, to: str = HEAD) -> None:
     """Migrate the schema within the transaction of the connection.
 
     Raises
     ------
     StoreError
-        The database was written by a newer version of islands.
+        This version of islands does not know the revision of the database, or the one to migrate to.
     """
     from alembic import command  # noqa: PLC0415
     from alembic.script import ScriptDirectory  # noqa: PLC0415
 
     config = configuration()
     config.attributes["connection"] = connection
-    current = revision(connection)
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    if current is not None and current not in known:
-        raise StoreError(
-            f"the database has revision {current}, which this version of islands does not know: it was made "
-            "by a newer one; run that, or give another database"
-        )
+    for number in filter(None, (revision(connection), to)):
+        if number not in known:
+            raise StoreError(
+                f"islands {ISLANDS_VERSION} does not know the revision {number} of the database: a newer "
+                "version made it, or one from before the first release. Run that version, or begin with an "
+                "empty database (another --data-dir or --database)"
+            )
     command.upgrade(config, to)
 
 

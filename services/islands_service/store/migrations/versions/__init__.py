@@ -1,1 +1,1 @@
-"""Schema revisions in the order of their numbers; `upgrade.HEAD` names the last one."""
+"""Schema revisions, each named by the release that made it; `upgrade.HEAD` names the last one."""
