@@ -5,7 +5,7 @@ BIN := .venv/bin
 # INSTALL_OPTIONS=--pip installs everything by pip instead of uv.
 INSTALL := $(PYTHON) deploy/packages/install.py .venv $(INSTALL_OPTIONS)
 
-.PHONY: help setup demo collect test ci nightly soak fuzz load lint kernels bench docs lock sbom licences audit wheel wheel-matrix clean
+.PHONY: help setup demo collect test ci nightly soak fuzz load lint kernels bench docs lock sbom licences audit wheel release clean
 
 # The first target, so that `make` alone prints it.
 help:
@@ -111,9 +111,10 @@ audit: .venv/ready-packages
 wheel: setup
 	$(BIN)/python -m build --no-isolation --wheel --outdir dist .
 
-# The wheel on Python 3.11, 3.12 and 3.13, with all extras and with the core only: a quarter of an hour, and an index of packages.
-wheel-matrix: setup
-	.ci/wheel-matrix
+# Source archive and wheel with hashes in dist/, tested on Python 3.11, 3.12 and 3.13, with all extras and with the core only: a
+# quarter of an hour, and an index of packages.
+release: setup
+	.ci/release
 
 clean:
 	rm -rf .venv build dist demo-out bench-out site

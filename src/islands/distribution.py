@@ -3,7 +3,7 @@
 import re
 
 #: Name of the distribution. It differs from that of the import package, which is free in the public index of
-#: packages, so that another project may take it. Nothing is published: users install a wheel or a checkout.
+#: packages, so that another project may take it. Until it is published, users install a wheel or a checkout.
 NAME = "islands-sysid"
 
 #: A requirement of the distribution: the name of a package, and the extra that needs it.

@@ -1,6 +1,6 @@
 """The core without its extras: the commands of an engineer run, and the others name the extra that they need.
 
-`make wheel-matrix` runs this file in environments that have the core only, without the other files of the
+`make release` runs this file in environments that have the core only, without the other files of the
 tests. Elsewhere the packages of the extras are hidden.
 """
 

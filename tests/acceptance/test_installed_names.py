@@ -72,7 +72,7 @@ def test_no_file_installs_the_project_by_name():
         "pip install 'islands[service]'",
         "pip install --upgrade islands",
         "RUN /opt/islands/bin/pip install --no-deps islands",
-        "uv pip install islands-sysid==0.1.0",
+        "uv pip install islands-sysid==0.2.0",
         "uv tool install islands_sysid",
         "(`pip install islands`).",
         "install islands[fmi] to simulate an FMU",
@@ -86,7 +86,7 @@ def test_an_installation_by_name_is_found(text):
 @pytest.mark.parametrize(
     "text",
     [
-        "pip install 'dist/islands_sysid-0.1.0-py3-none-any.whl[all]'",
+        "pip install 'dist/islands_sysid-0.2.0-py3-none-any.whl[all]'",
         '/opt/islands/bin/pip install --no-deps "$(echo "$PWD"/dist/islands_sysid-*.whl)"',
         "python3 deploy/packages/install.py /opt/islands --extra server",
         "archipelago.islands[index]",

@@ -58,7 +58,9 @@ def test_a_class_name_is_unique() -> None:
 def test_a_folder_has_several_modules() -> None:
     modules = [path for path in SOURCES if "__" not in path.stem]
     found = Counter(folder for path in modules for folder in path.parents)
-    assert not [folder for folder in {path.parent for path in SOURCES} if found[folder] < LEAST_MODULES]
+    small = {folder for folder in {path.parent for path in SOURCES} if found[folder] < LEAST_MODULES}
+    # Alembic loads every module of this folder as a revision, and there is one for each change of the schema.
+    assert small <= {ROOT / "services/islands_service/store/migrations/versions"}
 
 
 def test_a_function_is_short() -> None:
