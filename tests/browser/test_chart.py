@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import Any
 
 import pytest
 
-from support.canvas import DRAWN, count_segments, get_drawn, get_faint_lines, get_lines
-from support.processes import eventually
+from support.canvas import DRAWN, count_segments, get_lines
 from support.screen import Screen
 from support.service_client import ServiceClient
 
@@ -60,15 +58,6 @@ def heights(chart: Any, name: str) -> list[float]:
     return [y for part in get_lines(chart)[name] for _, y in part]
 
 
-def test_long_tick_labels_do_not_cover_the_title_of_the_axis(page: Any) -> None:
-    chart = draw(page, [make_series("a", [[0, 1.02345e-4], [1, 1.02346e-4]])])
-    texts = get_drawn(chart)["texts"]
-    ticks = [each for each in texts if each["align"] == "end"]
-    assert max(len(each["text"]) for each in ticks) > 8
-    (title,) = [each for each in texts if each["text"] == "RMS error"]
-    assert 0 <= title["left"] < title["right"] < min(each["left"] for each in ticks)
-
-
 @pytest.mark.parametrize(
     ("value", "half", "written"),
     [
@@ -83,14 +72,6 @@ def test_an_interval_has_two_digits_and_its_value_as_many_decimals(
     page: Any, value: float, half: float, written: str
 ) -> None:
     assert call(page, "lib/numbers.js", "formatInterval", value, half) == written
-
-
-def test_equal_ratios_are_equal_distances_on_a_logarithmic_axis(page: Any) -> None:
-    points = [[at, 10.0**-at] for at in range(5)]
-    drawn = heights(draw(page, [make_series("a", points)], **LOG), "a")
-    steps = [below - above for above, below in pairwise(drawn)]
-    assert len(steps) == 4
-    assert all(math.isclose(step, steps[0], abs_tol=0.11) and step > 20 for step in steps)
 
 
 def test_every_series_has_its_line_and_its_last_value_in_the_legend(page: Any) -> None:
@@ -109,23 +90,11 @@ def test_every_series_has_its_line_and_its_last_value_in_the_legend(page: Any) -
     assert chart.locator(".legend data").last.get_attribute("value") == "1.5"
 
 
-def test_faint_series_are_drawn_without_an_entry_in_the_legend(page: Any) -> None:
-    points = [[0, 1.0], [1, 0.5]]
-    chart = draw(page, [make_series("one", points, faint=True), make_series("best", points)])
-    assert get_faint_lines(chart) == get_lines(chart)["best"]
-    assert chart.locator(".legend li").all_text_contents() == ["best 0.500"]
-
-
 def test_a_line_is_interrupted_at_missing_or_nonpositive_values(page: Any) -> None:
     points = [[0, 1.0], [1, None], [2, 0.1], [3, 0.0], [4, 0.01], [5, -1.0]]
     parts = get_lines(draw(page, [make_series("a", points)], **LOG))["a"]
     assert [len(part) for part in parts] == [1, 1, 1]
     assert all(math.isfinite(each) for part in parts for point in part for each in point)
-
-
-def test_a_chart_without_data_is_hidden(page: Any) -> None:
-    for points in ([], [[0, None]], [[0, 0.0]]):
-        assert draw(page, [make_series("a", points)], **LOG).is_hidden()
 
 
 def test_a_single_point_and_a_constant_are_drawn(page: Any) -> None:
@@ -149,77 +118,6 @@ def test_arrow_keys_move_the_pointer_and_announce_the_values(page: Any) -> None:
         page.keyboard.press(key)
         assert plot.get_attribute("aria-valuetext") == said
     assert (plot.get_attribute("aria-valuemin"), plot.get_attribute("aria-valuemax")) == ("0", "45")
-
-
-def test_the_mouse_shows_the_value_under_it_until_it_leaves(page: Any) -> None:
-    chart = draw(page, [make_series("a", [[at, float(at + 1)] for at in range(11)])])
-    box = chart.locator(".plot").bounding_box()
-    page.mouse.move(box["x"] + 58 + 1, box["y"] + 50)
-    assert chart.locator(".legend").text_content() == "a 1.00"
-    page.mouse.move(box["x"] + 58, box["y"] - 40)
-    assert chart.locator(".legend").text_content() == "a 11.0"
-
-
-#: Draws a line of one more point in each of 40 frames, twice; returns the number of drawings, the texts of
-#: the position and the seconds.
-STREAM = """async () => {
-  const chart = document.querySelector("figure.chart");
-  const [canvas, position] = ["canvas", ".position"].map((each) => chart.querySelector(each));
-  const nextFrame = () => new Promise((done) => requestAnimationFrame(done));
-  const [drawings, begin, texts] = [canvas.drawings, performance.now(), []];
-  new MutationObserver(() => texts.push(position.textContent)).observe(position, { childList: true });
-  const x = [0];
-  for (let frame = 1; frame <= 40; frame += 1) {
-    for (const part of [0, 0.5]) {
-      x.push(frame + part);
-      window.chart.draw([{ name: "a", x, y: x }]);
-    }
-    await nextFrame();
-  }
-  const seconds = (performance.now() - begin) / 1000;
-  await nextFrame();
-  return [canvas.drawings - drawings, texts, seconds];
-}"""
-
-
-def test_changes_before_a_frame_are_one_drawing_and_texts_can_be_read(page: Any, expect: Any) -> None:
-    chart = draw(page, [make_series("a", [[0, 0.0]])])
-    drawings, texts, seconds = page.evaluate(STREAM)
-    assert 35 <= drawings <= 42
-    assert 1 <= len(texts) <= seconds / 0.25 + 1
-    expect(chart.locator(".position")).to_have_text("generation 40.5")
-    expect(chart.locator(".legend")).to_have_text("a 40.5")
-    assert count_segments(get_lines(chart)["a"]) == 80
-
-
-@pytest.mark.parametrize("change", [{"color_scheme": "dark"}, {"forced_colors": "active"}])
-def test_a_change_of_the_theme_changes_the_colours_of_a_chart(page: Any, change: dict[str, str]) -> None:
-    chart = draw(page, [make_series("a", [[0, 1.0], [1, 2.0]])])
-    before = {each["colour"] for each in get_drawn(chart)["texts"]}
-    page.emulate_media(**change)
-    try:
-        eventually(lambda: {each["colour"] for each in get_drawn(chart)["texts"]}.isdisjoint(before))
-        # The line has the colour of its swatch in the legend, and texts that of `--soft`.
-        assert count_segments(get_lines(chart)["a"]) == 1
-        soft = """(node) => {
-          const pen = document.createElement("canvas").getContext("2d");
-          pen.fillStyle = getComputedStyle(node).color;
-          return pen.fillStyle;
-        }"""
-        colours = {each["colour"] for each in get_drawn(chart)["texts"]}
-        assert colours == {chart.locator(".position").evaluate(soft)}
-    finally:
-        page.emulate_media(color_scheme="light", forced_colors="none")
-
-
-def test_an_event_is_a_line_over_the_series_or_a_band_behind_them(page: Any) -> None:
-    events = [{"kind": "alarm", "at": 2}, {"kind": "training", "from": 0, "to": 1}]
-    chart = draw(page, [make_series("a", [[0, 1.0], [1, 2.0], [2, 1.5]])], events)
-    (line,) = get_lines(chart)["a"]
-    drawn = get_drawn(chart)
-    (band,) = drawn["bands"]
-    assert (band["x"], band["width"]) == pytest.approx((line[0][0] - 3, line[1][0] - line[0][0] + 6))
-    assert {at for at, _ in drawn["lines"][-1]["parts"][0]} == {line[2][0]}
 
 
 def test_the_name_of_a_series_is_not_interpreted_as_markup(page: Any) -> None:
@@ -253,22 +151,6 @@ def test_round_ticks_are_within_the_axis_and_of_suitable_number(page: Any, low: 
     assert 2 <= len(ticks) <= 7
     assert all(low - 1e-9 * (high - low) <= tick <= high + 1e-9 * (high - low) for tick in ticks)
     assert ticks == sorted(set(ticks))
-
-
-def test_ticks_of_an_integer_axis_are_integers(page: Any) -> None:
-    for last in (1, 2, 3, 4, 7, 9, 25):
-        ticks = call(page, "lib/scale.js", "roundTicks", 0.6, last + 0.4, 8, True)
-        assert all(tick == int(tick) for tick in ticks)
-        assert len(ticks) >= 1
-
-
-@pytest.mark.parametrize(
-    ("low", "high"), [(5e-3, 7e-3), (1e-3, 2e-2), (1e-12, 1e5), (0.9, 1.1), (1e-3, 1e-2)]
-)
-def test_ticks_of_a_logarithmic_axis_are_within_it(page: Any, low: float, high: float) -> None:
-    ticks = call(page, "lib/scale.js", "logTicks", low, high, 6)
-    assert 2 <= len(ticks) <= 9
-    assert all(low * (1 - 1e-6) <= tick <= high * (1 + 1e-6) for tick in ticks)
 
 
 @pytest.mark.parametrize(
@@ -314,20 +196,6 @@ def list_island_errors(page: Any, points: list[dict[str, Any]]) -> list[dict[str
     return series
 
 
-def test_many_islands_are_summarised_by_best_and_worst(page: Any) -> None:
-    points = [{"generation": g, "islands": [4.0 ** -(i % 3) for i in range(20)]} for g in range(3)]
-    points[0]["islands"][0] = None
-    series = list_island_errors(page, points)
-    named = [each for each in series if not each["faint"]]
-    assert len(series) == 22
-    assert [(each["name"], each["y"][-1]) for each in named] == [
-        ("best of 20 islands", 0.25),
-        ("worst of 20 islands", 1.0),
-    ]
-    assert series[0]["y"][0] is None
-    assert [each["x"] for each in series] == [[0, 1, 2]] * 22
-
-
 def test_the_errors_of_a_long_search_are_those_of_spread_generations(page: Any) -> None:
     points = [{"generation": g, "islands": [1.0 + g, 4.0 + g]} for g in range(5000)]
     series = list_island_errors(page, points)
@@ -336,28 +204,3 @@ def test_the_errors_of_a_long_search_are_those_of_spread_generations(page: Any) 
         assert 300 <= len(each["x"]) <= 600
         assert (each["x"][0], each["x"][-1]) == (0, 4999)
         assert each["y"] == pytest.approx([math.sqrt(first + g) for g in each["x"]])
-
-
-def test_a_cached_figure_does_not_change_the_clock(page: Any) -> None:
-    """The cached response has the date of the first one."""
-    headers = {"Date": "Thu, 01 Jan 2026 00:00:00 GMT", "Cache-Control": "private, max-age=86400, immutable"}
-    page.route("**/kept.svg", lambda route: route.fulfill(headers=headers, body="<svg/>"))
-    age = page.evaluate("""async () => {
-      const modules = [import("/dashboard/lib/api.js"), import("/dashboard/lib/clock.js")];
-      const [api, clock] = await Promise.all(modules);
-      await api.getJson("/healthz");
-      await api.getBlob("/kept.svg");
-      return clock.makeAge(new Date(Date.now() - 7_300_000).toISOString()).textContent;
-    }""")
-    page.unroute("**/kept.svg")
-    assert age == "2 h ago"
-
-
-def test_halving_a_history_keeps_its_last_point(page: Any) -> None:
-    assert call(page, "components/convergence.js", "halve", list(range(10))) == [0, 2, 4, 6, 8, 9]
-
-
-def test_a_label_has_the_unit_once(page: Any) -> None:
-    labels = [("CH1 [V]", "V"), ("Block (°C)", "°C"), ("u_V", "V"), ("u", None)]
-    found = [call(page, "lib/numbers.js", "labelQuantity", *each) for each in labels]
-    assert found == ["CH1 [V]", "Block (°C)", "u_V (V)", "u"]

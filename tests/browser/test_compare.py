@@ -3,14 +3,12 @@
 import json
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from support.played import run_submitted
 from support.reading import unreadable
-from support.screen import Screen
 from support.service_client import ServiceClient
 
 pytestmark = pytest.mark.ci
@@ -59,34 +57,6 @@ def test_two_jobs_are_compared(
     assert unreadable(compared) == []
 
 
-def test_a_comparison_names_the_models_whose_errors_belong_to_other_parameters(
-    opened: Callable[..., Any], service: ServiceClient, jobs: tuple[str, str], expect: Any
-) -> None:
-    refitted = run_submitted(service, service.submit(5, name="again", settings={"refit": "all"}))
-    page = opened(f"#/compare?jobs={jobs[0]},{refitted}")
-    note = page.get_by_text("estimated again on all data after the errors were measured")
-    expect(note).to_have_count(1)
-    assert note.inner_text().startswith("again, model ")
-
-
-def test_the_report_of_the_comparison_is_one_file_of_four_pages(
-    compared: Any, quiet: Callable[..., Screen], tmp_path: Path, expect: Any
-) -> None:
-    # A link cannot send the key.
-    expect(compared.get_by_role("link", name="Read the report")).to_have_count(0)
-    with compared.expect_download(timeout=SIMULATED) as saved:
-        compared.get_by_role("button", name="Save the report").click()
-    assert saved.value.suggested_filename == "comparison.html"
-    path = tmp_path / "comparison.html"
-    saved.value.save_as(path)
-    page = quiet(tmp_path.as_uri(), width=390).go(path.name)
-    expect(page.locator("h1")).to_contain_text("Of 2 models, ")
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    assert page.evaluate("document.images[0].naturalWidth") > 0
-    printed = page.pdf(format="A4", print_background=True)
-    assert 1 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 4
-
-
 def test_models_of_a_job_are_chosen_on_its_page(
     opened: Callable[..., Any], jobs: tuple[str, str], expect: Any
 ) -> None:
@@ -101,14 +71,3 @@ def test_models_of_a_job_are_chosen_on_its_page(
     page.get_by_role("link", name="Compare", exact=True).click()
     expect(page).to_have_url(re.compile(f"#/compare\\?jobs={jobs[0]}:1,{jobs[0]}:2$"))
     expect(page.get_by_text("The jobs have the same settings.")).to_be_visible()
-
-
-def test_jobs_of_different_data_and_jobs_without_a_result_are_stated(
-    opened: Callable[..., Any], service: ServiceClient, jobs: tuple[str, str], expect: Any
-) -> None:
-    other = run_submitted(service, service.submit(5, name="rows", rows="0:300"))
-    queued = service.submit(5, name="waits")
-    page = opened(f"#/compare?jobs={jobs[0]},{other},{queued}")
-    expect(page.get_by_text("their errors are those of different validation data")).to_be_visible()
-    expect(page.locator(".complaint")).to_contain_text("waits: ")
-    service.ask("POST", f"/v1/jobs/{queued}/cancel")

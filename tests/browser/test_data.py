@@ -104,70 +104,6 @@ def test_the_visible_rows_are_those_of_the_job(looked: Any, desk: ServiceClient)
     desk.ask("POST", f"/v1/jobs/{submitted.json()['id']}/cancel")
 
 
-def test_values_of_a_short_range_are_read_with_the_keys(looked: Any, expect: Any) -> None:
-    plot = looked.get_by_role("slider", name="Record")
-    plot.focus()
-    with looked.expect_response(lambda answer: "/samples?" in answer.url):
-        for _ in range(30):
-            plot.press("+")
-    plot.press("ArrowRight")
-    # One value, and not the extremes of several rows.
-    expect(plot).to_have_attribute("aria-valuetext", re.compile(r"^[\d.]+ s: u_V \S+, y_um \S+$"))
-
-
-def test_a_range_is_drawn_before_its_samples_arrive(looked: Any, expect: Any) -> None:
-    """One request waits at a time, and the samples in memory are drawn meanwhile."""
-    held: list[Any] = []
-
-    def hold(route: Any) -> None:
-        held.append(route)
-
-    looked.route("**/samples?*", hold)
-    plot, canvas = looked.get_by_role("slider", name="Record"), looked.locator("canvas")
-    plot.focus()
-    for key in (*"++++++", "PageDown", *"------"):
-        plot.press(key)
-        looked.wait_for_timeout(30)
-    looked.wait_for_timeout(300)
-    assert len(held) == 1
-    expect(plot).to_have_attribute("aria-valuetext", re.compile(r"^[\d.]+ s: u_V \S+.*, y_um \S+"))
-    assert canvas.evaluate(DRAWN) > 100
-    before = looked.locator(".signals + .position").text_content()
-    held.pop().continue_()
-    looked.unroute("**/samples?*")
-    looked.wait_for_timeout(300)
-    assert looked.locator(".signals + .position").text_content() == before
-    assert canvas.evaluate(DRAWN) > 100
-
-
-def test_a_column_has_one_role(looked: Any, expect: Any) -> None:
-    looked.get_by_label("y_um is an input").check()
-    expect(looked.get_by_label("y_um is the output")).not_to_be_checked()
-    expect(looked.get_by_role("button", name="Identify")).to_be_disabled()
-    looked.get_by_label("u_V is the output").check()
-    expect(looked.get_by_label("u_V is an input")).not_to_be_checked()
-    expect(looked.get_by_role("button", name="Identify")).to_be_enabled()
-    expect(looked.locator(".run")).to_contain_text("y_um → u_V")
-
-
-@pytest.mark.parametrize(
-    ("steps", "count"), [((0.01, 0.01), 0), ((0.01, 0.02), 1)], ids=["equal", "different"]
-)
-def test_sampling_times_of_columns_are_shown_if_they_differ(
-    looked: Any, expect: Any, steps: tuple[float, float], count: int
-) -> None:
-    def answer(route: Any) -> None:
-        dataset = route.fetch().json()
-        for column, dt in zip(dataset["preview"]["columns"][1:], steps, strict=True):
-            column["dt"] = dt
-        route.fulfill(json=dataset)
-
-    looked.route(re.compile(r"/v1/datasets/[^/]+$"), answer)
-    looked.reload()
-    expect(looked.locator("table.choice th", has_text="Minimum")).to_be_visible()
-    expect(looked.locator("table.choice th", has_text="Sampling time")).to_have_count(count)
-
-
 def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
     page = screens(desk.url).go("#/data")
     page.get_by_role("heading", name="Data", exact=True).wait_for()
@@ -241,21 +177,6 @@ def test_only_changed_settings_are_sent_and_a_job_can_be_run_again(
     assert looked.get_by_label("Preset").input_value() == "hysteresis"
     looked.get_by_label("shifts", exact=True).fill("")
     assert submit(looked, desk)["settings"] == {"generations": 7}
-
-
-def test_several_files_are_one_job_if_they_have_the_same_columns(
-    quiet: Callable[..., Screen], desk: ServiceClient, text: str, expect: Any
-) -> None:
-    page = quiet(desk.url).go("#/data")
-    page.get_by_role("heading", name="Data", exact=True).wait_for()
-    other = "\n".join(text.splitlines()[:-50])
-    page.evaluate(DROP, [["first.csv", text], ["second.csv", other]])
-    added = page.get_by_role("region", name="Added records")
-    expect(added.get_by_role("listitem")).to_have_count(2)
-    second = added.get_by_role("link", name="second.csv").get_attribute("href").rpartition("/")[2]
-    added.get_by_role("link", name="Use them together in one job").click()
-    page.get_by_text("Together with").wait_for()
-    assert submit(page, desk)["recordings"] == [{"dataset": second}]
 
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)

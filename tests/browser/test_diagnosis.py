@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,8 @@ import pytest
 from islands_service.domain.diagnosis_outputs import write_outputs
 from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, JobState, ProgressReport
 from islands_service.store.blobs import Blobs
-from support.canvas import DRAWN
 from support.diagnosis_documents import CAUSE, GAIN, make_document
-from support.extended_simulations import extended
 from support.played import stored
-from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_client import ServiceClient
@@ -120,40 +116,6 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
     assert saved.value.suggested_filename == f"extended-{job[:8]}.json"
 
 
-def test_a_long_result_fits_on_a_narrow_screen(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = submit_diagnosis(desk)
-    with stored(desk) as store:
-        effects = ["thermal-drift", "rate-dependent-loop", "second-hysteresis"]
-        store.leases.finish(taken(store, job), make_outcome(desk, effects=effects))
-    page = quiet(desk.url, width=380).go(f"#/jobs/{job}")
-    for place in (f"#/jobs/{job}", "#/jobs"):
-        page.goto(f"{desk.url}/{place}")
-        text = page.locator(".progress-text:visible, .wide .line:visible", has_text="second-hysteresis")
-        expect(text.first).to_be_visible()
-        wide, seen = (page.evaluate(f"document.documentElement.{each}Width") for each in ("scroll", "client"))
-        assert wide <= seen
-
-
-def test_the_list_shows_the_verdict_of_a_diagnosis(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    jobs = [submit_diagnosis(desk, name=name) for name in ("one", "two")]
-    nothing = {"verdict": "nothing", "effects": [], "reduction_percent": None}
-    with stored(desk) as store:
-        store.leases.finish(taken(store, jobs[0]), make_outcome(desk))
-        store.leases.finish(taken(store, jobs[1]), make_outcome(desk, **nothing))
-    page = quiet(desk.url).go()
-    sentence = desk.job(jobs[0])["summary"]["words"].splitlines()[0].replace("`", "")
-    for job, cause in zip(jobs, ("thermal-drift", ""), strict=True):
-        expect(page.locator(f"tr[data-job='{job}'] .verdict")).to_have_text(sentence)
-        assert page.locator(f"tr[data-job='{job}'] .line").text_content() == cause
-    page.get_by_role("link", name="two").first.click()
-    expect(page.get_by_role("button", name="Save the report")).to_be_visible()
-    assert page.get_by_role("button", name="Save the extended simulation").count() == 0
-
-
 @pytest.fixture
 def finished(desk: ServiceClient) -> str:
     """A succeeded diagnosis."""
@@ -161,16 +123,6 @@ def finished(desk: ServiceClient) -> str:
     with stored(desk) as store:
         store.leases.finish(taken(store, job), make_outcome(desk))
     return job
-
-
-def test_verdict_and_figure_are_on_the_first_screen_above_the_causes(
-    quiet: Callable[..., Screen], desk: ServiceClient, finished: str
-) -> None:
-    page = quiet(desk.url, width=1440, height=900).go(f"#/jobs/{finished}")
-    eventually(lambda: page.locator("canvas").count() == 1 and page.locator("canvas").evaluate(DRAWN) > 100)
-    boxes = [page.locator(part).first.bounding_box() for part in (".verdict", "canvas", "table.causes")]
-    assert boxes[0]["y"] < boxes[1]["y"] < boxes[2]["y"]
-    assert boxes[1]["y"] + boxes[1]["height"] <= 900
 
 
 def test_the_values_of_all_outputs_are_read_with_the_keys(
@@ -181,63 +133,6 @@ def test_the_values_of_all_outputs_are_read_with_the_keys(
     plot.press("ArrowRight")
     names = r"measured \S+, simulated \S+, extended \S+, residual simulated \S+, residual extended \S+"
     expect(plot).to_have_attribute("aria-valuetext", re.compile(rf"^0\.04 s: {names}$"))
-
-
-def test_the_causes_have_a_score_and_only_tested_ones_a_confidence(
-    quiet: Callable[..., Screen], desk: ServiceClient, finished: str, expect: Any
-) -> None:
-    page = quiet(desk.url).go(f"#/jobs/{finished}")
-    rows = page.locator("table.causes tbody tr")
-    expect(rows).to_have_text(
-        [
-            re.compile(text)
-            for text in (
-                "output thermal-drift40.0\\s*99 %0.98exponential-creep",
-                "drift10.0\\s*50 %$",
-                "jump−2.00",
-            )
-        ]
-    )
-    widths = [float(bar.get_attribute("width")) for bar in rows.locator("rect").all()]
-    assert widths == [100.0, 25.0, 0.0]
-    expect(page.locator("table.causes th[scope=col]")).to_have_count(5)
-    expect(page.locator(".card", has=rows).locator(".facts")).to_contain_text("hold the input")
-
-
-def test_a_named_cause_is_shown_though_ten_others_have_a_better_score(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    """A cause that acts next to another one may explain nothing alone."""
-    simulation = {"kind": "linear", "order": 2, "delay": 1}
-    job = submit_diagnosis(desk, simulation=simulation, tolerance={})
-    candidates = [{"name": f"other-{place}", "score": 30.0 - place, "eta": 0.5} for place in range(12)]
-    candidates.append({"name": "thermal-drift", "score": -7.0, "eta": 0.0})
-    with stored(desk) as store:
-        outcome = replace(make_outcome(desk), document=RESULT | {"candidates": candidates})
-        store.leases.finish(taken(store, job), outcome)
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    expect(page.locator("table.causes").first.locator("tbody tr")).to_have_count(11)
-    expect(page.locator("table.causes").first.locator(".named")).to_have_text(re.compile("thermal-drift"))
-    expect(page.locator(".facts").filter(has_text="Simulation")).to_contain_text("linear: order 2, delay 1")
-    expect(page.locator("details.rest summary")).to_have_text("2 further causes")
-
-
-def test_an_extended_difference_equation_is_typeset_and_exported(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = submit_diagnosis(desk)
-    linear = {"kind": "linear", "order": 0, "numerator": [2.0]}
-    spec = extended(linear, {"dead-zone": {"d": 0.25}})
-    with stored(desk) as store:
-        outcome = make_outcome(desk, equation="y(k) = 2*max(abs(u(k)) - 0.25, 0)*sign(u(k))")
-        blob = Blobs(desk.folder / "blobs").write(spec.model_dump_json(by_alias=True).encode())
-        artefacts = {**outcome.artefacts, EXTENDED: blob}
-        store.leases.finish(taken(store, job), replace(outcome, artefacts=artefacts))
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    expect(page.locator(".findings .equation math")).to_contain_text("0.25")
-    with page.expect_download() as saved:
-        page.locator(".findings [data-format=c]").click()
-    assert saved.value.suggested_filename == f"extended-{job[:8]}.c"
 
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)

@@ -74,18 +74,6 @@ def test_values_and_tolerances_of_a_built_in_simulation_are_those_of_the_job(
     assert spec == {name: value for name, value in request.items() if name != "name"}
 
 
-def test_the_noise_of_the_sensor_is_that_of_the_job(
-    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str
-) -> None:
-    page = open_form(quiet(desk.url), dataset)
-    page.get_by_text("Rows and noise").click()
-    page.get_by_label("Noise of the sensor").fill("0.02")
-    details = page.locator("details.card")
-    details.get_by_text("The same as a command").click()
-    assert "--noise-level 0.02" in (details.locator("pre").first.text_content() or "")
-    assert submit(page, desk)["noise_level"] == 0.02
-
-
 def test_a_wrong_equation_is_explained_and_the_corrected_one_started(
     screens: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
 ) -> None:
@@ -106,18 +94,6 @@ def test_a_wrong_equation_is_explained_and_the_corrected_one_started(
     spec = submit(page, desk)
     assert spec["simulation"]["kind"] == "ode"
     assert "2*c*v" in spec["simulation"]["equations"]
-
-
-def test_a_text_survives_another_choice_of_columns(
-    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
-) -> None:
-    page = open_form(quiet(desk.url), dataset)
-    page.get_by_label("Simulation", exact=True).select_option("ode")
-    text = page.get_by_label("Equations", exact=True)
-    expect(page.locator(".check")).to_contain_text("Valid.")
-    text.fill(f"# mine\n{text.input_value()}")
-    page.get_by_label("theirs_um is the output").check()
-    assert text.input_value().startswith("# mine\n")
 
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)

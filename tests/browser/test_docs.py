@@ -43,19 +43,6 @@ def test_an_operation_leads_by_keyboard_to_the_schema_of_its_body(
     expect(schema.get_by_role("row", name="dataset").first).to_contain_text("string, required")
 
 
-def test_the_reference_leads_back_to_the_jobs(docs: Callable[..., Any]) -> None:
-    page = docs()
-    page.get_by_role("navigation", name="Sections").get_by_role("link", name="Jobs").click()
-    page.get_by_role("heading", name="Jobs", exact=True).wait_for()
-
-
-def test_the_entries_can_be_searched(docs: Callable[..., Any], expect: Any) -> None:
-    page = docs()
-    page.get_by_role("searchbox", name="Find").fill("webhooks")
-    expect(page.locator("#submit_v1_jobs_post")).to_be_hidden()
-    assert 0 < page.locator("details:visible").count() < 30
-
-
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_reference_is_readable(docs: Callable[..., Any], expect: Any, scheme: str, width: int) -> None:
     page = docs("docs#submit_v1_jobs_post", width=width, color_scheme=scheme)

@@ -42,18 +42,6 @@ def test_a_module_imports_only_served_files(name: str) -> None:
     assert list_imports(name) | set(loaded) <= set(FILES)
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_a_module_starts_with_a_description(name: str) -> None:
-    assert re.match(r"/\*\*\s", SCRIPTS[name])
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_a_file_has_fewer_than_300_lines(name: str) -> None:
-    lines = TEXTS[name].splitlines()
-    assert len(lines) < 300
-    assert name.endswith(".svg") or max(map(len, lines)) <= 110
-
-
 @pytest.mark.parametrize("name", ["docs.html", "index.html"])
 def test_the_page_has_no_inline_scripts_or_styles(name: str) -> None:
     """The content security policy forbids both."""

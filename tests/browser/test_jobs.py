@@ -50,15 +50,6 @@ def shown(page: Any) -> list[str]:
     return found
 
 
-def test_a_row_separates_the_equations_of_a_model_with_several(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    summary = {**SUMMARY, "equation": "y(k) = 0.5*x1(k)\nx1(k) = 0.9*x1(k-1) + u(k-1)"}
-    job = end(desk, desk.submit(500, name="states"), document={}, summary=summary)
-    line = row(quiet(desk.url).go(), job).locator(".line")
-    expect(line).to_have_text("y(k) = 0.5*x1(k); x1(k) = 0.9*x1(k-1) + u(k-1)")
-
-
 def test_a_row_shows_the_equation_the_error_and_the_verdict(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
@@ -171,19 +162,6 @@ def test_tags_are_added_on_the_page_of_a_job_and_filter_the_list(
     assert desk.job(job)["tags"] == ["rig 2"]
 
 
-def test_a_name_is_changed_on_the_page_of_a_job(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = desk.submit(500, name="before")
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    page.get_by_role("button", name="Rename").click()
-    page.get_by_role("textbox", name="Name of the job").fill("after")
-    page.keyboard.press("Enter")
-    expect(page.get_by_role("heading", level=1)).to_have_text("after")
-    expect(page).to_have_title("after · islands")
-    expect(page.get_by_role("button", name="Rename")).to_be_focused()
-
-
 def test_a_search_is_in_the_address_and_keeps_the_focus(
     screens: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
@@ -208,24 +186,6 @@ def test_a_search_is_in_the_address_and_keeps_the_focus(
     page.go_back()
     expect(row(page, found)).to_be_visible()
     assert shown(page) == [found]
-
-
-def test_the_list_is_sorted_by_error(quiet: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
-    jobs = []
-    for error in (2.0, 0.5):
-        summary = {**SUMMARY, "metrics": {"mape": error}}
-        jobs.append(end(desk, desk.submit(500), document={}, summary=summary))
-    waiting = desk.submit(500)
-    page = quiet(desk.url).go()
-    expect(row(page, waiting)).to_be_visible()
-    assert shown(page) == [waiting, jobs[1], jobs[0]]
-    page.get_by_role("columnheader", name="Error").get_by_role("link").click()
-    expect(row(page, waiting)).to_have_count(0)
-    expect(row(page, jobs[0])).to_be_visible()
-    assert shown(page) == [jobs[1], jobs[0]]
-    expect(page.locator("[aria-sort=ascending]")).to_have_text("Error ↑")
-    page.get_by_role("link", name="Submitted").click()
-    expect(row(page, waiting)).to_be_visible()
 
 
 def test_selected_jobs_are_deleted_after_a_confirmation(
@@ -265,18 +225,3 @@ def test_selected_jobs_are_cancelled_and_compared(
     for job in waiting:
         expect(row(page, job).locator(".state")).to_have_text("cancelled")
     assert {desk.job(job)["state"] for job in waiting} == {"cancelled"}
-
-
-@pytest.mark.parametrize(("kind", "resumed"), [("invalid-record", False), ("no-progress", True)])
-def test_a_job_is_resumed_only_where_it_can_succeed(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any, kind: str, resumed: bool
-) -> None:
-    problem = {"type": kind, "title": "The job failed", "detail": "line 8, column y_um is empty"}
-    job = end(desk, desk.submit(500), JobState.FAILED, problem=problem)
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    expect(page.locator(".failure")).to_contain_text("line 8, column y_um is empty")
-    expect(page.get_by_role("button", name="Resume")).to_have_count(1 if resumed else 0)
-    expect(page.locator(".failure .remedy")).to_have_count(0 if resumed else 1)
-    if not resumed:
-        page.locator(".failure").get_by_role("link", name="Open the data set").click()
-        expect(page.get_by_role("heading", name="Identify")).to_be_visible()

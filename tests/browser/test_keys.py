@@ -1,13 +1,11 @@
 """Dashboard of a service that needs a key."""
 
-import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 from support.played import advance, stored
-from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_client import ServiceClient
 from support.stores import taken
@@ -64,15 +62,6 @@ def test_the_key_form_rejects_wrong_keys_and_keeps_a_valid_one(
     assert page.evaluate("sessionStorage.getItem('islands.key')") is None
 
 
-@pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
-def test_the_key_form_has_sufficient_contrast(
-    screens: Callable[..., Screen], locked: ServiceClient, width: int, scheme: str
-) -> None:
-    page = screens(locked.url, width=width, color_scheme=scheme).go()
-    page.get_by_label("Key").wait_for()
-    assert unreadable(page) == []
-
-
 @pytest.mark.ci
 def test_the_key_is_in_no_url(screens: Callable[..., Screen], locked: ServiceClient, key: str) -> None:
     screen = screens(locked.url)
@@ -97,18 +86,6 @@ def test_event_streams_are_opened_with_the_key(
         for last in (5, 6, 7):
             advance(store, lease, last, last)
             expect(page.locator(".status .progress-text")).to_have_text(f"{last} / 500")
-
-
-@pytest.mark.ci
-def test_jobs_of_another_owner_are_hidden(
-    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
-) -> None:
-    job = locked.submit(500, name="mine")
-    page = screens(locked.url).go(f"#/jobs/{job}")
-    enter(page, make_key(locked, "read"))
-    expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
-    page.get_by_role("link", name="Show all jobs").click()
-    expect(page.get_by_role("heading", name="No jobs yet")).to_be_visible()
 
 
 @pytest.mark.nightly
@@ -139,43 +116,3 @@ def test_an_action_without_its_scope_shows_a_problem(
     banner.get_by_role("button", name="Dismiss").click()
     expect(banner).to_have_count(0)
     assert locked.job(job)["state"] == "queued"
-
-
-@pytest.mark.ci
-def test_an_administrator_sees_the_owners_of_jobs_and_opens_those_of_the_key(
-    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
-) -> None:
-    theirs = locked.submit(500, name="theirs")
-    own = make_key(locked, "read", "write", "admin", owner="operator")
-    locked.client.headers["Authorization"] = f"Bearer {own}"
-    locked._dataset = ""
-    mine = locked.submit(500, name="mine")
-    page = screens(locked.url).go("#/jobs")
-    enter(page, own)
-    rows = page.locator("tr[data-job]")
-    expect(rows).to_have_count(1)
-    page.get_by_label("Owner").select_option("all owners")
-    other = page.locator(f"tr[data-job='{theirs}']")
-    with stored(locked) as store:
-        owner = store.keys.find(key).owner
-    expect(other.locator(".about-job")).to_have_text(re.compile(f"^{re.escape(owner)} · Identification"))
-    assert other.locator("a[href], input").count() == 0
-    expect(page.locator(f"tr[data-job='{mine}'] .about-job")).to_have_text(re.compile("^operator · "))
-    page.get_by_label("Owner").select_option("operator")
-    expect(rows).to_have_count(1)
-    page.get_by_label("Owner").select_option("all owners")
-    page.locator(f"tr[data-job='{mine}']").get_by_role("link", name="mine").click()
-    expect(page.get_by_role("heading", name="mine")).to_be_visible()
-
-
-@pytest.mark.ci
-def test_a_key_of_one_owner_has_no_choice_of_owners(
-    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
-) -> None:
-    locked.submit(500, name="mine")
-    page = screens(locked.url).go("#/jobs")
-    enter(page, key)
-    row = page.locator("tr[data-job]")
-    expect(row.locator(".about-job")).to_have_text(re.compile("^Identification"))
-    page.wait_for_load_state("networkidle")
-    expect(page.get_by_label("Owner")).to_be_hidden()

@@ -1,7 +1,6 @@
 """List of jobs on the dashboard."""
 
 import re
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -54,49 +53,6 @@ def test_a_name_cannot_reverse_the_text_around_it(
     desk.ask("POST", f"/v1/jobs/{job}/cancel")
 
 
-def test_a_job_that_waits_for_a_reason_shows_it(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = desk.submit(500)
-    with stored(desk) as store:
-        store.leases.decline(taken(store, job), "waiting for islands 9.9", "1.0")
-    expect(row(quiet(desk.url).go(), job)).to_contain_text("waiting for islands 9.9")
-    desk.ask("POST", f"/v1/jobs/{job}/cancel")
-
-
-def test_a_queued_job_shows_its_place_among_all_jobs(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    with stored(desk) as store:
-        while (lease := store.leases.claim(f"emptied {time.monotonic()}", 3600.0)) is not None:
-            store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
-        first, second = desk.submit(500), desk.submit(500)
-        page = quiet(desk.url).go()
-        expect(row(page, first)).to_contain_text("waiting, number 1")
-        expect(row(page, second)).to_contain_text("waiting, number 2")
-        urgent = desk.submit(500, priority=5)
-        expect(row(page, urgent)).to_contain_text("waiting, number 1")
-        expect(row(page, second)).to_contain_text("waiting, number 3")
-
-
-def test_a_queued_job_shows_when_it_starts_if_running_jobs_have_a_time_left(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    with stored(desk) as store:
-        running = desk.submit(500)
-        lease = taken(store, running)
-        # Jobs of other tests that still run are finished in an unknown time.
-        store.leases.report(lease, ProgressReport({"phase": "search", "seconds_left": 3900.0}))
-        job, later = desk.submit(500), desk.submit(500)
-        page = quiet(desk.url).go()
-        expect(row(page, job)).to_contain_text(re.compile(r"waiting, number 1, starts in about 1 h \d+ min"))
-        expect(row(page, later)).to_contain_text("waiting, number 2")
-        assert "starts in" not in row(page, later).text_content()
-        store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
-        for each in (job, later):
-            store.leases.finish(taken(store, each), JobOutcome(JobState.CANCELLED))
-
-
 def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
@@ -127,43 +83,6 @@ def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], des
     page.get_by_role("heading", name="Data set").wait_for()
     assert page.title() == f"{HOSTILE} · islands"
     assert page.locator("main script, main img").count() == 0
-
-
-def test_a_filter_shows_only_jobs_in_its_state(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    waiting, other = desk.submit(500), desk.submit(500)
-    assert desk.ask("POST", f"/v1/jobs/{other}/cancel").status_code == 202
-    page = quiet(desk.url).go()
-    page.get_by_role("link", name="cancelled", exact=True).click()
-    expect(row(page, other)).to_be_visible()
-    expect(page.locator(".state").first).to_have_text("cancelled")
-    assert set(page.locator("tbody .state").all_text_contents()) == {"cancelled"}
-    assert row(page, waiting).count() == 0
-    assert page.locator("[aria-current=page]").text_content() == "cancelled"
-    page.reload()
-    expect(row(page, other)).to_be_visible()
-    assert page.url.endswith("#/jobs?state=cancelled")
-    page.get_by_role("link", name="succeeded", exact=True).click()
-    expect(page.get_by_text("No job is succeeded.")).to_be_visible()
-
-
-def test_pages_show_each_job_once_while_jobs_are_added(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    jobs = [desk.submit(500) for _ in range(55)]
-    page = quiet(desk.url).go()
-    expect(row(page, jobs[-1])).to_be_visible()
-    seen = page.locator("tbody tr").evaluate_all("rows => rows.map((row) => row.dataset.job)")
-    late = desk.submit(500)
-    for first in (jobs[-26], jobs[-51]):
-        page.get_by_role("link", name="Older").click()
-        expect(row(page, first)).to_be_visible()
-        seen += page.locator("tbody tr").evaluate_all("rows => rows.map((row) => row.dataset.job)")
-    assert set(jobs) <= set(seen)
-    assert len(seen) == len(set(seen))
-    page.get_by_role("link", name="Newest").click()
-    expect(row(page, late)).to_be_visible()
 
 
 def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
@@ -219,14 +138,6 @@ def test_a_rejected_request_shows_its_problem(
     expect(banner).to_have_count(0)
 
 
-def test_an_unknown_address_redirects_to_the_list(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
-    for place in ("#/nonsense", "#/jobs/", "#/jobs/a/b", "#%zz"):
-        page = quiet(desk.url).go(place)
-        page.get_by_role("heading", name="Jobs", exact=True).wait_for()
-        assert page.url.endswith("#/jobs")
-
-
 def pattern(text: str) -> Any:
-    import re
 
     return re.compile(text)

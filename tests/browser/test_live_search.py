@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.job import ProgressReport
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
 from support.canvas import count_segments, get_drawn, get_lines
@@ -29,45 +28,6 @@ def searching(service: ServiceClient) -> Iterator[ServiceClient]:
     yield service
     stopping.request()
     thread.join(30.0)
-
-
-@pytest.mark.ci
-def test_a_running_job_states_its_phase_in_words(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = desk.submit(500, name="piezo", preset="auto")
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    doing, stage = page.locator(".doing"), page.locator(".stages [aria-current=step]")
-    with stored(desk) as store:
-        lease = taken(store, job)
-        # Before the first report the bar moves.
-        expect(page.locator(".status progress")).not_to_have_attribute("value", "0")
-        expect(stage).to_have_text("Record")
-        for phase, name, sentence in (
-            ("reading the record", "Record", "Reading the record."),
-            ("preset auto: fit of friction", "Preset", "Choice of the preset: fit of friction."),
-            (
-                "swap search among 144 candidates: 9 terms",
-                "First models",
-                "Swap search among 144 candidates: 9 terms.",
-            ),
-            (
-                "estimation of the final models of 7 terms",
-                "Final models",
-                "Estimation of the final models of 7 terms.",
-            ),
-            ("prediction bands", "Validation", "Prediction bands."),
-            ("storing the result", "Result", "Storing the result."),
-        ):
-            store.leases.report(lease, ProgressReport({"phase": phase}))
-            expect(doing).to_have_text(sentence)
-            expect(stage).to_have_text(name)
-            if name != "Record":
-                # Screen readers announce every new stage, after the state of the job.
-                expect(page.get_by_role("status")).to_have_text(f"\u2068piezo\u2069: {sentence}")
-        advance(store, lease, 0, 40)
-        expect(doing).to_have_text("Evolution of equations on 2 islands: generation 40 of 500.")
-        expect(stage).to_have_text("Search")
 
 
 @pytest.mark.ci
@@ -98,28 +58,6 @@ def test_the_front_grows_and_its_points_show_their_equations(
     ways = "Islands that received models: island 1 from 2; island 2 from 1"
     expect(page.get_by_role("img", name=ways)).to_be_visible()
     expect(page.locator(".map")).to_contain_text("Generation 95: 1 model was sent along each arrow.")
-
-
-@pytest.mark.ci
-def test_sizes_of_state_spaces_are_parameters_also_if_the_preset_chose_them(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = desk.submit(500, preset="auto")
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    with stored(desk) as store:
-        lease = taken(store, job)
-        store.leases.report(lease, ProgressReport({"phase": "linear state space of order 2"}))
-        expect(page.locator(".stages [aria-current=step]")).to_have_text("First models")
-        advance(store, lease, 0, 40, model="latent")
-        expect(page.locator(".doing")).to_have_text(
-            "Evolution of state spaces on 2 islands: generation 40 of 500."
-        )
-        expect(page.locator(".live")).to_contain_text("Model of the least error: 5 parameters")
-        page.get_by_role("slider", name="Front of size against error").focus()
-        page.keyboard.press("Home")
-        expect(page.locator(".live > figure.chart")).to_contain_text("parameters 1")
-        store.leases.report(lease, ProgressReport({"phase": "final estimation of state spaces"}))
-        expect(page.locator(".stages [aria-current=step]")).to_have_text("Final models")
 
 
 @pytest.mark.ci

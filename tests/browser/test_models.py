@@ -2,26 +2,17 @@
 
 import io
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pytest
 from PIL import Image
 
-from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.settings import ServiceSettings
-from islands_service.store.blobs import Blobs
-from support.coupled_systems import TWO_MASSES, make_coupled_record
-from support.job_runs import make_run
-from support.latent_systems import spring_record
-from support.played import run_submitted, stored
+from support.played import run_submitted
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
 from support.screen import Screen
 from support.service_client import ServiceClient
-from support.statements import find_contradictions
-from support.stores import LONG, taken
 
 #: Maximum number of transferred bytes: the files of the dashboard and the list of jobs. The history and the
 #: models of a job are not counted, because they grow with the search.
@@ -53,20 +44,6 @@ def finished(service: ServiceClient) -> str:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_job_with_a_refit_says_which_parameters_its_errors_belong_to(
-    opened: Callable[..., Any], service: ServiceClient, expect: Any, scheme: str
-) -> None:
-    job = run_submitted(service, service.submit(5, name="refit", settings={"refit": "all"}))
-    models = json.loads(service.models(job))["items"]
-    assert any(each["refit"]["discarded"] is None for each in models)
-    page = opened(f"#/jobs/{job}", color_scheme=scheme)
-    expect(page.locator("section.result")).to_contain_text("Refit: ")
-    expect(page.get_by_text("estimated again on all data after the errors were measured")).to_be_visible()
-    assert unreadable(page) == []
-
-
-@pytest.mark.ci
 def test_a_finished_job_shows_its_models_with_their_metrics(
     opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
 ) -> None:
@@ -88,28 +65,6 @@ def test_a_finished_job_shows_its_models_with_their_metrics(
 
 
 @pytest.mark.ci
-def test_the_panel_begins_with_the_sentences(
-    opened: Callable[..., Any], service: ServiceClient, finished: str, expect: Any
-) -> None:
-    page = opened(f"#/jobs/{finished}")
-    words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
-    expect(page.locator(".sentences > p, .sentences > code")).to_have_text([line.strip() for line in words])
-    expect(page.locator(".sentences code")).to_have_text([words[1].strip()])
-    assert not find_contradictions(page.locator("main").inner_text())
-
-
-@pytest.mark.nightly
-def test_the_report_is_saved_as_a_file(
-    opened: Callable[..., Any], service: ServiceClient, finished: str
-) -> None:
-    page = opened(f"#/jobs/{finished}")
-    words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
-    with page.expect_download() as saved:
-        page.get_by_role("button", name="Save the report").click()
-    assert words[0] in saved.value.path().read_text()
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 def test_a_result_begins_with_its_equation_and_its_free_run(
     opened: Callable[..., Any], finished: str, width: int, height: int
@@ -120,38 +75,6 @@ def test_a_result_begins_with_its_equation_and_its_free_run(
         box = part.bounding_box()
         assert box["y"] + box["height"] <= height
     assert result.locator(".symbols").inner_text() == "y: y_um (um); u: u_V (V); k: samples of 0.01 s"
-
-
-@pytest.mark.ci
-def test_the_models_of_a_result_are_above_the_course_of_its_search(
-    opened: Callable[..., Any], finished: str
-) -> None:
-    page = opened(f"#/jobs/{finished}")
-    page.locator("table.models").wait_for()
-    parts = (".result", "table.models", ".status", ".convergence", ".about")
-    places = [page.locator(part).first.bounding_box()["y"] for part in parts]
-    assert places == sorted(places)
-
-
-@pytest.mark.ci
-def test_a_diverged_error_is_one_word_with_the_reason_as_title(
-    opened: Callable[..., Any], finished: str, expect: Any
-) -> None:
-    reason = "diverged: |y| left 3.45e+08 at sample 486; take fewer terms"
-
-    def diverge(route: Any) -> None:
-        answer = route.fetch()
-        document = answer.json()
-        document["items"][-1]["metrics"]["estimation"]["free_run"]["mape"] = None
-        document["items"][-1]["outcomes"]["estimation"]["free_run"] = reason
-        route.fulfill(response=answer, json=document)
-
-    page = opened("#/jobs")
-    page.route("**/models", diverge)
-    page.goto(f"{page.url.partition('#')[0]}#/jobs/{finished}")
-    cell = page.locator("table.models tbody tr").last.locator("td span.no").first
-    expect(cell).to_have_text("diverged")
-    expect(cell).to_have_attribute("title", reason)
 
 
 @pytest.mark.ci
@@ -210,63 +133,6 @@ def test_the_models_panel_has_sufficient_contrast(
     assert unreadable(page) == []
 
 
-@pytest.fixture(scope="module")
-def coupled(service: ServiceClient) -> str:
-    """A succeeded job of two outputs, executed by the test process."""
-    record = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
-    rows = zip(0.1 * np.arange(200).round(3), record.records[0].u[:, 0], *record.y.T, strict=True)
-    settings = {"population": 8, "generations": 1, "max_terms": 4, "library_degree": 1}
-    spec = {"inputs": ["u_N"], "output": ["y1_mm", "y2_mm"], "settings": settings}
-    return run_on_table(service, "t_s,u_N,y1_mm,y2_mm", rows, spec)
-
-
-def run_on_table(
-    service: ServiceClient, header: str, rows: Iterable[Sequence[float]], spec: dict[str, Any]
-) -> str:
-    """Upload a table, and execute a job on it in the test process."""
-    text = "\n".join([header, *(",".join(map(repr, map(float, row))) for row in rows)])
-    answer = service.ask("POST", "/v1/datasets", files={"file": ("table.csv", text.encode())})
-    submitted = service.ask("POST", "/v1/jobs", json={"dataset": answer.json()["id"], **spec})
-    assert submitted.status_code == 202, submitted.text
-    job: str = submitted.json()["id"]
-    with stored(service) as store:
-        lease = taken(store, job)
-        blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
-        store.leases.finish(lease, run_identification_job(make_run(lease, store, blobs, lambda: None, LONG)))
-    return job
-
-
-@pytest.fixture(scope="module")
-def latent(service: ServiceClient) -> str:
-    """A succeeded job of latent models, executed by the test process."""
-    record = spring_record(600, noise=0.02)
-    rows = zip(0.01 * np.arange(600), record.u[:, 0], record.y, strict=True)
-    settings = {"population": 8, "generations": 3, "islands": 1}
-    search = {"inputs": ["u_V"], "output": "y_mm", "preset": "latent", "settings": settings}
-    return run_on_table(service, "t_s,u_V,y_mm", rows, search)
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_job_of_two_outputs_shows_both(
-    opened: Callable[..., Any], service: ServiceClient, coupled: str, expect: Any, scheme: str
-) -> None:
-    page = opened(f"#/jobs/{coupled}", color_scheme=scheme)
-    words = service.ask("GET", f"/v1/jobs/{coupled}").json()["summary"]["words"].splitlines()
-    assert any(line.startswith("As a simulation: ") for line in words)
-    expect(page.locator(".sentences > p, .sentences > code")).to_have_text([line.strip() for line in words])
-    assert not find_contradictions(page.locator("main").inner_text())
-    expect(page.locator(".model .equation math")).to_have_count(2)
-    outputs = page.get_by_role("table", name="Errors of the outputs").locator("tbody tr th")
-    assert outputs.all_text_contents() == ["y1: y1_mm (mm)", "y2: y2_mm (mm)"]
-    expect(page.locator(".gallery .rendered")).to_have_count(2)
-    # The errors of two outputs have no common scale.
-    expect(page.get_by_text("Convergence")).to_have_count(0)
-    assert unreadable(page) == []
-    page.locator(".gallery .rendered").last.scroll_into_view_if_needed()
-    expect(page.locator(".gallery img")).to_have_count(2, timeout=DRAWN)
-
-
 @pytest.mark.ci
 def test_a_model_is_saved_as_a_file(
     opened: Callable[..., Any], service: ServiceClient, finished: str
@@ -282,16 +148,6 @@ def test_a_model_is_saved_as_a_file(
         page.get_by_role("button", name="Save the result").click()
     whole = service.ask("GET", f"/v1/jobs/{finished}/result").json()
     assert json.loads(saved.value.path().read_text()) == whole
-
-
-@pytest.mark.ci
-def test_every_export_format_has_a_button(opened: Callable[..., Any], finished: str, expect: Any) -> None:
-    from islands.export import EXPORTS
-
-    page = opened(f"#/jobs/{finished}")
-    expect(page.locator(".model .exports button")).not_to_have_count(0)
-    shown = page.locator(".model .exports button").evaluate_all("all => all.map((one) => one.dataset.format)")
-    assert set(shown) == {*EXPORTS, "fmu"}
 
 
 @pytest.mark.ci
@@ -360,32 +216,3 @@ def test_a_figure_is_saved_as_svg_png_and_csv(
     assert picture.width == 2100  # 7 inches at 300 per inch
     assert picture.getpixel((2, 2)) == (255, 255, 255)
     assert picture.getcolors(maxcolors=1) is None
-
-
-@pytest.mark.parametrize(
-    ("scheme", "width"),
-    [
-        pytest.param("light", 1280, marks=pytest.mark.nightly),
-        pytest.param("dark", 390, marks=pytest.mark.ci),
-    ],
-)
-def test_a_latent_model_has_parameters_and_figures_of_its_parts(
-    opened: Callable[..., Any], latent: str, expect: Any, scheme: str, width: int
-) -> None:
-    page = opened(f"#/jobs/{latent}", color_scheme=scheme, width=width)
-    expect(page.locator(".model .equation math").first).to_be_visible()
-    assert page.locator("table.models thead th").nth(1).inner_text() == "Parameters"
-    # Parameters with names have no inclusion, and these have no standard errors.
-    parameters = page.get_by_role("table", name="Parameters of the model")
-    assert parameters.locator("thead th").all_text_contents() == ["Parameter", "Value"]
-    # The equations of the point are one below the other.
-    written = page.locator(".front .equation").inner_text()
-    assert "\nx1(k) = " in written
-    titles = page.locator(".gallery h4").all_text_contents()
-    assert titles[1:4] == ["Structure", "Curves of the units", "Frequency response at rest"]
-    structure = page.locator(".rendered").nth(1)
-    structure.scroll_into_view_if_needed()
-    expect(structure.locator("img")).to_be_visible(timeout=DRAWN)
-    assert structure.locator(".files a").all_text_contents() == ["SVG", "PNG"]
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert unreadable(page) == []

@@ -104,18 +104,6 @@ def test_the_input_is_described_drawn_and_saved(
 
 
 @pytest.mark.nightly
-def test_causes_that_no_input_separates_have_words_alone(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    pair = {**EXPERIMENT["pairs"][0], "predicted": None, "repeats": None}
-    page = quiet(desk.url).go(f"#/jobs/{finish(desk, {'pairs': [pair], 'input': None})}")
-    section = page.locator(".next-experiment")
-    expect(section).to_contain_text("no input separates them")
-    expect(section.locator("tbody tr")).to_contain_text("not separable")
-    assert section.get_by_role("button").count() == 0
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
 def test_the_section_is_readable(
     quiet: Callable[..., Screen], desk: ServiceClient, tmp_path: Path, scheme: str, width: int

@@ -108,24 +108,3 @@ def test_the_page_recovers_automatically_from_a_killed_service(
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 7)
     expect(page.locator(".status .progress-text")).to_have_text("7 / 500")
-
-
-@pytest.mark.nightly
-def test_a_page_opened_during_an_outage_shows_it(
-    screens: Callable[..., Screen], desk: Service, expect: Any
-) -> None:
-    """As behind a proxy or during a database outage, the first responses are 503."""
-    job = desk.submit(500)
-    page = screens(desk.url).page
-    detail = "the database does not answer: try again in a moment"
-    page.route(
-        "**/v1/jobs?*",
-        lambda route: route.fulfill(
-            status=503, content_type="application/problem+json", json={"status": 503, "detail": detail}
-        ),
-    )
-    page.goto(desk.url)
-    expect(page.locator(".banner.unavailable")).to_contain_text(detail)
-    page.unroute("**/v1/jobs?*")
-    expect(page.locator(f"tr[data-job='{job}']")).to_be_visible()
-    expect(page.locator(".banner")).to_have_count(0)

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from support.command_line import write_offset
-from support.repository import ROOT
 from support.screen import Screen
 from support.service_client import ServiceClient
 
@@ -101,51 +100,6 @@ def test_a_diagnosis_is_run_again_with_all_of_its_settings(
     page = open_again(quiet(desk.url), job)
     again = submit(page, desk, "Diagnose")
     assert (again["spec"], again["name"]) == (job["spec"], "first")
-
-
-def test_the_equations_of_a_diagnosis_are_edited_again(
-    screens: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
-) -> None:
-    text = (ROOT / "examples" / "simulations" / "dc-motor.toml").read_text()
-    simulation = desk.ask("POST", "/v1/simulations/equations", json={"text": text}).json()
-    order = {"dataset": dataset, "input": "u_V", "output": "y_um", "tolerance": {"b": 0.2}}
-    job = start(desk, "/v1/discrepancies", {**order, "simulation": simulation})
-    page = open_again(screens(desk.url), job)
-    expect(page.locator(".check")).to_contain_text("Valid. States: i, omega, phi.")
-    expect(page.get_by_label("Tolerance of b in per cent")).to_have_value("20")
-    field = page.get_by_label("Equations", exact=True)
-    assert "di/dt = (u - R*i - K*omega)/L" in field.input_value()
-    assert submit(page, desk, "Diagnose")["spec"] == job["spec"]
-
-
-@pytest.mark.nightly
-def test_a_changed_setting_is_the_only_difference(
-    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str
-) -> None:
-    order = {"dataset": dataset, "input": "theirs_um", "channels": ["u_V"], "output": "y_um"}
-    job = start(desk, "/v1/discrepancies", {**order, **REQUESTS["second-order"]})
-    page = open_again(quiet(desk.url), job)
-    page.get_by_label("Value of m").fill("4")
-    changed = {"kind": "second-order", "parameters": {"m": 4.0}}
-    assert submit(page, desk, "Diagnose")["spec"] == {**job["spec"], "simulation": changed}
-
-
-def test_a_model_of_several_outputs_is_identified_again(
-    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
-) -> None:
-    settings = {"generations": 7, "shifts": [1, 2]}
-    order = {"dataset": dataset, "inputs": ["u_V"], "output": ["y_um", "theirs_um"], "rows": "20:380"}
-    job = start(desk, "/v1/jobs", {**order, "preset": "hysteresis", "settings": settings, "seed": 5})
-    page = open_again(quiet(desk.url), job)
-    expect(page.get_by_label("theirs_um is an output")).to_be_checked()
-    expect(page.get_by_label("generations", exact=True)).to_have_value("7")
-    again = submit(page, desk, "Identify")
-    assert again["spec"] == job["spec"]
-    page.get_by_role("link", name="Run again with changes").click()
-    page.get_by_label("generations", exact=True).fill("9")
-    page.get_by_label("theirs_um is an output").uncheck()
-    changed = {**job["spec"], "output": "y_um", "settings": {**settings, "generations": 9}}
-    assert submit(page, desk, "Identify")["spec"] == changed
 
 
 def test_a_preset_shows_its_settings_only_and_latent_models_have_a_structure(

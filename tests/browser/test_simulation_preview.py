@@ -1,18 +1,13 @@
 """Previews of simulations, and FMUs, in the form of a diagnosis."""
 
 import re
-import shlex
-import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 import pytest
 
-from islands.simulators.specification.code import FmuSpec
-from islands.simulators.specification.table import parse_spec
 from islands_service.intake.reader_process import SIMULATION_SERVER
 from support.canvas import DRAWN
 from support.oscillator_fmus import write_oscillator
@@ -57,18 +52,6 @@ def dataset(desk: ServiceClient) -> str:
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_oscillator(tmp_path_factory.mktemp("fmu") / "mass.fmu")
-
-
-def rename(source: Path, path: Path, names: dict[str, str]) -> Path:
-    """Write an FMU with other names of variables."""
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(path, "w") as new:
-        for each in old.infolist():
-            data = old.read(each)
-            if each.filename == "modelDescription.xml":
-                for name, other in names.items():
-                    data = data.replace(f'name="{name}"'.encode(), f'name="{escape(other)}"'.encode())
-            new.writestr(each, data)
-    return path
 
 
 def open_form(screen: Screen, dataset: str, kind: str) -> Any:
@@ -132,63 +115,6 @@ def test_an_fmu_is_uploaded_previewed_and_diagnosed(
     again = desk.job(form.page.url.rpartition("/")[2])
     desk.ask("POST", f"/v1/jobs/{again['id']}/cancel")
     assert again["spec"] == job["spec"]
-
-
-@pytest.mark.nightly
-@pytest.mark.nightly
-@pytest.mark.parametrize("stiffness", ["k%2B", "k=a,b"])
-def test_channels_drive_further_inputs_and_the_command_is_the_request(
-    quiet: Callable[..., Screen],
-    desk: ServiceClient,
-    dataset: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    expect: Any,
-    stiffness: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    plain = write_oscillator(tmp_path / "plain.fmu", disturbance=True)
-    fmu = rename(plain, tmp_path / "axis.fmu", {"u": "u+1", "m": "m & load", "k": stiffness})
-    form = open_form(quiet(desk.url), dataset, "fmu")
-    form.get_by_label("File", exact=True).set_input_files(fmu)
-    driven = form.get_by_label("w is driven by")
-    expect(driven.locator("option")).to_have_text(["nothing"])
-    form.page.get_by_label("w_N is an input").check()
-    form.get_by_label("Driven by", exact=True).select_option("F_N")
-    expect(driven.locator("option")).to_have_text(["w_N", "nothing"])
-    form.get_by_text("The same as a command").click()
-    command = form.locator("pre").first.text_content().replace("\\\n", "")
-    if file := re.match(r"cat > (\S+) <<'END'\n(.*)\nEND\n", command, re.DOTALL):
-        Path(file[1]).write_text(file[2], encoding="utf-8")
-    words = shlex.split(command[file.end() if file else 0 :])
-    assert words[words.index("--channel") + 1] == "w_N"
-    written = parse_spec(words[words.index("--simulation") + 1])
-    form.get_by_role("button", name="Diagnose").click()
-    form.page.wait_for_url("**/#/jobs/*")
-    job = desk.job(form.page.url.rpartition("/")[2])
-    desk.ask("POST", f"/v1/jobs/{job['id']}/cancel")
-    asked = FmuSpec.model_validate(job["spec"]["simulation"])
-    assert (asked.input, asked.channels) == ("u+1", ("w",))
-    assert list(asked.parameters) == ["m & load", "c", stiffness]
-    assert written == asked.model_copy(update={"file": "axis.fmu"})
-    assert job["spec"]["channels"] == ["w_N"]
-
-
-def test_a_preview_that_fails_states_the_reason_of_the_fmu(
-    screens: Callable[..., Screen], desk: ServiceClient, dataset: str, fmu: Path, expect: Any
-) -> None:
-    form = open_form(screens(desk.url), dataset, "fmu")
-    form.get_by_label("File", exact=True).set_input_files(fmu)
-    form.get_by_label("Value of m").fill("-1")
-    form.get_by_role("button", name="Preview").click()
-    message = form.locator(".preview [role=status]")
-    expect(message).to_contain_text("m is out of range", timeout=COMPILED)
-    expect(message).to_have_class(re.compile("complaint"))
-    expect(form.locator(".preview canvas")).to_have_count(0)
-    form.get_by_label("Value of m").fill("0.5")
-    form.get_by_role("button", name="Preview").click()
-    expect(message).to_have_text(ERROR, timeout=COMPILED)
-    expect(message).not_to_have_class(re.compile("complaint"))
 
 
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)

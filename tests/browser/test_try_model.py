@@ -82,25 +82,6 @@ def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect
     expect(page.get_by_text("Before the first sample", exact=False)).to_be_visible()
 
 
-def test_every_excitation_has_a_response(tried: Callable[..., Any], expect: Any) -> None:
-    page = tried()
-    for kind in ("triangle", "steps", "sweep", "hold", "record"):
-        with page.expect_response(lambda answer: answer.url.endswith("/simulate")) as answer:
-            page.get_by_label("Signal").select_option(kind)
-        assert answer.value.status == 200
-        assert answer.value.request.post_data_json["inputs"]["u_V"]["kind"] == kind
-    expect(page.locator(".try .loop canvas")).to_be_visible()
-    expect(page.get_by_role("img", name="Output over input: u_V (V) from")).to_be_visible()
-
-
-def test_an_invalid_value_is_named_and_not_requested(tried: Callable[..., Any], expect: Any) -> None:
-    page = tried()
-    page.get_by_label("Samples").fill("60000")
-    expect(page.locator(".try [role=status]")).to_contain_text("missing or out of its range")
-    page.get_by_label("Samples").fill("100")
-    expect(page.locator(".try [role=status]")).to_contain_text("y_um: ")
-
-
 def test_the_response_is_saved_with_every_digit(tried: Callable[..., Any]) -> None:
     page = tried()
     with page.expect_response(lambda answer: answer.url.endswith("/simulate")) as answered:

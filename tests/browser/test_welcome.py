@@ -1,9 +1,7 @@
 """Instructions for the first job: the three commands on the page work as written."""
 
 import os
-import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -86,27 +84,6 @@ def test_the_command_line_submits_and_watches(
     done = run_with_coordinator(folder, "sh", "-ec", commands["Command line"])
     assert done.returncode == 0, done.stderr
     assert "rank" in done.stdout
-
-
-@pytest.mark.nightly
-def test_the_client_submits_and_waits(
-    commands: dict[str, str], folder: Path, run_with_coordinator: Any
-) -> None:
-    done = run_with_coordinator(folder, sys.executable, "-c", commands["Python"])
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == "y(k) = 42\n"
-
-
-@pytest.mark.ci
-@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
-def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: ServiceClient) -> None:
-    upload, submit = commands["curl"].split("\n", 1)
-    uploaded = run(folder, "sh", "-ec", f"{upload} --silent --show-error --fail")
-    assert uploaded.returncode == 0, uploaded.stderr
-    dataset = uploaded.stdout.partition('"id":"')[2].partition('"')[0]
-    submitted = run(folder, "sh", "-ec", submit.replace("THE ID IN THE RESPONSE", dataset) + " -sSf")
-    assert submitted.returncode == 0, submitted.stderr
-    assert submitted.stdout.partition('"id":"')[2].partition('"')[0] in list_jobs(desk)
 
 
 @pytest.mark.ci

@@ -10,8 +10,6 @@ from support.markup_rules import find_markup_defects
 APPEARANCES = [
     pytest.param("light", 1280, marks=pytest.mark.nightly),
     pytest.param("dark", 360, marks=pytest.mark.ci),
-    pytest.param("light", 360, marks=pytest.mark.nightly),
-    pytest.param("dark", 1280, marks=pytest.mark.nightly),
 ]
 
 #: Minimum contrast of a text (WCAG 2.2, 1.4.3).
