@@ -6,8 +6,8 @@ import pytest
 
 from islands_api.admin_schemas import CreatedKey, KeyPage, KeyView, OwnerPage, OwnerView
 from support.processes import eventually
-from support.service import csv, kept, problem_of, queued, spec
-from support.stores import FOUND, claimed
+from support.service import kept, problem_of, queued, spec
+from support.stores import claimed
 
 
 @pytest.fixture(scope="module")
@@ -72,12 +72,6 @@ def test_invalid_key_is_refused(service, admin, body, kind):
     assert service.store.keys.all() == before
 
 
-def test_unknown_key_and_owner_are_not_found(service, admin, change):
-    problem_of(service.client.post("/v1/admin/keys/0/revoke", headers=admin), 404, "no-such-key")
-    problem_of(service.client.get("/v1/admin/owners/unknown", headers=admin), 404, "no-such-owner")
-    problem_of(change("unknown", weight=2), 404, "no-such-owner")
-
-
 def test_owners_are_listed_with_their_quotas_and_use(service, admin, change):
     dataset = kept(service.store, "me")
     for _ in range(2):
@@ -108,38 +102,6 @@ def test_invalid_change_is_refused(service, change, wrong):
     assert service.store.owners.get("me").weight == 100
 
 
-def test_quota_of_active_jobs_of_an_owner_precedes_the_setting(service, mine, change):
-    order = spec(kept(service.store, "me"))
-    change(max_active=4)
-    answers = [service.submit(mine, **order, seed=seed) for seed in range(5)]
-    assert [answer.status_code for answer in answers] == [202] * 4 + [429]
-    assert "4 is the most" in problem_of(answers[-1], 429, "quota-exceeded")
-    change(max_active=0)
-    other = service.key(owner="them")
-    assert service.submit(other, **spec(kept(service.store, "them"))).status_code == 202
-
-
-def test_quota_of_running_islands_of_an_owner_precedes_the_setting(service, mine, change):
-    order = spec(kept(service.store, "me"), settings={"islands": 6})
-    answer = service.submit(mine, **order)
-    assert "6 islands, and your running jobs may have 5" in problem_of(answer, 422, "invalid-settings")
-    assert change(max_islands=6).json()["max_islands"] == 6
-    assert service.submit(mine, **order).status_code == 202
-    claimed(service.store)
-    assert change(max_islands=5).json()["running_islands"] == 6
-
-
-@pytest.mark.ci
-def test_quotas_of_uploads_and_bytes_apply_to_single_owners(service, mine, change):
-    files = {"file": ("a.csv", csv())}
-    change(max_uploads=0)
-    answer = service.client.post("/v1/datasets", files=files, headers=mine)
-    problem_of(answer, 429, "too-many-uploads")
-    change(max_uploads=None, max_stored=10)
-    answer = service.client.post("/v1/datasets", files=files, headers=mine)
-    assert "0.0 MB is the most: delete some" in problem_of(answer, 429, "quota-exceeded")
-
-
 def test_event_streams_of_an_owner_are_limited_until_they_end(service, mine, change):
     path = f"/v1/jobs/{queued(service.store, 'me').id}/events"
     change(max_streams=2)
@@ -154,19 +116,6 @@ def test_event_streams_of_an_owner_are_limited_until_they_end(service, mine, cha
             return answer.status_code == 200
 
     eventually(is_open)
-
-
-def test_figures_of_an_owner_without_a_quota_of_drawings_are_refused(service, mine, change):
-    job = queued(service.store, "me").id
-    service.store.leases.finish(claimed(service.store), FOUND)
-    path = f"/v1/jobs/{job}/models/1/figures/free-run.svg"
-    change(max_drawings=0)
-    answer = service.client.get(path, headers=mine)
-    assert "0 is the most" in problem_of(answer, 429, "quota-exceeded")
-    # A figure that is drawn already is sent.
-    blob = service.app.state.islands.blobs.write(b"<svg/>")
-    service.store.results.keep(job, {"1/free-run.svg": blob})
-    assert service.client.get(path, headers=mine).status_code == 200
 
 
 def test_an_administrator_lists_and_cancels_the_jobs_of_all_owners(service, admin, mine):

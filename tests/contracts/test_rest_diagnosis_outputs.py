@@ -3,7 +3,7 @@
 import pytest
 
 from islands_api import Client
-from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState
+from islands_service.domain.job import EXTENDED, JobOutcome, JobState
 from islands_service.store.blobs import Blobs
 from support.extended_simulations import extended
 from support.service import hidden, problem_of, run_diagnosis
@@ -43,38 +43,12 @@ def test_the_extremes_are_those_of_all_samples(finished):
             assert max(fine["maximum"]) == max(coarse["maximum"])
 
 
-def test_an_answer_is_revalidated(finished):
-    first = ask(finished)
-    again = ask(finished, **{"if-none-match": first.headers["etag"]})
-    assert (again.status_code, again.content) == (304, b"")
-    assert "no-cache" in first.headers["cache-control"]
-
-
-def test_the_client_has_the_same_outputs(finished):
-    service, job = finished
-    with Client(str(service.client.base_url)) as client:
-        found = client.outputs(job, start=10, stop=20)
-    assert found.rows == tuple(range(10, 20))
-
-
 @pytest.mark.parametrize(
     ("query", "detail"), [("start=9999999", "is not a part of it"), ("points=0", "points")]
 )
 def test_invalid_requests_say_what_exists(finished, query, detail):
     answer = ask(finished, query)
     assert (answer.status_code, detail in answer.text) == (422, True), answer.text
-
-
-def test_a_result_of_an_earlier_version_has_no_outputs(finished):
-    service, _ = finished
-    dataset = service.upload(hidden(service.settings.data_dir)).json()["id"]
-    order = {"dataset": dataset, "input": "u_V", "output": "y_um", "simulation": {"kind": "second-order"}}
-    job = service.client.post("/v1/discrepancies", json=order).json()
-    assert job["kind"] == DISCREPANCY
-    lease = service.store.leases.claim("test", 600.0)
-    service.store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"verdict": "nothing"}))
-    answer = service.client.get(f"/v1/jobs/{job['id']}/outputs")
-    assert "submit it again" in problem_of(answer, 404, "not-found")
 
 
 def test_an_extended_linear_simulation_is_exported_as_a_model(service, order):

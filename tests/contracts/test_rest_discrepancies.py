@@ -7,19 +7,14 @@ import sys
 
 import pytest
 
-from islands_service.domain.job import DISCREPANCY, JobOutcome, JobState, ProgressReport
+from islands_service.domain.job import JobOutcome, JobState
 from support.service import (
     HIDDEN,
-    held,
     hidden,
-    kept,
-    parse_events,
     problem_of,
     run_diagnosis,
-    run_identification,
-    served,
 )
-from support.stores import LONG, claimed
+from support.stores import claimed
 
 TERM = {"regressor": "y(k-1)", "parameter": 0.5}
 
@@ -48,50 +43,10 @@ def make_model_simulation(*terms, **changes):
     return {"simulation": {"kind": "model", "model": {**model, **changes}}}
 
 
-def test_a_discrepancy_job_is_listed_cancelled_and_resumed_like_any_job(service, order):
-    answer = submit_diagnosis(service, **order, name="piezo", priority=5)
-    assert answer.status_code == 202
-    job = answer.json()
-    assert answer.headers["location"] == f"/v1/jobs/{job['id']}"
-    assert answer.headers["retry-after"] == "1"
-    assert (job["kind"], job["state"], job["name"], job["priority"]) == (DISCREPANCY, "queued", "piezo", 5)
-    assert job["spec"] == order
-    assert service.client.get(answer.headers["location"]).json()["spec"] == order
-    other = service.submit(dataset=order["dataset"], inputs=["u_V"], output="y_um").json()
-    listed = service.client.get("/v1/jobs").json()["items"]
-    assert [(each["id"], each["kind"]) for each in listed] == [
-        (other["id"], "identification"),
-        (job["id"], DISCREPANCY),
-    ]
-    assert service.client.post(f"/v1/jobs/{job['id']}/cancel").json()["state"] == "cancelled"
-    assert service.client.post(f"/v1/jobs/{job['id']}/resume").json()["state"] == "queued"
-    assert "needs data set" in problem_of(
-        service.client.delete(f"/v1/datasets/{order['dataset']}"), 409, "dataset-in-use"
-    )
-
-
 def test_recordings_that_share_samples_are_refused(service, order):
     recordings = [{"dataset": order["dataset"], "rows": "50:"}]
     refused = submit_diagnosis(service, **order, recordings=recordings)
     assert "share samples" in problem_of(refused, 422, "invalid-settings")
-
-
-def test_an_idempotency_key_identifies_one_job_of_one_kind(service, order):
-    key = {"Idempotency-Key": "k1"}
-    first = submit_diagnosis(service, key, **order)
-    again = submit_diagnosis(service, key, **order)
-    assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
-    assert again.json() == first.json()
-    problem_of(submit_diagnosis(service, key, **{**order, "seed": 1}), 422, "idempotency-conflict")
-    other = service.submit(key, dataset=order["dataset"], inputs=["u_V"], output="y_um")
-    problem_of(other, 422, "idempotency-conflict")
-
-
-def test_a_discrepancy_job_counts_towards_the_quota(tmp_path):
-    with served(tmp_path, max_active=1) as service:
-        order = held(kept(service.store))
-        assert submit_diagnosis(service, **order).status_code == 202
-        problem_of(submit_diagnosis(service, **order), 429, "quota-exceeded")
 
 
 @pytest.mark.parametrize(
@@ -274,66 +229,12 @@ def test_the_report_is_self_contained_and_has_a_strict_policy(finished):
     assert not re.findall(r'(?:src|href)="(?!data:)', answer.text)
 
 
-@pytest.mark.ci
-def test_the_events_of_a_diagnosis_show_its_phases(finished):
-    service, job = finished
-    events = parse_events(service.client.get(f"/v1/jobs/{job}/events").text)
-    assert [number for number, _, _ in events] == list(range(1, len(events) + 1))
-    kinds = [kind for _, kind, _ in events]
-    assert (kinds[:2], kinds[-1], set(kinds[2:-1])) == (["queued", "running"], "succeeded", {"progress"})
-    phases = [data["phase"] for _, kind, data in events if kind == "progress"]
-    assert (phases[0], phases[-1]) == ("reading the record", "writing the report")
-    assert len(phases) > 4
-    assert events[-1][2]["verdict"] == "named"
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    "resource",
-    [
-        *("/models", "/models/1", "/models/1/export", "/models/1/figures", "/models/1/figures/loop.svg"),
-        *("/models/1/simulation", "/figures", "/figures/record.svg", "/history"),
-    ],
-)
-def test_resources_of_a_search_do_not_exist_for_a_diagnosis(finished, resource):
-    service, job = finished
-    detail = problem_of(service.client.get(f"/v1/jobs/{job}{resource}"), 404, "not-found")
-    assert f"job {job} is of the kind discrepancy, but only jobs of the kind identification" in detail
-    assert "/report" in detail
-
-
-@pytest.mark.ci
-def test_a_search_has_no_extended_simulation(service):
-    job = run_identification(service)
-    detail = problem_of(service.client.get(f"/v1/jobs/{job}/extended"), 404, "not-found")
-    assert "is of the kind identification, but only jobs of the kind discrepancy" in detail
-
-
 def test_a_diagnosis_without_effects_has_no_extended_simulation(service, order):
     job = submit_diagnosis(service, **order).json()["id"]
     found = JobOutcome(JobState.SUCCEEDED, {"verdict": "nothing"}, summary={"verdict": "nothing"})
     service.store.leases.finish(claimed(service.store), found)
     detail = problem_of(service.client.get(f"/v1/jobs/{job}/extended"), 404, "not-found")
     assert "its verdict is nothing" in detail
-
-
-def test_a_cancelled_diagnosis_has_a_result_and_no_report(service, order):
-    job = submit_diagnosis(service, **order).json()["id"]
-    found = JobOutcome(JobState.CANCELLED, {"verdict": "stopped"}, summary={"verdict": "stopped"})
-    service.store.leases.finish(claimed(service.store), found)
-    assert service.client.get(f"/v1/jobs/{job}/result").json()["verdict"] == "stopped"
-    detail = problem_of(service.client.get(f"/v1/jobs/{job}/report"), 404, "not-found")
-    assert "was cancelled and has no report: see its /result, or resume it" in detail
-
-
-def test_results_of_a_running_diagnosis_are_not_ready(service, order):
-    job = submit_diagnosis(service, **order).json()["id"]
-    lease = service.store.leases.claim("test", LONG)
-    service.store.leases.report(lease, ProgressReport({"phase": "residual analysis"}))
-    for resource in ("/result", "/report", "/extended"):
-        detail = problem_of(service.client.get(f"/v1/jobs/{job}{resource}"), 409, "not-finished")
-        assert "wait until it has succeeded" in detail
-    assert "islands_leases 1.0" in service.client.get("/metrics").text
 
 
 WEIGHT = """

@@ -3,16 +3,14 @@
 import threading
 import time
 
-import httpx
 import pytest
 
 from islands_api.web import event_hub
-from islands_api.web.auth import LOCAL_OWNER
 from islands_api.web.routes import events as routes
 from islands_service.store import leases
 from support.processes import eventually
-from support.service import PATIENCE, emptied, parse_events, problem_of, queued
-from support.stores import CANCELLED, FAILED, FOUND, brought_on, claimed
+from support.service import PATIENCE, emptied, parse_events, queued
+from support.stores import FOUND, brought_on, claimed
 
 
 @pytest.fixture(scope="module")
@@ -69,21 +67,6 @@ def test_a_stream_has_all_events_of_a_job_and_ends_with_it(service):
     assert eventually(lambda: open_streams(service) == 0)
 
 
-@pytest.mark.parametrize("end", [FAILED, CANCELLED])
-def test_a_stream_ends_with_every_terminal_event(service, end):
-    job = queued(service.store).id
-    service.store.leases.finish(claimed(service.store), end)
-    assert [kind for _, kind, _ in read_events(service, job)] == ["queued", "running", end.state]
-
-
-def test_a_stream_ends_if_a_queued_job_is_cancelled(service):
-    job = queued(service.store).id
-    thread, seen = start_reader(service, job)
-    service.client.post(f"/v1/jobs/{job}/cancel")
-    thread.join(PATIENCE)
-    assert [kind for _, kind, _ in seen] == ["queued", "cancelled"]
-
-
 @pytest.mark.parametrize("last", range(6))
 def test_a_reconnected_stream_has_each_later_event_once(service, last):
     job = queued(service.store).id
@@ -129,25 +112,6 @@ def test_a_stream_after_the_last_event_returns_204(service, last):
     assert (answer.status_code, answer.content) == (204, b"")
 
 
-def test_a_resumed_job_has_a_stream_again(service):
-    job = queued(service.store, spec={"seed": 7}).id
-    service.store.leases.finish(claimed(service.store), CANCELLED)
-    assert [number for number, _, _ in read_events(service, job)] == [1, 2, 3]
-    service.store.jobs.resume(LOCAL_OWNER, job)
-    thread, seen = start_reader(service, job, last=3)
-    service.store.leases.finish(claimed(service.store), FOUND)
-    thread.join(PATIENCE)
-    assert [(number, kind) for number, kind, _ in seen] == [(4, "queued"), (5, "running"), (6, "succeeded")]
-
-
-def test_a_future_event_number_is_limited_to_the_last_event(service):
-    job = queued(service.store).id
-    thread, seen = start_reader(service, job, last=10**9)
-    service.store.leases.finish(claimed(service.store), FOUND)
-    thread.join(PATIENCE)
-    assert [(number, kind) for number, kind, _ in seen] == [(2, "running"), (3, "succeeded")]
-
-
 def test_an_idle_stream_has_comments(service, monkeypatch):
     monkeypatch.setattr(routes, "_KEEP_ALIVE_SECONDS", 0.05)
     job = queued(service.store).id
@@ -158,34 +122,6 @@ def test_an_idle_stream_has_comments(service, monkeypatch):
             if text.count(": alive\n\n") >= 3:
                 break
     assert [number for number, _, _ in parse_events(text)] == [1]
-
-
-def test_a_stream_of_another_owners_job_is_not_found(service):
-    job = queued(service.store, "other").id
-    problem_of(service.client.get(f"/v1/jobs/{job}/events"), 404, "no-such-job")
-
-
-@pytest.mark.ci
-def test_many_streams_of_one_job_have_the_same_events(service):
-    job = queued(service.store).id
-    lease = claimed(service.store)
-    found = [[] for _ in range(12)]
-
-    def watch(index):
-        with httpx.Client(base_url=service.url, timeout=PATIENCE, verify=False) as client:
-            found[index] = parse_events(client.get(f"/v1/jobs/{job}/events").text)
-
-    watchers = [threading.Thread(target=watch, args=(index,)) for index in range(len(found))]
-    for watcher in watchers:
-        watcher.start()
-    eventually(lambda: open_streams(service) == len(found))
-    for generation in range(5):
-        service.store.leases.report(lease, brought_on(generation))
-    service.store.leases.finish(lease, FOUND)
-    for watcher in watchers:
-        watcher.join(PATIENCE)
-    assert [number for number, _, _ in found[0]] == list(range(1, 9))
-    assert all(seen == found[0] for seen in found)
 
 
 def test_a_long_stream_omits_the_oldest_progress_events(service, monkeypatch):

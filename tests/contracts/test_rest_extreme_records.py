@@ -1,18 +1,15 @@
 """Short and extreme records over REST: a job fails with a problem that says what to do, or it succeeds."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from threading import Thread
 from typing import Any
 
 import pytest
 
-from islands.records.writer import write_record
-from islands.systems.example_records import make_piezo
 from islands_service.liveness import StopRequest
 from support.coordinators import SerialCoordinator
 from support.processes import eventually
-from support.service import QUICK, Service, columns, emptied, held, npz, spec
+from support.service import Service, columns, emptied, held, npz
 
 #: Seconds that a job may take.
 _PATIENCE = 240.0
@@ -58,41 +55,6 @@ def _scale(samples: int = 200, **factors: float) -> bytes:
     """Return a record whose columns are multiplied by factors."""
     values = columns(samples)
     return npz(**{name: factors.get(name, 1.0) * column for name, column in values.items()})
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("name", ["u_V", "y_um"])
-@pytest.mark.parametrize("factor", [1e300, pytest.param(1e-300, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize("kind", ["jobs", "discrepancies"])
-def test_a_job_on_extreme_magnitudes_fails_with_a_sentence_that_says_what_to_do(
-    service: Service, kind: str, factor: float, name: str
-) -> None:
-    asked = spec("", settings=QUICK) if kind == "jobs" else held("", simulation={"kind": "second-order"})
-    job = _run(service, f"/v1/{kind}", _scale(400, **{name: factor}), "record.npz", **asked)
-    assert job["state"] == "failed"
-    assert job["problem"]["type"] != "defect", job["problem"]
-    assert name in job["problem"]["detail"]
-    assert "use another unit" in job["problem"]["detail"]
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    "rows", ["0:36", *(pytest.param(each, marks=pytest.mark.nightly) for each in ("0:30", "0:44"))]
-)
-def test_a_job_on_few_samples_succeeds_or_asks_for_more(service: Service, tmp_path: Path, rows: str) -> None:
-    """Models of different lags had predictions of different lengths, which the recommendation compared."""
-    write_record(make_piezo(), tmp_path / "piezo.csv")
-    content = (tmp_path / "piezo.csv").read_bytes()
-    settings = {**QUICK, "max_height": 1}
-    job = _run(
-        service, "/v1/jobs", content, "piezo.csv", **spec("", preset="narx", settings=settings, rows=rows)
-    )
-    if job["state"] == "failed":
-        assert job["problem"]["type"] == "invalid-record", job["problem"]
-        assert "give" in job["problem"]["detail"]
-    else:
-        assert job["state"] == "succeeded"
-        assert service.client.get(f"/v1/jobs/{job['id']}/models").json()["items"]
 
 
 @pytest.mark.ci

@@ -11,16 +11,14 @@ from functools import partial
 
 import httpx
 import pytest
-from sqlalchemy import update
 
 from islands_api.web.routes import figures
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError
-from islands_service.store.tables import models, results
 from support.databases import server
 from support.disks import filled, read_only
 from support.processes import eventually
-from support.service import PATIENCE, csv, parse_events, problem_of, queued, run_identification, served, spec
+from support.service import PATIENCE, csv, parse_events, problem_of, run_identification, served, spec
 from support.stores import FOUND, claimed
 
 
@@ -79,16 +77,6 @@ def test_a_client_frees_space_of_a_full_disk(disk, serve):
             assert service.client.post(f"{job}/cancel").json()["state"] == "cancelled"
             assert service.client.delete(job).status_code == 204
         assert service.client.delete(f"/v1/datasets/{dataset}").status_code == 204
-
-
-@pytest.mark.nightly
-def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
-    with serve(disk) as service:
-        path = f"/v1/jobs/{run_identification(service)}/models/1/figures/hold.svg"
-        filler = filled(disk)
-        assert "free some space" in problem_of(service.client.get(path), 507, "storage-full")
-        filler.unlink()
-        assert service.client.get(path).status_code == 200
 
 
 @pytest.mark.ci
@@ -200,50 +188,11 @@ def test_text_with_zero_bytes_never_reaches_postgresql(tmp_path, prepared_postgr
             assert service.client.get(path).status_code == 422, path
 
 
-def test_special_characters_are_stored_by_postgresql(tmp_path, prepared_postgres):
-    with served(tmp_path, database=prepared_postgres) as service:
-        name = "Größe 😀 'quoted' \"twice\" \\ % _"
-        job = queued(service.store, name=name)
-        assert service.client.get(f"/v1/jobs/{job.id}").json()["name"] == name
-        dataset = service.upload(csv(), "größe😀' ;%_.csv").json()
-        assert dataset["name"] == "größe😀' ;%_.csv"
-        for changes in ({"inputs": ["u\0V"]}, {"name": "a\0b"}, {"dataset": "a\0b"}):
-            assert service.submit(**spec(dataset["id"], **changes)).status_code == 422
-
-
 @pytest.fixture(scope="module")
 def figure_service(serve):
     """A service for tests that make figures fail."""
     with serve() as running:
         yield running
-
-
-def corrupt_row(service, table, **values):
-    """Identify a record and corrupt a row of its job in the store; return the path of a figure."""
-    job = run_identification(service)
-    service.store.database.write(
-        lambda connection: connection.execute(update(table).where(table.c.job_id == job).values(**values))
-    )
-    return f"/v1/jobs/{job}/models/1/figures/hold.svg"
-
-
-@pytest.mark.nightly
-def test_a_figure_of_a_damaged_model_has_a_readable_error(figure_service):
-    detail = problem_of(
-        figure_service.client.get(corrupt_row(figure_service, models, file="{}")), 500, "failed"
-    )
-    assert "cannot be drawn: model 1" in detail
-
-
-@pytest.mark.nightly
-def test_a_defect_while_drawing_is_logged_and_not_retried_at_once(figure_service):
-    path = corrupt_row(figure_service, results, document='{"settings": {"islands": 1}}')
-    figure_service.logs.clear()
-    said = [problem_of(figure_service.client.get(path), 500, "failed") for _ in range(2)]
-    assert said[0] == said[1]
-    assert said[0].endswith("cannot be drawn: the log of the service gives the reason")
-    (entry,) = [each for each in figure_service.logs if each["event"] == "drawing failed"]
-    assert entry["reason"].endswith("KeyError: 'shooting'")
 
 
 @pytest.mark.nightly
@@ -265,16 +214,6 @@ def test_figures_report_a_lost_blob_and_an_unavailable_database(figure_service):
     blob.write_bytes(data)
     problem_of(answer, 500, "no-such-blob")
     assert str(blob.parent.parent) not in answer.text
-
-
-@pytest.mark.ci
-def test_a_figure_that_timed_out_is_not_retried_at_once(figure_service, monkeypatch):
-    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/hold.svg"
-    monkeypatch.setattr(figures, "_DRAWING_TIMEOUT", 0.1)
-    detail = problem_of(figure_service.client.get(path), 500, "failed")
-    assert "take longer than" in detail
-    monkeypatch.undo()
-    assert problem_of(figure_service.client.get(path), 500, "failed") == detail
 
 
 def test_a_failed_figure_is_retried_later(monkeypatch):

@@ -277,16 +277,6 @@ def test_a_file_beyond_the_limits_ends_while_it_is_received(service: Service, si
     assert not [path for path in service.settings.blobs.glob("*") if path.is_file()]
 
 
-def test_quotas_and_scopes_are_those_of_uploads(service: Service, site: Site) -> None:
-    site.pages = {"/a.csv": send(200, bytes(90_000))}
-    key = service.key(owner="small")
-    for quota, kind in (({"max_stored": 10_000}, "quota-exceeded"), ({"max_uploads": 0}, "too-many-uploads")):
-        service.store.owners.change("small", quota)
-        problem_of(fetch(service, site.url("/a.csv"), key), 429, kind)
-    problem_of(fetch(service, site.url("/a.csv"), service.key("read")), 403, "scope-missing")
-    assert len(site.asked) == 1
-
-
 @pytest.mark.parametrize(
     "listed", ["s3://islands", "s3://islands/blobs", "s3://islands/blobs/ab", "s3://abc,s3://islands"]
 )

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 import scipy
 
-import islands
 from islands_api import Client
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.domain.job import JobOutcome, JobState
-from support.command_line import succeed
 from support.oscillator_fmus import write_oscillator
-from support.service import execute_diagnosis, npz, problem_of, spec
+from support.service import execute_diagnosis, npz, problem_of
 
 pytestmark = pytest.mark.ci
 
@@ -79,14 +77,6 @@ def test_an_fmu_is_described_and_listed_and_the_same_bytes_are_the_same_fmu(shar
         assert [each.id for each in client.fmus().items] == [fmu]
         assert client.describe_fmu(fmu).sha256 == found["sha256"]
     assert fmu not in shared.client.get("/v1/datasets").text
-
-
-def test_an_fmu_is_no_data_set(shared, dataset, fmu):
-    problem_of(shared.client.get(f"/v1/datasets/{fmu}"), 404, "no-such-dataset")
-    problem_of(shared.client.delete(f"/v1/datasets/{fmu}"), 404, "no-such-dataset")
-    problem_of(shared.client.get(f"/v1/fmus/{dataset}"), 404, "no-such-fmu")
-    problem_of(shared.client.delete(f"/v1/fmus/{dataset}"), 404, "no-such-fmu")
-    problem_of(shared.client.post("/v1/jobs", json=spec(fmu)), 404, "no-such-dataset")
 
 
 def test_an_fmu_may_be_as_large_as_a_data_set(shared, content):
@@ -195,27 +185,3 @@ def test_a_diagnosis_of_an_fmu_names_the_missing_offset(shared, diagnosed):
     assert "/tmp" not in report.text
     outputs = shared.client.get(f"/v1/jobs/{diagnosed}/outputs").json()
     assert [each["name"] for each in outputs["outputs"]] == ["measured", "simulated", "extended"]
-
-
-@pytest.mark.nightly
-def test_the_extended_simulation_of_an_fmu_runs_in_the_folder_of_its_file(
-    shared, diagnosed, content, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    succeed("jobs", "result", diagnosed, "--url", shared.url, "--out", "found")
-    shown = succeed("show", "found/extended.json")
-    assert shown.startswith("x_m from F_N: fmu ")
-    assert "offset (output map)" in shown
-    (tmp_path / "mass.fmu").write_bytes(content)
-    (tmp_path / "axis.npz").write_bytes(make_axis(0.02))
-    record = islands.read_record("axis.npz", inputs=["F_N"], output="x_m")
-    residual = islands.load("found/extended.json").simulate(record).y - record.y
-    assert np.sqrt(np.mean(residual**2)) < 4e-4
-
-
-@pytest.mark.nightly
-def test_a_diagnosed_fmu_is_neither_exported_nor_monitored(shared, diagnosed):
-    export = shared.client.get(f"/v1/jobs/{diagnosed}/extended/export")
-    assert "is not one difference equation" in problem_of(export, 404, "not-found")
-    monitor = shared.client.post("/v1/monitors", json={"diagnosis": diagnosed})
-    assert "run 'islands monitor' locally" in problem_of(monitor, 422, "invalid-settings")

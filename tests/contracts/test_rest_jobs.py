@@ -2,19 +2,15 @@
 
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import pytest
 
 from islands_api import Client
 from islands_api.web.auth import LOCAL_OWNER
-from islands_service.domain.job import JobState, ProgressReport, Submission
+from islands_service.domain.job import JobState, Submission
 from islands_service.store.tenants.keys import SCOPES
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
-
-MANY = 16
 
 
 @pytest.fixture
@@ -56,20 +52,6 @@ def test_a_repeated_request_with_a_key_returns_the_same_job(service, order):
     assert ids(service.client.get("/v1/jobs")) == [first.json()["id"]]
 
 
-def test_a_replay_returns_the_job_after_its_data_set_was_deleted(service, order):
-    """A client that lost the first response repeats its request, possibly after the data set was deleted."""
-    first = service.submit({"Idempotency-Key": "k1"}, **order)
-    service.client.post(f"{first.headers['location']}/cancel")
-    assert service.client.delete(f"/v1/datasets/{order['dataset']}").status_code == 204
-    again = service.submit({"Idempotency-Key": "k1"}, **order)
-    assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
-    assert (again.json()["id"], again.json()["state"]) == (first.json()["id"], "cancelled")
-    other = service.submit({"Idempotency-Key": "k1"}, **{**order, "seed": 1})
-    problem_of(other, 422, "idempotency-conflict")
-    problem_of(service.submit({"Idempotency-Key": "k2"}, **order), 404, "no-such-dataset")
-    problem_of(service.submit(**order), 404, "no-such-dataset")
-
-
 @pytest.mark.parametrize("change", [{"seed": 1}, {"name": "second"}, {"priority": 1}, {"preset": "narx"}])
 def test_another_request_with_the_same_key_is_rejected(service, order, change):
     first = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]
@@ -82,26 +64,9 @@ def test_another_request_with_the_same_key_is_rejected(service, order, change):
     assert ids(service.client.get("/v1/jobs")) == [first]
 
 
-def test_idempotency_keys_are_separate_for_each_owner(service, order):
-    mine = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]
-    header = service.key(owner="other")
-    theirs = service.submit({"Idempotency-Key": "k1", **header}, **spec(kept(service.store, "other")))
-    assert theirs.status_code == 202
-    assert theirs.json()["id"] != mine
-
-
 @pytest.mark.parametrize("key", ["", "x" * 256])
 def test_an_idempotency_key_has_1_to_255_characters(service, order, key):
     problem_of(service.submit({"Idempotency-Key": key}, **order), 422, "invalid-request")
-
-
-def test_concurrent_requests_with_one_key_make_one_job(service, order):
-    with ThreadPoolExecutor(MANY) as pool:
-        answers = list(pool.map(lambda _: service.submit({"Idempotency-Key": "k"}, **order), range(MANY)))
-    assert {answer.status_code for answer in answers} == {202}
-    assert len({answer.json()["id"] for answer in answers}) == 1
-    assert [answer.headers.get("idempotent-replayed") for answer in answers].count("true") == MANY - 1
-    assert len(ids(service.client.get("/v1/jobs"))) == 1
 
 
 def test_an_unchanged_job_is_answered_with_304(service):
@@ -175,23 +140,6 @@ def test_pages_have_each_job_once_while_jobs_are_added(service, limit):
     assert read_all_pages(service, "/v1/jobs", limit, lambda: queued(service.store)) == newest_first
 
 
-def test_pages_have_each_data_set_once_while_others_are_added(service):
-    before = [kept(service.store, content=b"%d" % index) for index in range(7)]
-    more = iter(range(100))
-    found = read_all_pages(
-        service, "/v1/datasets", 2, lambda: kept(service.store, content=b"x%d" % next(more))
-    )
-    assert sorted(found) == sorted(before)
-
-
-def test_pages_of_a_state_contain_only_jobs_in_it(service):
-    running = {make_job_in_state(service, JobState.RUNNING) for _ in range(3)}
-    waiting = {queued(service.store).id for _ in range(3)}
-    assert set(read_all_pages(service, "/v1/jobs", 2, state="queued")) == waiting
-    assert set(read_all_pages(service, "/v1/jobs", 2, state="running")) == running
-    assert read_all_pages(service, "/v1/jobs", 2, state="failed") == []
-
-
 @pytest.mark.parametrize("path", ["/v1/jobs", "/v1/datasets"])
 @pytest.mark.parametrize("cursor", ["x", "!!!", "bnVsbA", "WzEsMl0", "WzFlOTk5LCJhIl0"])
 def test_invalid_cursors_are_rejected(service, path, cursor):
@@ -227,58 +175,6 @@ def test_actions_are_allowed_only_in_certain_states(service, action, state):
         assert answer.json()["stop_requested"] == (action == "stop")
 
 
-def test_queued_jobs_show_their_position_among_those_of_all_owners(service, order, monkeypatch):
-    monkeypatch.setattr("islands_api.web.responses._PLACE_SECONDS", 0.0)
-    first, second = (service.submit(**order, priority=each).json()["id"] for each in (1, 0))
-    urgent = service.submit(service.key(owner="other"), **spec(kept(service.store, "other")), priority=7)
-    assert urgent.status_code == 202
-    listed = {
-        each["id"]: each["progress"]["position"] for each in service.client.get("/v1/jobs").json()["items"]
-    }
-    # The owners have turns, whatever the priority.
-    assert listed == {first: 1, second: 3}
-    assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 3
-    assert claimed(service.store).job.id == first
-    assert service.client.get(f"/v1/jobs/{second}").json()["progress"]["position"] == 2
-    assert claimed(service.store).job.owner == "other"
-    service.store.owners.change(LOCAL_OWNER, {"max_running": 1})
-    assert service.client.get(f"/v1/jobs/{second}").json()["progress"] == {
-        "phase": "queued",
-        "position": 1,
-        "note": "waits for your quota of running jobs: 1 of 1 are running",
-    }
-
-
-def test_job_states_its_run_time_and_its_limit(service, order):
-    job = service.submit(**order).json()
-    default = service.client.get(f"/v1/jobs/{job['id']}").json()
-    assert (job["max_run_seconds"], default["max_run_seconds"], default["run_seconds"]) == (3600, 3600, 0.0)
-    service.store.owners.change(LOCAL_OWNER, {"max_run_seconds": 7200})
-    service.store.leases.renew(claimed(service.store), 60.0, ran=7.26)
-    raised = service.client.get(f"/v1/jobs/{job['id']}").json()
-    assert (raised["max_run_seconds"], raised["run_seconds"]) == (7200, 7.3)
-    assert service.submit(**order).json()["max_run_seconds"] == 7200
-    service.store.owners.change(LOCAL_OWNER, {"max_run_seconds": None})
-    assert service.client.get(f"/v1/jobs/{job['id']}").json()["max_run_seconds"] == 3600
-
-
-def test_cancelling_a_job_twice_is_allowed(service):
-    path = f"/v1/jobs/{make_job_in_state(service, JobState.RUNNING)}"
-    first = service.client.post(f"{path}/cancel")
-    assert service.client.post(f"{path}/cancel").json() == first.json()
-
-
-def test_a_data_set_is_deleted_only_if_no_job_needs_it(service, order):
-    path = f"/v1/datasets/{order['dataset']}"
-    job = service.submit(**order).json()["id"]
-    detail = problem_of(service.client.delete(path), 409, "dataset-in-use")
-    assert f"job {job} needs data set" in detail
-    service.client.post(f"/v1/jobs/{job}/cancel")
-    assert service.client.delete(path).status_code == 204
-    problem_of(service.client.get(path), 404, "no-such-dataset")
-    problem_of(service.client.delete(path), 404, "no-such-dataset")
-
-
 @pytest.mark.parametrize("state", ["queued", "running", "failed", "cancelled"])
 def test_the_result_of_an_unfinished_job_is_not_ready(service, state):
     path = f"/v1/jobs/{make_job_in_state(service, JobState(state))}"
@@ -309,21 +205,6 @@ def test_the_history_of_a_search_starts_after_a_generation(service):
     assert service.client.get(path, params={"after": 99}).json()["items"] == []
 
 
-def test_the_history_of_many_islands_has_small_pages(service):
-    asked = {**spec("0-csv"), "settings": {"islands": 256}}
-    job, _ = service.store.jobs.submit(Submission(LOCAL_OWNER, asked))
-    points = tuple((at, 60 * at, {"3": 0.5}, (1.0 / 3.0,) * 256) for at in range(400))
-    service.store.leases.report(claimed(service.store), ProgressReport({"generation": 399}, points))
-    path, sizes, seen = f"/v1/jobs/{job.id}/history", [], [-1]
-    while not sizes or sizes[-1]:
-        answer = service.client.get(path, params={"after": seen[-1]})
-        assert len(answer.content) < 3_000_000
-        sizes.append(len(answer.json()["items"]))
-        seen += [point["generation"] for point in answer.json()["items"]]
-    assert seen[1:] == list(range(400))
-    assert sizes == [390, 10, 0]
-
-
 def test_figures_of_a_job_of_another_version_are_rejected(service):
     job, _ = service.store.jobs.submit(Submission(LOCAL_OWNER, {**spec("0-csv"), "colour": "red"}))
     service.store.leases.finish(claimed(service.store), FOUND)
@@ -333,17 +214,6 @@ def test_figures_of_a_job_of_another_version_are_rejected(service):
     assert "submit it again" in detail
 
 
-@pytest.mark.parametrize("loop", [True, False])
-def test_only_a_result_with_a_loop_has_the_loop_figure(service, loop):
-    job = service.store.jobs.submit(Submission(LOCAL_OWNER, spec("0-csv")))[0].id
-    service.store.leases.finish(claimed(service.store), replace(FOUND, document={"loop": loop}))
-    path = f"/v1/jobs/{job}/models/1/figures"
-    names = service.client.get(path).json()["items"]
-    assert names == ["free-run", *(["loop"] if loop else []), "hold", "residuals"]
-    if not loop:
-        assert "no figure 'loop'" in problem_of(service.client.get(f"{path}/loop.svg"), 404, "not-found")
-
-
 def test_cached_figures_vary_with_the_key(service):
     job = make_job_in_state(service, JobState.SUCCEEDED)
     blob = service.app.state.islands.blobs.write(b"<svg/>" * 1000)
@@ -351,30 +221,6 @@ def test_cached_figures_vary_with_the_key(service):
     headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers
     assert headers["cache-control"] == "private, max-age=86400, immutable"
     assert headers["vary"] == "Authorization, Accept-Encoding"
-
-
-def test_a_queued_job_states_the_time_until_enough_running_jobs_have_ended(service, order, monkeypatch):
-    monkeypatch.setattr("islands_api.web.responses._PLACE_SECONDS", 0.0)
-
-    def read(job):
-        return service.client.get(f"/v1/jobs/{job}").json()["progress"]
-
-    running = [service.submit(**order).json()["id"] for _ in range(2)]
-    leases = [claimed(service.store) for _ in running]
-    first, second, third = (service.submit(**order).json()["id"] for _ in range(3))
-    # Nothing is known about the running jobs.
-    assert "seconds_to_start" not in read(first)
-    service.store.leases.report(leases[0], ProgressReport({"phase": "search", "seconds_left": 300.0}))
-    assert read(first)["seconds_to_start"] == pytest.approx(300.0, abs=20.0)
-    # One known end lets only one job start.
-    assert "seconds_to_start" not in read(second)
-    service.store.leases.report(leases[1], ProgressReport({"phase": "search", "seconds_left": 100.0}))
-    starts = [read(job).get("seconds_to_start") for job in (first, second, third)]
-    assert starts[:2] == [pytest.approx(100.0, abs=20.0), pytest.approx(300.0, abs=20.0)]
-    # The duration of a queued job is unknown.
-    assert starts[2] is None
-    service.store.owners.change(LOCAL_OWNER, {"max_running": 2})
-    assert read(first).keys() == {"phase", "position", "note"}
 
 
 def test_a_caller_knows_its_owner_and_its_scopes(service):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.report.figures.names import LATENT_FIGURES
 from islands_api.client import Client
 from islands_api.client.errors import ServiceError
 from islands_api.web.auth import LOCAL_OWNER
@@ -85,26 +84,6 @@ def test_a_latent_model_has_the_constraints_of_its_job(service, tmp_path):
                 client.submit(dataset, "u_V", "y_mm", **given, constraints="[u(k-1)] = 1")
             with pytest.raises(ServiceError, match="2 inputs, but the record has 1"):
                 client.submit(dataset, "u_V", "y_mm", **given, constraints="gain(u2) = 1")
-
-
-@pytest.mark.nightly
-def test_a_latent_model_has_figures_of_its_parts(service, tmp_path):
-    islands.write_record(spring_record(500, noise=0.02), tmp_path / "spring.csv")
-    with Client(service.url) as client:
-        job = client.submit(client.upload(tmp_path / "spring.csv"), "u_V", "y_mm", model="latent")
-        blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
-        outcome = run_identification_job(make_run(lease, service.store, blobs, lambda: None, LONG))
-        service.store.leases.finish(lease, outcome)
-        models = client.models(job)
-    assert {"h1(k)" in model.equation for model in models} == {False, True}
-    for model in models:
-        listed = service.client.get(f"/v1/jobs/{job.id}/models/{model.rank}/figures").json()["items"]
-        parts = ("structure", "curves", "bode") if "h1(k)" in model.equation else ("structure", "bode")
-        assert tuple(name for name in listed if name in LATENT_FIGURES) == parts
-        # Names of parameters are positions: they have another meaning in another structure.
-        assert all(term["inclusion"] is None for term in model.terms)
-    rebuilt = read_search_result(service.store.jobs.get(LOCAL_OWNER, job.id), service.store, blobs, 1)
-    assert {f"1/{name}.svg" for name in LATENT_FIGURES} <= render_model_figures(rebuilt, 1).keys()
 
 
 @pytest.mark.parametrize(

@@ -114,16 +114,6 @@ def test_the_simulation_and_columns_of_a_diagnosis_are_monitored(service, order,
     assert found["simulation"]["kind"] == ("bouc-wen-piezo" if extended is None else "extended")
 
 
-def test_a_monitor_is_sent_again_only_if_it_has_changed(service, order):
-    monitor = create(service)
-    path = f"/v1/monitors/{monitor['id']}"
-    tag = {"If-None-Match": service.client.get(path).headers["etag"]}
-    assert service.client.get(path, headers=tag).status_code == 304
-    add(service, monitor, order["dataset"])
-    changed = service.client.get(path, headers=tag)
-    assert (changed.status_code, changed.json()["pending"]) == (200, 1)
-
-
 REFUSED = {
     "no simulation": ({"simulation": None}, "invalid-request", "give the diagnosis, or simulation"),
     "two": ({"diagnosis": UNKNOWN}, "invalid-request", "the diagnosis has input, output, simulation"),
@@ -153,28 +143,6 @@ def test_a_record_that_cannot_be_read_is_refused(service, order):
     other = create(service, channels=["T_K"])
     assert "T_K" in problem_of(add(service, other, order["dataset"]), 422, "invalid-record")
     assert service.client.get("/v1/jobs").json()["items"] == []
-
-
-def test_a_monitor_of_another_owner_is_not_found(service, order):
-    monitor = create(service)
-    foreign = service.key("read", "write", owner="other")
-    path = f"/v1/monitors/{monitor['id']}"
-    for method, where in (("GET", ""), ("GET", "/state"), ("GET", "/records"), ("DELETE", "")):
-        answer = service.client.request(method, path + where, headers=foreign)
-        problem_of(answer, 404, "no-such-monitor")
-    problem_of(add(service, monitor, order["dataset"], foreign), 404, "no-such-monitor")
-    assert service.client.get("/v1/monitors", headers=foreign).json()["items"] == []
-
-
-def test_changes_of_monitors_need_the_scope_write(service, order):
-    monitor, reader = create(service), service.key("read", owner="local")
-    problem_of(service.client.post("/v1/monitors", json=PIEZO, headers=reader), 403, "scope-missing")
-    problem_of(add(service, monitor, order["dataset"], reader), 403, "scope-missing")
-    path = f"/v1/monitors/{monitor['id']}"
-    problem_of(service.client.delete(path, headers=reader), 403, "scope-missing")
-    assert service.client.get(path, headers=reader).status_code == 200
-    problem_of(service.client.get(f"{path}/state"), 404, "not-found")
-    assert 'islands_monitors{status="waiting"} 1.0' in service.client.get("/metrics").text
 
 
 @pytest.mark.ci

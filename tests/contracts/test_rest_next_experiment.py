@@ -6,7 +6,6 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from islands_api import Client
 from islands_service.coordinator.diagnosis.job import run_diagnosis_job
 from islands_service.domain.job import JobOutcome, JobState
 from islands_service.store.blobs import Blobs
@@ -74,12 +73,6 @@ def test_the_file_has_the_column_the_sampling_time_and_the_limits_of_the_result(
     assert np.abs(np.diff(u)).max() / DT == pytest.approx(described["limits"]["rate"])
     assert described["is_within_record"] == (max(described["range_excess"], described["rate_excess"]) <= 1.0)
     assert any(pair["predicted"]["is_sufficient"] for pair in found["pairs"])
-
-
-def test_the_client_has_the_same_file(finished):
-    service, job = finished
-    with Client(str(service.client.base_url)) as client:
-        assert client.next_experiment(job) == service.client.get(f"/v1/jobs/{job}/next-experiment").text
 
 
 @pytest.mark.parametrize(

@@ -1,26 +1,20 @@
 """Responses of all routes match the OpenAPI document."""
 
-import io
 import json
 import re
 import xml.etree.ElementTree as ET
-import zipfile
 
 import pytest
 from jsonschema import Draft202012Validator
 
-from islands.export import EXPORTS, FILE_EXPORTS
-from islands.export.fmu.compiler import find_compiler
-from islands.persistence.models import model_from_json
+from islands.export import EXPORTS
 from support.service import (
     columns,
     csv,
     held,
-    hidden,
     kept,
     problem_of,
     queued,
-    run_diagnosis,
     run_identification,
     spec,
 )
@@ -199,37 +193,6 @@ def test_responses_of_other_requests_match_the_documentation(service, document):
     assert check_response(document, ended).status_code == 204
 
 
-@pytest.mark.ci
-def test_responses_of_a_diagnosis_match_the_documentation(service, document, tmp_path):
-    job = run_diagnosis(service, hidden(tmp_path))
-    for of in ("", "/events", "/result", "/report", "/extended"):
-        answer = check_response(document, service.client.get(f"/v1/jobs/{job}{of}"))
-        assert answer.status_code == 200
-    assert check_response(document, service.client.get(f"/v1/jobs/{job}/models")).status_code == 404
-    order = service.client.get(f"/v1/jobs/{job}").json()["spec"]
-    assert check_response(document, service.client.post("/v1/discrepancies", json=order)).status_code == 202
-    refused = service.client.post("/v1/discrepancies", json={**order, "input": "u"})
-    assert check_response(document, refused).status_code == 422
-
-
-def test_a_model_equals_its_entry_in_the_result(service, finished):
-    result = service.client.get(f"/v1/jobs/{finished}/result").json()
-    models = service.client.get(f"/v1/jobs/{finished}/models").json()["items"]
-    assert result["models"] == models
-    assert [model["rank"] for model in models] == list(range(1, len(models) + 1))
-    for model in models:
-        assert service.client.get(f"/v1/jobs/{finished}/models/{model['rank']}").json() == model
-    job = service.client.get(f"/v1/jobs/{finished}").json()
-    (chosen,) = (model for model in models if model["recommended"])
-    assert job["summary"]["size"] == chosen["size"]
-    for name in ("rank", "reasons"):
-        assert job["summary"][name] == result["recommended"][name]
-    assert job["summary"]["models"] == len(models)
-    assert models[0]["metrics"]["validation"]["free_run"]["mape"] < 1.0
-    missing = service.client.get(f"/v1/jobs/{finished}/models/{len(models) + 1}")
-    assert "see its /models" in problem_of(missing, 404, "not-found")
-
-
 @pytest.mark.parametrize("form", EXPORTS)
 def test_a_model_is_exported_in_every_format(service, document, finished, form):
     path = f"/v1/jobs/{finished}/models/1/export"
@@ -241,19 +204,6 @@ def test_a_model_is_exported_in_every_format(service, document, finished, form):
     (parameter,) = [each for each in documented["parameters"] if each["name"] == "format"]
     assert form in parameter["schema"]["enum"]
     assert answer.headers["content-type"].partition(";")[0] in documented["responses"]["200"]["content"]
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(find_compiler() is None, reason="there is no C compiler named cc")
-def test_a_model_is_exported_as_fmu(service, document, finished):
-    answer = check_response(document, service.client.get(f"/v1/jobs/{finished}/models/1/fmu"))
-    assert answer.headers["content-disposition"] == 'attachment; filename="model-01.fmu"'
-    stored = service.client.get(f"/v1/jobs/{finished}/models/1/export", params={"format": "json"}).text
-    expected = FILE_EXPORTS["fmu"](model_from_json(stored, "model 1"))
-    first, second = (zipfile.ZipFile(io.BytesIO(each)) for each in (answer.content, expected))
-    assert first.namelist() == second.namelist()
-    for name in ("modelDescription.xml", "sources/model.h"):
-        assert first.read(name) == second.read(name)
 
 
 def test_an_unknown_export_format_is_rejected(service, finished):
@@ -301,23 +251,3 @@ def test_every_figure_is_drawn_once_and_stored(service, document, finished):
     assert report.text.startswith("<!DOCTYPE html>")
     assert "inclusion" in report.text
     assert "script" not in report.headers["content-security-policy"]
-
-
-@pytest.mark.ci
-def test_the_preview_of_a_data_set_describes_its_columns(service):
-    preview = service.upload(csv(123), "größe.csv").json()["preview"]
-    assert (preview["samples"], preview["time"], preview["dt"], preview["warnings"]) == (123, "t_s", 0.01, [])
-    for column, (name, values) in zip(preview["columns"], columns(123).items(), strict=True):
-        assert (column["name"], column["unit"], column["samples"]) == (name, name.split("_")[1], 123)
-        for field, expected in (
-            ("minimum", values.min()),
-            ("mean", values.mean()),
-            ("deviation", values.std()),
-        ):
-            assert column[field] == pytest.approx(expected, abs=1e-6)
-    inspection = preview["inspection"]
-    assert inspection["choice"]["inputs"] == ["u_V"]
-    facts = {(fact["name"], fact["signal"]): fact["value"] for fact in inspection["facts"]}
-    assert facts["samples", ""] == 123
-    assert ("dead-time", "u_V") in facts
-    assert kept(service.store) != kept(service.store, content=b"other")

@@ -7,22 +7,6 @@ import pytest
 from support.bad_records import lines
 from support.service import problem_of
 
-HEADERLESS = "\n".join(lines()[1:]).encode()
-NAMES = {"names": ["t_s", "u_V", "y_um"]}
-
-
-@pytest.mark.ci
-def test_a_job_reads_a_record_without_a_header_with_given_names(service):
-    refused = service.upload(HEADERLESS)
-    assert "contains the number" in problem_of(refused, 422, "invalid-record")
-    stored = service.upload(HEADERLESS, reading=json.dumps(NAMES))
-    assert stored.status_code == 201
-    document = stored.json()
-    assert [column["name"] for column in document["preview"]["columns"]] == NAMES["names"]
-    assert document["preview"]["reading"] == NAMES
-    job = service.submit(dataset=document["id"], inputs=["u_V"], output="y_um", rows="0:50")
-    assert job.status_code == 202, job.text
-
 
 @pytest.mark.ci
 def test_the_same_bytes_read_in_another_way_are_another_data_set(service):
@@ -45,13 +29,6 @@ def test_invalid_options_are_refused(service, reading):
     problem_of(service.upload(b"t,u,y", reading=reading or "null"), 422, "invalid-settings")
 
 
-def test_an_unknown_option_has_similar_names(service):
-    answer = service.upload(b"t,u,y", reading='{"sheets": "a"}')
-    assert problem_of(answer, 422, "invalid-settings").endswith(
-        "sheets: Unexpected keyword argument. Did you mean 'sheet'?"
-    )
-
-
 @pytest.mark.parametrize(
     "reading", ['{"missing": ["Failed", "-9999"]}', '{"header": false}', '{"gaps": "split"}']
 )
@@ -64,13 +41,6 @@ def test_every_option_of_reading_works_over_rest(service, reading):
     assert document["reading"] == json.loads(reading)
     if "missing" in reading:
         assert "column y_um: Failed is read as missing in line 10" in document["warnings"]
-
-
-def test_days_as_a_time_are_read_as_days_and_said_so(service):
-    rows = (f"{45987.5 + k / 1440:.9f}{line[line.index(',') :]}" for k, line in enumerate(lines()[1:]))
-    preview = service.upload("\n".join(["Date,u_V,y_um", *rows]).encode()).json()["preview"]
-    assert preview["dt"] == 60.0
-    assert any("column Date is read as days: 45987.5 is 2025-11-26" in each for each in preview["warnings"])
 
 
 @pytest.mark.parametrize("name", ["header", "missing", "inputz", "anything"])

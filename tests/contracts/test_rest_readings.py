@@ -1,6 +1,5 @@
 """Data sets that are read in another way, by the options that their notes advise."""
 
-import numpy as np
 import pytest
 
 from islands_api import Client
@@ -62,23 +61,3 @@ def test_unknown_options_are_refused_with_the_known_ones(service, gaps, reading,
 def test_a_data_set_that_does_not_exist_has_no_reading(service):
     answer = service.client.post("/v1/datasets/0-csv/readings", json={"reading": {}})
     assert problem_of(answer, 404, "no-such-dataset")
-
-
-def test_presets_state_their_settings_and_what_the_settings_mean(service):
-    with Client(service.url) as client:
-        page = client.presets()
-    auto, *named = page.items
-    assert auto.name == "auto"
-    assert {each.name for each in named} >= {"narx", "hysteresis"}
-    for each in named:
-        assert each.settings.keys() == page.settings.keys()
-    # What depends on the record is not stated.
-    assert auto.settings["tolerance"] == 1e-5
-    assert "library" not in auto.settings
-    assert page.settings["tolerance"]["description"].startswith("Smallest error reduction ratio")
-    assert np.all([each["description"] for each in page.settings.values()])
-    latent = next(each for each in named if each.name == "latent")
-    assert latent.structures == ("auto", "wiener", "hammerstein", "feedback")
-    assert {"max_terms", "model_class"} <= {*latent.fixed}
-    assert "structure" not in latent.fixed
-    assert (auto.structures, auto.fixed) == (("free", "phi", "increment"), ("model_class",))

@@ -13,7 +13,7 @@ from islands_service.coordinator.identification_job import run_identification_jo
 from islands_service.store.blobs import Blobs
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.job_runs import make_run
-from support.service import columns, problem_of, queued, run_identification
+from support.service import problem_of, run_identification
 from support.stores import taken
 
 pytestmark = pytest.mark.ci
@@ -84,31 +84,6 @@ def test_the_response_is_that_of_the_library_bit_for_bit(service, job, model, ki
     assert again.json() == found
 
 
-def test_the_input_of_the_record_is_scaled_and_shifted(service, job):
-    asked = {"inputs": {"u_V": {"kind": "record", "scale": 2.0, "offset": -1.0}}, "samples": 1000}
-    found = ask(service, job, asked).json()
-    assert found["inputs"]["u_V"] == pytest.approx(2.0 * columns(400)["u_V"] - 1.0, abs=2e-6)
-    shorter, left = found["warnings"]
-    assert shorter == "the record has 400 samples, and so has the response"
-    assert left.startswith("u_V is -")
-
-
-def test_an_input_outside_of_the_range_of_the_estimation_data_is_a_warning(service, job):
-    low, high = ask(service, job, {"samples": 1}).json()["ranges"]["u_V"]
-    for value, warned in ((high, 0), (low, 0), (2.0 * high, 1)):
-        found = ask(service, job, {"inputs": {"u_V": {"kind": "hold", "value": value}}}).json()
-        assert len(found["warnings"]) == warned, found["warnings"]
-        assert len(found["output"]) == 2000
-    assert "in this response and" in found["warnings"][0]
-
-
-def test_the_output_starts_from_a_given_value(service, job, model):
-    asked = {"inputs": {"u_V": [1.0] * 100}, "initial_output": 3.0}
-    found = ask(service, job, asked).json()
-    assert found["output"] == simulate(model, np.ones(100), 3.0).tolist()
-    assert found["start"] == "before the first sample y_um is 3 um, as given"
-
-
 def test_huge_inputs_are_answered(service, job):
     for value in (1e308, -1e150):
         found = ask(service, job, {"inputs": {"u_V": {"kind": "hold", "value": value}}, "samples": 20})
@@ -151,14 +126,6 @@ def test_the_client_sends_arrays_and_excitations(service, job):
 )
 def test_requests_are_bounded(service, job, body, status, kind, detail):
     assert detail in problem_of(ask(service, job, body), status, kind)
-
-
-def test_a_missing_model_and_an_unfinished_job_have_no_response(service, job):
-    assert "has no model 99" in problem_of(ask(service, job, {}, 99), 404, "not-found")
-    waiting = queued(service.store).id
-    assert "wait until it has succeeded" in problem_of(ask(service, waiting, {}), 409, "not-finished")
-    service.client.post(f"/v1/jobs/{waiting}/cancel")
-    problem_of(ask(service, "0" * 32, {}), 404, "no-such-job")
 
 
 def test_a_model_of_several_outputs_is_refused_with_advice(service, tmp_path):

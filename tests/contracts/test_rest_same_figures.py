@@ -8,7 +8,6 @@ import pytest
 
 import islands
 from islands.persistence.models import model_from_json
-from islands.records.signal_map import match_rate
 from islands.report.text.statements import BEFORE_REFIT
 from islands.validation.metrics import metrics
 from islands_api.client import Client
@@ -19,7 +18,7 @@ from islands_service.coordinator.identification_job import run_identification_jo
 from islands_service.domain.job import REPORT, JobState
 from islands_service.figure_worker import read_search_result, render_figures
 from islands_service.store.blobs import Blobs
-from support.command_line import fail, succeed
+from support.command_line import succeed
 from support.job_runs import make_run
 from support.monitoring_jobs import analyse_next
 from support.stores import LONG, taken
@@ -96,45 +95,6 @@ def test_errors_and_figures_of_a_job_belong_to_the_model_before_its_refit(servic
     assert metrics(measured, simulated).rmse == pytest.approx(summary["metrics"]["rmse"])
     assert "Refit: the parameters were estimated again on all 1200 samples" in summary["words"]
     assert BEFORE_REFIT.encode() in render_figures(stored, rebuilt)[REPORT]
-
-
-def test_a_job_that_averages_samples_has_the_same_figures_everywhere(service, client, path, tmp_path):
-    dataset = client.upload(path)
-    job = search(service, client, dataset, average=2)
-    succeed("jobs", "result", job, "--out", tmp_path / "result", "--url", service.url)
-    best = islands.read_result(tmp_path / "result").best
-    record = islands.read_record(path, *COLUMNS)
-    assert best.model.average == 2
-
-    # The record as measured: library and command.
-    simulated = best.simulate(record)
-    succeed("simulate", tmp_path / "result", path, "--out", tmp_path / "s.csv")
-    time, y = np.genfromtxt(tmp_path / "s.csv", delimiter=",", skip_header=1).T
-    np.testing.assert_allclose(y, simulated.y, rtol=1e-9)
-    assert np.diff(time) == pytest.approx(0.02)
-
-    # The validation data: service and library.
-    rank = client.job(job).summary["rank"]
-    answer = service.client.get(f"/v1/jobs/{job}/models/{rank}/simulation", timeout=PATIENCE)
-    assert answer.status_code == 200, answer.text
-    shown = answer.json()
-    averaged = match_rate(best.model, record)
-    held_out = averaged[averaged.samples - len(shown["measured"]) :]
-    np.testing.assert_allclose(shown["measured"], held_out.y, rtol=1e-9)
-    again = best.simulate(held_out)
-    np.testing.assert_allclose(np.array(shown["free_run"], dtype=float), again.y, rtol=1e-9)
-    assert client.job(job).summary["metrics"]["rmse"] == pytest.approx(metrics(held_out.y, again.y).rmse)
-
-    # A monitor reads every sample. It refuses the model, by the same message over REST and as a command.
-    model = {"kind": "model", "model": json.loads(client.export(job, rank, "json"))}
-    monitor = client.create_monitor(simulation=model, input="u_V", output="y_um", training=12)
-    client.add_record(monitor, dataset)
-    refused = analyse_next(service)
-    assert refused.state == JobState.FAILED
-    reason = "each value is the mean of 2 samples of the record, and a diagnosis reads every sample"
-    assert reason in refused.problem["detail"]
-    file = tmp_path / "result/models" / f"{rank:02d}.json"
-    assert reason in monitored(path, file, tmp_path / "monitored", fail)
 
 
 def test_a_model_of_deviations_has_the_same_figures_in_a_monitor(service, client, path, tmp_path):

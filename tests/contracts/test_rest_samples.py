@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from islands_api import Client
-from support.service import problem_of
-
 
 @pytest.fixture
 def signal():
@@ -58,13 +55,6 @@ def test_an_answer_is_valid_for_ever(service, dataset):
 
 
 @pytest.mark.ci
-def test_the_client_has_the_same_columns(service, dataset):
-    with Client(str(service.client.base_url)) as client:
-        found = client.samples(dataset, ["u", "y"], start=430, stop=440)
-    assert found.columns[1].maximum[7] == 9.0
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("query", "status", "detail"),
     [
@@ -80,7 +70,3 @@ def test_invalid_requests_say_what_exists(service, dataset, query, status, detai
     answer = ask(service, dataset, query)
     assert answer.status_code == status, answer.text
     assert detail in answer.text
-
-
-def test_an_unknown_data_set_is_not_found(service):
-    problem_of(ask(service, "0" * 40 + "-csv", "column=y"), 404, "no-such-dataset")

@@ -7,10 +7,9 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 import islands
-from islands_api.web import prometheus
 from islands_service.domain.job import JobState, ProgressReport
 from support.service import kept, problem_of, queued, spec
-from support.stores import FOUND, claimed, job_in
+from support.stores import FOUND, claimed
 
 
 @pytest.fixture
@@ -147,25 +146,6 @@ def test_metrics_describe_the_process_the_disk_and_the_commits(service):
     assert after[count] == found[count] + 1
 
 
-def test_metrics_show_the_owners_with_most_jobs(service, monkeypatch):
-    monkeypatch.setattr(prometheus, "MAX_OWNERS", 2)
-    for owner, jobs in (("a", 3), ("b", 1), ("c", 4), ("d", 2)):
-        for _ in range(jobs):
-            queued(service.store, owner)
-    claimed(service.store)
-    found = {
-        labels: value
-        for (name, labels), value in read_metrics(service).items()
-        if name == "islands_owner_jobs"
-    }
-    assert found == {
-        (("owner", "a"), ("state", "queued")): 2.0,
-        (("owner", "a"), ("state", "running")): 1.0,
-        (("owner", "c"), ("state", "queued")): 4.0,
-        (("owner", ""), ("state", "queued")): 3.0,
-    }
-
-
 def test_metrics_count_requests_by_route_and_not_by_path(service):
     def counts(route, method, status):
         label = (("method", method), ("route", route), ("status", status))
@@ -190,17 +170,6 @@ def test_metrics_count_requests_by_route_and_not_by_path(service):
     }
     paths = set(service.client.get("/openapi.json").json()["paths"])
     assert routes <= paths | {"none", "/", "/dashboard/{name}", "/openapi.json"}
-
-
-def test_metrics_count_each_accepted_job_once(service):
-    def accepted():
-        return read_metrics(service)["islands_jobs_accepted_total", ()]
-
-    before, order = accepted(), spec(kept(service.store))
-    for _ in range(3):
-        service.submit({"Idempotency-Key": "k"}, **order)
-    service.submit(**{**order, "seed": -1})
-    assert accepted() == before + 1
 
 
 def test_unknown_methods_do_not_add_metric_labels(service):
@@ -246,11 +215,3 @@ def test_the_log_has_the_bytes_of_refused_and_anonymous_requests(service):
     (line,) = service.logs
     assert (line["status"], line["received"], line["sent"]) == (400, 77, len(answer.content))
     assert (line["owner"], line["key"]) == ("local", None)
-
-
-def test_the_log_has_the_bytes_of_an_event_stream_when_it_ends(service):
-    job = job_in(service.store, JobState.FAILED, "local").id
-    service.logs.clear()
-    text = service.client.get(f"/v1/jobs/{job}/events").text
-    (line,) = service.logs
-    assert line["sent"] == len(text.encode())

@@ -3,9 +3,8 @@
 import pytest
 
 from islands.simulators.specification.table import SIMULATORS
-from islands_api import Client
 from islands_service.intake import job_fmu
-from support.service import held, kept, problem_of
+from support.service import problem_of
 
 VALID = """
 input = "u"
@@ -48,22 +47,6 @@ def test_a_listed_default_is_the_value_of_an_absent_parameter(service):
     assert {each["name"]: each["default"] for each in piezo["parameters"]}["dp"] == 1.6
     assert {each["default"] for each in oscillator["parameters"]} == {None}
     assert oscillator["estimated"]
-
-
-def test_the_equations_of_a_built_in_simulation_are_valid(service):
-    for each in service.client.get("/v1/simulations").json()["items"]:
-        if each["equations"]:
-            answer = check(service, each["equations"])
-            assert (answer.status_code, answer.json()["name"]) == (200, each["kind"])
-
-
-def test_checked_equations_are_the_simulation_of_a_request(service):
-    with Client(str(service.client.base_url)) as client:
-        simulation = client.check_equations(VALID)
-    assert simulation["parameters"] == {"tau": {"value": 0.2, "unit": "s", "tolerance": 0.05}}
-    order = held(kept(service.store), simulation=simulation)
-    answer = service.client.post("/v1/discrepancies", json=order)
-    assert answer.status_code == 202, answer.text
 
 
 @pytest.mark.parametrize(

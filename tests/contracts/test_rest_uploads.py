@@ -16,15 +16,16 @@ from support.bad_records import write_hdf5_bomb, write_mat_bomb, write_parquet_b
 from support.processes import eventually
 from support.service import csv, problem_of
 
-#: Beginning of a form whose file never ends.
-START = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\nt_s,u_V,y_um\r\n'
-
 
 @pytest.fixture(scope="module")
 def shared(serve):
     limits = {"max_uploads": 3, "max_uploads_per_owner": 2, "max_stored": 5_000_000, "max_upload": 9_000_000}
     with serve(require_keys=True, rate=0.0, **limits) as running:
         yield running
+
+
+#: Beginning of a form whose file never ends.
+START = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\nt_s,u_V,y_um\r\n'
 
 
 @pytest.fixture
@@ -139,15 +140,6 @@ def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(imp
         with suppress(ConnectionResetError):  # by a byte that the service received after it had closed
             assert connection.recv(1) == b""
     assert not receiving(impatient)
-
-
-def test_a_slow_job_is_a_problem(impatient):
-    with socket.create_connection(("127.0.0.1", impatient.port), timeout=10.0) as connection:
-        key = impatient.key()["Authorization"]
-        lines = ["POST /v1/jobs HTTP/1.1", "Host: 127.0.0.1", f"Authorization: {key}"]
-        lines += ["Content-Type: application/json", "Content-Length: 100", "", "{"]
-        connection.sendall("\r\n".join(lines).encode())
-        assert answer(connection)[0] == 408
 
 
 def test_a_declared_length_above_the_quota_is_refused_before_the_body(service):

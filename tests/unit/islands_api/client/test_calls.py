@@ -19,8 +19,7 @@ from islands_api.dataset_schemas import DatasetView
 from islands_api.schemas import JobPage, JobRequest, JobView
 from islands_api.web.responses import job_document
 from islands_service.domain.job import JobState
-from support.service import Service, csv, kept, queued
-from support.stores import FAILED, FOUND
+from support.service import Service, csv, queued
 
 SPEC = {"inputs": ["u_V"], "output": "y_um"}
 
@@ -58,17 +57,6 @@ def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> 
     assert (listed.id, listed.columns, listed.samples) == (dataset.id, 3, 200)
 
 
-@pytest.mark.ci
-def test_upload_with_columns_is_checked_like_a_job(client: Any, me: Any, tmp_path: Path) -> None:
-    path = tmp_path / "record.csv"
-    path.write_bytes(csv(u_V={8: "nan"}))
-    with pytest.raises(ServiceError) as caught:
-        client.upload(path, "u_V", "y_um")
-    assert (caught.value.status, caught.value.type) == (422, "/problems/invalid-record")
-    assert "record.csv, line 8, column u_V" in caught.value.detail
-    assert [dataset.id for dataset in client.datasets().items] == [me.dataset]
-
-
 def test_upload_sends_all_given_values() -> None:
     for inputs in ("u_V", ["u_V"], ("u_V",)):  # a single name is one input, not one input per letter
         assert dataset_calls.upload("r.csv", inputs, "y_um", 0.0).data == {
@@ -83,28 +71,6 @@ def test_upload_sends_all_given_values() -> None:
 def test_unreadable_record_raises_the_error_of_its_file(client: Any, path: str) -> None:
     with pytest.raises(OSError, match=r"nowhere\.csv|Is a directory"):
         client.upload(path)
-
-
-def test_pages_of_data_sets_and_jobs_do_not_overlap(client: Any, service: Service, me: Any) -> None:
-    kept(service.store, me.owner, b"another")
-    for pages in (client.datasets, lambda **given: client.jobs(state="queued", **given)):
-        for _ in range(2):
-            client.submit(me.dataset, **SPEC)
-        first = pages(limit=1)
-        second = pages(cursor=first.next, limit=1)
-        assert first.next is not None
-        assert len(first.items) == len(second.items) == 1
-        assert first.items[0].id != second.items[0].id
-
-
-def test_data_set_can_be_deleted_when_no_job_needs_it(client: Any, me: Any) -> None:
-    job = client.submit(me.dataset, **SPEC)
-    with pytest.raises(ServiceError) as caught:
-        client.delete_dataset(me.dataset)
-    assert caught.value.type == "/problems/dataset-in-use"
-    client.cancel(job)
-    assert client.delete_dataset(me.dataset) is None
-    assert client.datasets().items == ()
 
 
 # Jobs.
@@ -148,32 +114,9 @@ def test_validation_is_a_fraction_a_data_set_or_its_rows(given: Any, stored: Any
     JobRequest.model_validate(body)
 
 
-def test_calls_accept_ids_and_values(client: Any, service: Service, me: Any) -> None:
-    other = kept(service.store, me.owner, b"another")
-    record, validation = client.datasets().items[1], client.datasets().items[0]
-    assert (record.id, validation.id) == (me.dataset, other)
-    job = client.submit(record, **SPEC, validation=validation)
-    assert job.spec["dataset"] == me.dataset
-    assert job.spec["validation"] == {"dataset": other}
-    assert client.cancel(job).id == client.job(job.id).id
-
-
 def test_arguments_of_submit_hide_no_setting() -> None:
     taken = set(inspect.signature(calls.submit).parameters) - {"settings"}
     assert not taken & {each.name for each in fields(Settings)}
-
-
-def test_submissions_have_distinct_idempotency_keys_by_default(client: Any, me: Any) -> None:
-    one, other = (client.submit(me.dataset, **SPEC) for _ in range(2))
-    assert one.id != other.id
-    assert client.submit(me.dataset, **SPEC, idempotency_key="mine").id not in (one.id, other.id)
-    again = client.submit(me.dataset, **SPEC, idempotency_key="mine")
-    assert again.id == client.submit(me.dataset, **SPEC, idempotency_key="mine").id
-    with pytest.raises(ServiceError) as caught:
-        client.submit(me.dataset, **SPEC, seed=9, idempotency_key="mine")
-    assert (caught.value.status, caught.value.type) == (422, "/problems/idempotency-conflict")
-    with pytest.raises(ServiceError, match="idempotency-key"):
-        client.submit(me.dataset, **SPEC, idempotency_key="")
 
 
 @pytest.mark.parametrize(
@@ -244,42 +187,6 @@ def test_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> No
     with pytest.raises(ServiceError) as caught:
         client.job(job)
     assert (caught.value.status, caught.value.type) == (404, "/problems/no-such-job")
-
-
-def test_cancelling_a_cancelled_job_changes_nothing(client: Any, me: Any) -> None:
-    job = client.submit(me.dataset, **SPEC)
-    cancelled = client.cancel(job)
-    assert client.cancel(job) == cancelled
-
-
-def test_finished_job_cannot_be_cancelled_nor_queued_job_resumed(
-    client: Any, service: Service, me: Any, claimed: Any
-) -> None:
-    job = client.submit(me.dataset, **SPEC)
-    for wrong in (client.resume, client.delete):
-        with pytest.raises(ServiceError) as caught:
-            wrong(job)
-        assert (caught.value.status, caught.value.type) == (409, "/problems/wrong-state")
-    service.store.leases.finish(claimed(job), FOUND)
-    with pytest.raises(ServiceError, match=f"job {job.id} is succeeded: there is nothing to cancel"):
-        client.cancel(job)
-
-
-def test_search_of_a_running_job_is_stopped(client: Any, me: Any, claimed: Any) -> None:
-    job = client.submit(me.dataset, **SPEC)
-    with pytest.raises(ServiceError, match="is queued: it has no models yet"):
-        client.stop(job)
-    claimed(job)
-    stopped = client.stop(job)
-    assert (stopped.state, stopped.stop_requested) == (JobState.RUNNING, True)
-    assert client.stop(job) == stopped
-
-
-def test_failed_job_contains_its_problem(client: Any, service: Service, me: Any, claimed: Any) -> None:
-    job = client.submit(me.dataset, **SPEC)
-    service.store.leases.finish(claimed(job), FAILED)
-    assert client.job(job).problem == {"type": "broken", "detail": "it broke"}
-    assert client.jobs(state="failed").items[0].id == job.id
 
 
 def test_job_is_found_by_its_labels(client: Any, me: Any) -> None:
@@ -401,20 +308,3 @@ def test_calls_declare_whether_they_are_repeatable() -> None:
 
 
 # Administration.
-
-
-def test_administrators_list_and_cancel_the_jobs_of_all_owners(
-    client: Any, service: Service, administrator: Any
-) -> None:
-    with pytest.raises(ServiceError, match="admin"):
-        client.admin_jobs()
-    jobs = {queued(service.store, owner).id: owner for owner in ("first lab", "second lab")}
-    listed = administrator.admin_jobs(limit=2)
-    assert {job.id: job.owner for job in listed.items} == jobs
-    (job,) = administrator.admin_jobs("first lab", "queued").items
-    assert (job.owner, job.state) == ("first lab", "queued")
-    assert administrator.admin_jobs(limit=1, cursor=administrator.admin_jobs(limit=1).next).items[0] == job
-    cancelled = administrator.admin_cancel(job)
-    assert (cancelled.id, cancelled.owner, cancelled.state) == (job.id, "first lab", "cancelled")
-    with pytest.raises(ServiceError, match="cancelled"):
-        administrator.admin_cancel(job.id)

@@ -1,6 +1,5 @@
 """Following a job by long polling and by events, over reliable and broken connections."""
 
-import asyncio
 import time
 from collections.abc import Callable
 from typing import Any
@@ -8,12 +7,10 @@ from typing import Any
 import pytest
 
 from islands_api.client import (
-    AsyncClient,
     Event,
     JobFailedError,
     ServiceError,
     ServiceUnreachableError,
-    transport,
 )
 from islands_api.client.response_parsing import EventParser
 from islands_service.domain.job import JobOutcome, JobState
@@ -114,18 +111,6 @@ def test_wait_times_out(client: Any, job: Any) -> None:
     assert 0.3 <= time.monotonic() - began < 25.0
 
 
-def test_wait_times_out_while_the_job_progresses(
-    client: Any, job: Any, service: Service, claimed: Any, later: Any
-) -> None:
-    lease = claimed(job)
-    for generation in range(1, 6):
-        later(0.1 * generation, service.store.leases.report, lease, brought_on(generation))
-    began = time.monotonic()
-    with pytest.raises(TimeoutError, match="is still running after"):
-        client.wait(job, 0.3)
-    assert 0.3 <= time.monotonic() - began < 25.0
-
-
 def test_wait_times_out_while_the_service_is_unreachable(connect: Any, me: Any, wire: Any) -> None:
     client = connect(wire.url, me.secret, retry=60.0)
     job = client.submit(me.dataset, **SPEC)
@@ -133,17 +118,6 @@ def test_wait_times_out_while_the_service_is_unreachable(connect: Any, me: Any, 
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=r"is not known to have ended after 0.3 s: .* does not answer"):
         client.wait(job, 0.3)
-    assert time.monotonic() - began < 25.0
-
-
-def test_wait_times_out_while_the_service_hangs(
-    connect: Any, scripted: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(transport, "GRACE_SECONDS", 0.1)
-    server = scripted((200, {}, b"{}"), delay=60.0)
-    began = time.monotonic()
-    with pytest.raises(TimeoutError, match=r"job 0 is not known to have ended after 0.2 s"):
-        connect(server.url).wait("0", 0.2)
     assert time.monotonic() - began < 25.0
 
 
@@ -163,14 +137,6 @@ def test_wait_survives_a_restart_of_the_service(
     later(0.1, wire.outage, 0.3)
     later(0.2, run_job, job)
     assert client.wait(job).state == JobState.SUCCEEDED
-
-
-def test_wait_works_with_a_short_timeout_and_an_idle_job(connect: Any, service: Service, me: Any) -> None:
-    # The service must not hold back an answer for longer than the client's timeout.
-    client = connect(service.url, me.secret, timeout=1.5, retry=0.0)
-    job = client.submit(me.dataset, **SPEC)
-    with pytest.raises(TimeoutError, match="is still queued"):
-        client.wait(job, 2.0)
 
 
 # By events.
@@ -204,14 +170,6 @@ def test_events_are_complete_over_broken_connections(
     assert wire.connections > 2
 
 
-def test_events_continue_after_an_outage(
-    connect: Any, me: Any, wire: Any, job: Any, run_job: Any, later: Any
-) -> None:
-    later(0.05, run_job, job, 0.05)
-    later(0.2, wire.outage, 0.2)
-    assert numbers_and_kinds(connect(wire.url, me.secret).events(job)) == expected_events()
-
-
 def test_events_include_the_end_of_a_job_after_a_closed_stream(
     connect: Any, service: Service, me: Any, job: Any, run_job: Any, later: Any
 ) -> None:
@@ -227,17 +185,6 @@ def test_events_include_the_end_of_a_job_after_a_closed_stream(
     assert numbers_and_kinds(connect(service.url, me.secret).events(job)) == expected_events()
 
 
-def test_idle_connections_may_break_repeatedly(
-    connect: Any, me: Any, wire: Any, job: Any, run_job: Any, later: Any
-) -> None:
-    # No event arrives for longer than the retry time, before and after the connection breaks.
-    client = connect(wire.url, me.secret, retry=0.15)
-    for seconds in (0.25, 0.5):
-        later(seconds, wire.interrupt)
-    later(0.55, run_job, job)
-    assert numbers_and_kinds(client.events(job)) == expected_events()
-
-
 def test_silent_connection_is_reopened_after_the_timeout(
     connect: Any, service: Service, me: Any, job: Any, run_job: Any, later: Any
 ) -> None:
@@ -246,16 +193,6 @@ def test_silent_connection_is_reopened_after_the_timeout(
         numbers_and_kinds(connect(service.url, me.secret, timeout=0.5, retry=1.0).events(job))
         == expected_events()
     )
-
-
-def test_slow_reader_receives_all_events(connect: Any, me: Any, wire: Any, job: Any, run_job: Any) -> None:
-    run_job(job)
-    wire.cuts = [1300]
-    events = []
-    for event in connect(wire.url, me.secret, retry=0.2).events(job):
-        events.append(event)
-        time.sleep(0.3 if event.number == 2 else 0.0)
-    assert numbers_and_kinds(events) == expected_events()
 
 
 def test_events_fail_after_a_long_outage(connect: Any, me: Any, wire: Any, job: Any) -> None:
@@ -267,39 +204,10 @@ def test_events_fail_after_a_long_outage(connect: Any, me: Any, wire: Any, job: 
         list(events)
 
 
-def test_events_are_requested_again_after_a_busy_answer(connect: Any, scripted: Any) -> None:
-    text = b"id: 1\nevent: succeeded\ndata: {}\n\n"
-    server = scripted((503, {}, b"{}"), (429, {"Retry-After": "0"}, b"{}"), (200, {}, text), (204, {}, b""))
-    assert numbers_and_kinds(connect(server.url).events("0")) == [(1, "succeeded")]
-    assert [headers["Last-Event-ID"] for *_, headers in server.requests] == ["0", "0", "0", "1"]
-    with pytest.raises(ServiceError):
-        list(connect(scripted((503, {"Retry-After": "9"}, b"{}")).url).events("0"))
-
-
 def test_unknown_job_has_no_events(client: Any) -> None:
     with pytest.raises(ServiceError) as caught:
         list(client.events("unknown"))
     assert caught.value.type == "/problems/no-such-job"
-
-
-def test_deleted_job_ends_its_events(client: Any, job: Any, me: Any, service: Service, later: Any) -> None:
-    def delete() -> None:
-        service.store.jobs.cancel(me.owner, job.id)
-        service.store.jobs.delete(me.owner, job.id)
-
-    later(0.15, delete)
-    with pytest.raises(ServiceError, match="there is no job"):
-        list(client.events(job))
-
-
-def test_unicode_line_separators_do_not_split_an_event(
-    client: Any, job: Any, service: Service, claimed: Any
-) -> None:
-    text = "a\u2028b\x85c\r\nd\x0be\x1cf\n\ng\U0001f600"
-    problem = {"type": "broken", "detail": text}
-    service.store.leases.finish(claimed(job), JobOutcome(JobState.FAILED, problem=problem))
-    *_, last = client.events(job)
-    assert last.data["detail"] == text
 
 
 def test_connection_broken_within_a_character_loses_nothing(
@@ -322,17 +230,3 @@ def test_parsed_events_do_not_depend_on_the_chunk_size(size: int) -> None:
     parser = EventParser()
     found = [event for at in range(0, len(text), size) for event in parser.feed(text[at : at + size])]
     assert found == [Event(1, "running", {"note": "ü: x"})] * 2
-
-
-def test_concurrent_streams_share_one_client(service: Service, me: Any, run_job: Any, later: Any) -> None:
-    async def follow_all() -> list[list[tuple[int, str]]]:
-        async with AsyncClient(service.url, me.secret) as client:
-            jobs = [await client.submit(me.dataset, ["u_V"], "y_um") for _ in range(8)]
-            later(0.1, lambda: [run_job(each) for each in jobs])
-
-            async def follow(one: Any) -> list[tuple[int, str]]:
-                return numbers_and_kinds([event async for event in client.events(one)])
-
-            return await asyncio.gather(*map(follow, jobs))
-
-    assert asyncio.run(follow_all()) == [expected_events()] * 8

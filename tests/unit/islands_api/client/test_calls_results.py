@@ -3,17 +3,14 @@
 The job is run by the function of the coordinator, with the serial engine.
 """
 
-import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from islands.export import EXPORTS
-from islands.persistence.models import model_from_json
 from islands_api.client import ServiceError
-from islands_api.schemas import HistoryPage, ModelView
+from islands_api.schemas import ModelView
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.store.blobs import Blobs
 from support.job_runs import make_run
@@ -62,16 +59,6 @@ def reader(connect: Callable[..., Any], service: Service, finished: tuple[str, s
     return connect(service.url, finished[0])
 
 
-@pytest.mark.ci
-def test_succeeded_job_contains_a_summary_of_the_best_model(reader: Any, job: str) -> None:
-    done = reader.wait(job)
-    best = reader.models(job)[0]
-    assert done.summary["equation"] == best.equation
-    assert done.summary["metrics"] == best.metrics["validation"]["free_run"]
-    assert done.summary["models"] == len(reader.models(job))
-    assert (done.progress["generation"], done.attempt) == (3, 1)
-
-
 def test_models_are_typed_and_best_first(reader: Any, job: str) -> None:
     models = reader.models(job)
     assert all(isinstance(model, ModelView) for model in models)
@@ -99,30 +86,6 @@ def test_each_model_can_be_exported_in_each_form(reader: Any, job: str, form: st
     assert reader.export(job) == reader.export(job, 1, "python")
 
 
-def test_exported_model_file_can_be_read_back(reader: Any, job: str) -> None:
-    best = reader.models(job)[0]
-    text = reader.export(job, 1, "json")
-    assert json.loads(text)["terms"] == [
-        {name: value for name, value in term.items() if name not in ("term", "inclusion")}
-        for term in best.terms
-    ]
-    assert model_from_json(text, "model 1").regressors
-
-
-def test_figures_are_listed_and_fetched(reader: Any, service: Service, job: str, tmp_path: Path) -> None:
-    names = reader.figures(job)
-    of_search = ("record", "front", "convergence", "islands")
-    rank = next(model.rank for model in reader.models(job) if model.recommended)
-    assert names == (
-        *((name, None) for name in of_search),
-        *((name, rank) for name in ("free-run", "loop", "hold", "residuals")),
-    )
-    # Stored beforehand, so that the test does not wait for matplotlib; tests/acceptance draws them.
-    blobs = Blobs(service.settings.blobs)
-    service.store.results.keep(job, {"front.svg": blobs.write(b"<svg>front</svg>")})
-    assert reader.figure(job, "front", None) == b"<svg>front</svg>"
-
-
 @pytest.mark.parametrize(
     ("call", "status"),
     [
@@ -137,27 +100,3 @@ def test_missing_item_of_a_result_raises_a_problem(reader: Any, job: str, call: 
     with pytest.raises(ServiceError) as caught:
         call(reader, job)
     assert caught.value.status == status
-
-
-def test_history_starts_after_a_generation(reader: Any, job: str) -> None:
-    history = reader.history(job)
-    assert isinstance(history, HistoryPage)
-    generations = [point.generation for point in history.items]
-    assert generations[0] == 0
-    assert generations[-1] == 3
-    assert history.items[-1].evaluations == 2 * 4 * 10
-    assert len(history.items[-1].islands) == 2
-    assert [point.generation for point in reader.history(job, after=0).items] == generations[1:]
-    assert reader.history(job, after=3).items == ()
-
-
-def test_queued_job_has_no_result(client: Any, me: Any) -> None:
-    waiting = client.submit(me.dataset, ["u_V"], "y_um")
-    assert client.models(waiting) == ()
-    assert client.history(waiting).items == ()
-    for call in (client.result, client.figures, client.export):
-        with pytest.raises(
-            ServiceError, match="is queued and has no result: wait until it has succeeded"
-        ) as caught:
-            call(waiting)
-        assert (caught.value.status, caught.value.type) == (409, "/problems/not-finished")

@@ -11,7 +11,7 @@ import pytest
 from islands_api.client import ServiceError, ServiceUnreachableError, calls, transport
 from islands_service.domain.job import JobState
 from islands_service.store.database import CommitUnknownError
-from support.service import Service, served
+from support.service import Service
 
 pytestmark = pytest.mark.usefixtures("quick")
 
@@ -60,23 +60,6 @@ def test_lost_answer_to_a_cancellation_is_not_an_error(client: Any, connect: Any
     wire.cuts = [0]
     assert connect(wire.url, me.secret).cancel(job).state == JobState.CANCELLED
     assert client.job(job).version == 2  # cancelled once
-
-
-def test_non_idempotent_call_is_not_repeated(client: Any, connect: Any, me: Any, wire: Any) -> None:
-    job = client.cancel(client.submit(me.dataset, **SPEC))
-    for call in ("resume", "delete"):
-        wire.cuts, before = [0], wire.connections
-        with pytest.raises(
-            ServiceUnreachableError,
-            match=r"closed the connection before it answered .*: the call may have been carried out",
-        ):
-            getattr(connect(wire.url, me.secret), call)(job)
-        assert wire.connections == before + 1
-        if call == "resume":
-            assert client.job(job).state == JobState.QUEUED
-            client.cancel(job)
-    with pytest.raises(ServiceError, match="there is no job"):
-        client.job(job)
 
 
 def test_call_with_unknown_outcome_is_not_repeated(
@@ -131,13 +114,6 @@ def test_long_outage_raises_an_error_in_time(connect: Any, me: Any, wire: Any) -
     )
 
 
-def test_call_without_retries_fails_immediately(connect: Any, wire: Any, pauses: list[float]) -> None:
-    wire.tear()
-    with pytest.raises(ServiceUnreachableError):
-        connect(wire.url, retry=0.0).jobs()
-    assert pauses == []
-
-
 def test_hanging_service_raises_an_error_in_time(connect: Any, scripted: Any) -> None:
     server = scripted(EMPTY, delay=60.0)
     began = time.monotonic()
@@ -164,20 +140,6 @@ def test_call_is_repeated_after_the_requested_delay(connect: Any, scripted: Any,
     assert second <= max(transport.RETRY_DELAYS)
 
 
-# Explicit ids, because the dates differ between the processes that collect the tests.
-@pytest.mark.parametrize(
-    "after",
-    ["soon", "-5", "", from_now(-3600.0), "1e9", "٣"],
-    ids=["word", "negative", "empty", "past date", "not an integer", "non-ASCII digit"],
-)
-def test_invalid_retry_after_header_is_ignored(
-    connect: Any, scripted: Any, pauses: list[float], after: str
-) -> None:
-    server = scripted(problem_answer(503, after.encode().decode("latin-1")), EMPTY)
-    assert connect(server.url).jobs().items == ()
-    assert [pause <= max(transport.RETRY_DELAYS) for pause in pauses] == [True]
-
-
 @pytest.mark.parametrize("after", [3, from_now(3600.0)], ids=["seconds", "date"])
 def test_delay_beyond_the_retry_time_fails_immediately(connect: Any, scripted: Any, after: object) -> None:
     server = scripted(problem_answer(429, after, "quota-exceeded"), EMPTY)
@@ -185,14 +147,6 @@ def test_delay_beyond_the_retry_time_fails_immediately(connect: Any, scripted: A
         connect(server.url).jobs()
     assert (caught.value.status, caught.value.type) == (429, "/problems/quota-exceeded")
     assert len(server.requests) == 1
-
-
-def test_permanently_busy_service_raises_its_problem(connect: Any, scripted: Any) -> None:
-    server = scripted(problem_answer(503, kind="store-unavailable"))
-    with pytest.raises(ServiceError) as caught:
-        connect(server.url, retry=0.2).jobs()
-    assert caught.value.type == "/problems/store-unavailable"
-    assert 1 < len(server.requests) < 5  # at 0, 0.03, 0.09, 0.19 seconds
 
 
 def test_gateway_error_repeats_idempotent_calls_only(connect: Any, scripted: Any) -> None:
@@ -211,15 +165,3 @@ def test_permanent_problem_is_not_repeated(connect: Any, scripted: Any, status: 
     with pytest.raises(ServiceError, match="not now"):
         connect(server.url).call(calls.job("0"))
     assert len(server.requests) == 1
-
-
-@pytest.mark.nightly
-def test_rate_limited_client_waits_as_requested(connect: Any, tmp_path: Any) -> None:
-    with served(tmp_path / "busy", rate=2.0, burst=1) as busy:
-        _, secret = busy.store.keys.create("test", frozenset({"read"}))
-        client = connect(busy.url, secret)
-        began = time.monotonic()
-        for _ in range(2):
-            client.jobs()
-        assert time.monotonic() - began > 0.4
-        assert "429" in str(busy.logs)

@@ -16,7 +16,7 @@ from islands_api.client import ServiceError, ServiceUnreachableError
 from islands_api.web.app import create_app
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from support.service import Service, kept, listening
+from support.service import Service, listening
 
 #: Unknown API key that must not appear in any output.
 SECRET = "islands_this-is-an-unknown-key-and-secret-all-the-same"
@@ -57,34 +57,6 @@ def format_error(error: BaseException) -> str:
 
 
 # Keys.
-
-
-def test_key_gives_access_to_the_data_of_its_owner(connect: Any, guarded: Service) -> None:
-    _, one = guarded.store.keys.create("one", frozenset({"read", "write"}))
-    _, other = guarded.store.keys.create("other", frozenset({"read"}))
-    owner = guarded.store.keys.find(one).owner  # type: ignore[union-attr]
-    job = connect(guarded.url, one).submit(kept(guarded.store, owner), ["u_V"], "y_um")
-    # A key that was read from a file includes the line break.
-    assert connect(guarded.url, f" {one}\r\n").job(job).id == job.id
-    with pytest.raises(ServiceError) as caught:
-        connect(guarded.url, other).job(job)
-    assert caught.value.type == "/problems/no-such-job"
-    with pytest.raises(ServiceError) as caught:
-        connect(guarded.url, other).cancel(job)
-    assert (caught.value.status, caught.value.type) == (403, "/problems/scope-missing")
-
-
-@pytest.mark.parametrize(
-    ("key", "message"), [(None, "this service needs a key"), (SECRET, "the key is unknown")]
-)
-def test_missing_or_unknown_key_is_rejected(
-    connect: Any, guarded: Service, key: str | None, message: str
-) -> None:
-    with pytest.raises(ServiceError, match=message) as caught:
-        connect(guarded.url, key).jobs()
-    assert (caught.value.status, caught.value.type) == (401, "/problems/no-key")
-    with pytest.raises(ServiceError, match=message):
-        list(connect(guarded.url, key).events("0"))
 
 
 @pytest.mark.parametrize(
@@ -132,14 +104,6 @@ def test_private_authority_is_trusted_if_its_file_is_given(
     context = ssl.create_default_context(cafile=path)
     for verify in (str(path), path, context, False):
         assert connect(f"https://127.0.0.1:{secure}", verify=verify).jobs().items == ()
-
-
-def test_authority_in_the_environment_is_trusted(
-    connect: Any, secure: int, authority: trustme.CA, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    authority.cert_pem.write_to_path(tmp_path / "authority.pem")
-    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "authority.pem"))
-    assert connect(f"https://127.0.0.1:{secure}", verify=True).jobs().items == ()
 
 
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])

@@ -9,7 +9,7 @@ import pytest
 
 import islands
 from islands.persistence.models import model_json
-from islands_api.model_simulation_schemas import SimulatedOutput, SimulationRequest
+from islands_api.model_simulation_schemas import SimulationRequest
 from islands_api.web.model_simulation import (
     SimulatedModel,
     describe_start,
@@ -93,11 +93,3 @@ def test_the_document_has_null_after_a_divergence_and_every_digit_before() -> No
     written = write_document(document, compressed=False)
     assert json.loads(written) == {"output": [0.1 + 0.2, None, 1e-310, 5.0]}
     assert gzip.decompress(write_document(document, compressed=True)) == written
-
-
-def test_the_document_has_the_fields_of_its_schema() -> None:
-    document = simulate_inputs(FOUND, make({"u_V": [0.0, 1.0]}), 1.0, "rests", ())
-    assert set(document) == set(SimulatedOutput.model_fields)
-    assert SimulatedOutput.model_validate_json(write_document(document, False)).output[0] == pytest.approx(
-        29.5
-    )

@@ -65,14 +65,6 @@ def test_audit_lists_changes_newest_first(run: Run, subjects: list[str]) -> None
     assert out.index("bob") < out.index("192.0.2.7")
 
 
-def test_audit_is_limited_to_an_owner_a_time_and_a_number(run: Run, subjects: list[str]) -> None:
-    assert [entry["action"] for entry in read(run, "--owner", "bob")] == ["create-key"]
-    assert len(read(run, "--since", "2024-10-06")) == 2
-    assert len(read(run, "--since", "2024-10-06T00:00:01")) == 1
-    assert [entry["subject"] for entry in read(run, "--limit", "1")] == subjects[:1]
-    assert run("--limit", "0")[0] == 2
-
-
 def test_owners_are_listed_and_changed(run: Run, subjects: list[str], command_line: Run) -> None:
     owners = partial(command_line, "admin", "owners")
     assert owners("set", "bob", "--weight", 200, "--max-running", 2, "--max-islands", 8) == (
@@ -115,24 +107,6 @@ def test_invalid_change_of_an_owner_is_refused(
     assert (code, out) == (2, "")
     assert message in " ".join(err.split())
     assert read(run) == before
-
-
-def test_keys_of_the_command_line_are_audited(run: Run, command_line: Run) -> None:
-    assert command_line("keys", "create", "--scope", "read", "--owner", "carol")[0] == 0
-    (created,) = read(run)
-    assert command_line("keys", "revoke", str(created["subject"]))[0] == 0
-    assert [(entry["action"], entry["owner"], entry["address"]) for entry in read(run)] == [
-        ("revoke-key", "carol", "command line"),
-        ("create-key", "carol", "command line"),
-    ]
-
-
-def test_audit_entries_expire(folder: Path, subjects: list[str]) -> None:
-    with Store(ServiceSettings(data_dir=folder).url) as store:
-        store.retention.delete_old_audit(1e12)
-        assert len(store.audit.entries()) == len(subjects)
-        store.retention.delete_old_audit(0.0)
-        assert store.audit.entries() == ()
 
 
 @pytest.mark.parametrize("command", [("keys", "list"), ("admin", "audit"), ("serve",)])

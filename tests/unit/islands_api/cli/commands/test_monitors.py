@@ -8,18 +8,16 @@ from typing import Any
 
 import pytest
 
-from islands.cli.watched_folder import hash_file
 from islands.facade.record_monitor import reject_record
 from islands.report.documents.monitor_json import monitor_document
 from islands.report.documents.monitor_state import monitor_to_json
 from islands_api.cli.service import client_options
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import MONITORING, JobOutcome, JobState, Submission
-from islands_service.domain.monitoring import MonitorStatus, MonitorUpdate, RecordEntry
 from support.monitor_updates import store_monitor
 from support.monitored_oscillator import follow, make_records
-from support.service import Service, csv
-from support.stores import claimed, taken
+from support.service import Service
+from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -53,34 +51,6 @@ def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
     assert run("delete", made["id"])[0] == 0
     code, _, complaint = run("show", made["id"])
     assert (code, "no monitor" in complaint) == (2, True)
-
-
-@pytest.mark.nightly
-def test_records_are_added_in_the_order_of_recording_and_once(
-    run: Run, service: Service, tmp_path: Path
-) -> None:
-    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
-    names = ["press_2026-11-03T10-00.csv", "press_2026-11-03T09-00.csv"]
-    for samples, name in zip((200, 210), names, strict=True):
-        (tmp_path / name).write_bytes(csv(samples))
-    paths = [str(tmp_path / name) for name in names]
-    code, shown, _ = run("add", monitor, *paths, "--no-watch")
-    assert (code, shown.count("job ")) == (0, 2)
-    assert run("add", monitor, paths[1], "--no-watch")[1] == shown.splitlines(keepends=True)[0]
-    lease = claimed(service.store)
-    assert lease.job.kind == MONITORING
-    assert (lease.job.spec["name"], lease.job.spec["time"]) == (names[1], "2026-11-03T09:00:00")
-    service.store.jobs.cancel(LOCAL_OWNER, shown.split()[4].removesuffix(":"))
-    content = hash_file(Path(paths[1]))
-    document = json.dumps({"index": 0, "name": names[1], "sha256": content})
-    entry = RecordEntry(names[1], content, False, "{}", document)
-    update = MonitorUpdate(monitor, 0, MonitorStatus.ALARM, 1, 1, 0, "{}", "{}", entry, "{}")
-    summary = {"words": "ALARM: k changed", "alarms": 1}
-    service.store.leases.finish(
-        lease, JobOutcome(JobState.SUCCEEDED, {"record": {}}, summary=summary, monitor=update)
-    )
-    code, shown, complaint = run("add", monitor, paths[1])
-    assert (code, shown, complaint) == (0, "", "")
 
 
 @pytest.mark.ci

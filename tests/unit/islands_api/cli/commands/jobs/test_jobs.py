@@ -7,19 +7,16 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from islands_api.cli.service import client_options
-from islands_service.domain.job import BY_OWNER, RUN_TIME, JobOutcome, JobState
+from islands_service.domain.job import JobOutcome
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
-from support.service import FIGURES, Service, ahead, kept, queued, spec
-from support.stores import FAILED, at_once, brought_on, taken
+from support.service import FIGURES, Service, ahead, kept, spec
+from support.stores import FAILED, brought_on, taken
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -47,21 +44,6 @@ def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) ->
     assert [job["id"] for job in json.loads(run("list", "--limit", 1, "--json")[1])["items"]] == [second]
 
 
-def test_list_may_be_longer_than_a_page(run: Run, service: Service, owner: str) -> None:
-    made = [job.id for job in at_once([partial(queued, service.store, owner)] * 202)]
-    listed = [job["id"] for job in json.loads(run("list", "--limit", 201, "--json")[1])["items"]]
-    assert len(set(listed)) == 201
-    assert set(listed) < set(made)
-
-
-def test_job_that_waits_shows_the_reason(run: Run, service: Service, owner: str) -> None:
-    job = ahead(service, owner)
-    service.store.leases.postpone(taken(service.store, job), "the disk is away", 60.0)
-    assert re.fullmatch(
-        rf"job {job}: queued\nnumber \d+ in the queue\nthe disk is away\n", run("show", job)[1]
-    )
-
-
 def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: str) -> None:
     job = ahead(service, owner, spec=spec(kept(service.store, owner)))
     waits = re.compile(rf"job {job}: queued\nnumber \d+ in the queue\n")
@@ -73,25 +55,6 @@ def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: s
         assert printed["id"] == job
     service.store.leases.finish(taken(service.store, job), FAILED)
     assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
-
-
-def test_search_of_a_running_job_is_stopped(run: Run, service: Service, owner: str) -> None:
-    job = ahead(service, owner, spec=spec(kept(service.store, owner)))
-    taken(service.store, job)
-    assert run("stop", job)[:2] == (0, f"job {job}: running\n")
-    assert service.store.jobs.get(owner, job).stop_requested
-    assert json.loads(run("stop", job, "--json")[1])["stop_requested"]
-
-
-@pytest.mark.ci
-def test_succeeded_job_shows_the_sentences_about_its_model(run: Run, done: str, found: JobOutcome) -> None:
-    assert found.summary is not None
-    out = run("show", done)[1]
-    assert out.splitlines()[0] == f"job {done}: succeeded"
-    shown = " ".join(out.split())
-    for sentence in found.summary["words"].splitlines():
-        assert " ".join(sentence.split()) in shown
-    assert max(map(len, out.splitlines())) <= 80
 
 
 # Watch.
@@ -116,13 +79,6 @@ def test_job_is_submitted_watched_and_shown(
     assert "Property 1" in out
 
 
-@pytest.mark.ci
-def test_watch_prints_the_ended_job_as_json(run: Run, done: str) -> None:
-    code, out, _ = run("watch", done, "--json")
-    assert code == 0
-    assert json.loads(out)["state"] == "succeeded"
-
-
 def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, owner: str) -> None:
     job = ahead(service, owner)
     service.store.leases.finish(taken(service.store, job), FAILED)
@@ -132,44 +88,6 @@ def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, ow
     code, out, _ = run("watch", job, "--json")
     assert code == 2
     assert json.loads(out)["problem"]["detail"] == "it broke"
-
-
-@pytest.mark.ci
-def test_watch_states_the_models_of_a_cancelled_job_and_how_to_get_them(
-    run: Run, service: Service, owner: str, found: JobOutcome, finish: Callable[[JobOutcome], str]
-) -> None:
-    job = finish(replace(found, state=JobState.CANCELLED))
-    get = f"'islands jobs result {job} --out FOLDER' writes them to a folder"
-    kept = f"was cancelled and kept the {len(found.models)} models found so far: {get}"
-    code, out, err = run("watch", job)
-    assert (code, out) == (2, "")
-    assert err.splitlines()[-1] == f"error: job {job} {kept}, 'islands jobs resume {job}' continues"
-    assert f"The job {kept}, " in " ".join(run("show", job)[1].split())
-    # The stated command works.
-    code, _, err = run("result", job, "--out", "kept")
-    assert code == 0, err
-    assert len(list(Path("kept/models").iterdir())) == len(found.models)
-    empty = ahead(service, owner)
-    service.store.leases.finish(taken(service.store, empty), JobOutcome(JobState.CANCELLED))
-    assert run("watch", empty)[2].endswith(f"error: job {empty} cancelled: resume it to continue\n")
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    ("ended_by", "words"),
-    [(RUN_TIME, "ended at its limit of run time"), (BY_OWNER, "was stopped by its owner")],
-)
-def test_watch_states_that_a_job_whose_search_ended_early_kept_its_models(
-    run: Run, found: JobOutcome, finish: Callable[[JobOutcome], str], ended_by: str, words: str
-) -> None:
-    assert words not in run("watch", finish(found))[1]
-    job = finish(replace(found, summary={**(found.summary or {}), "ended_by": ended_by}))
-    code, out, _ = run("watch", job)
-    assert code == 0
-    assert " ".join(out.split()).endswith(
-        f"The job {words} and kept the {len(found.models)} models found so far: "
-        f"'islands jobs result {job} --out FOLDER' writes them to a folder."
-    )
 
 
 @pytest.mark.ci
@@ -216,12 +134,6 @@ def test_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) 
     assert files == {f"{rank:02d}.json": file for rank, (_, file) in enumerate(found.models, start=1)}
     assert {path.name for path in Path("out/figures").iterdir()} == {f"{name}.svg" for name in FIGURES}
     assert json.loads(run("result", done, "--json")[1]) == result
-
-
-def test_result_is_requested_once(run: Run, service: Service, done: str) -> None:
-    service.logs.clear()
-    assert run("result", done)[0] == 0
-    assert [each["path"] for each in service.logs if "path" in each].count(f"/v1/jobs/{done}/result") == 1
 
 
 def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) -> None:
@@ -289,17 +201,6 @@ def test_error_is_one_line(run: Run, service: Service, owner: str, arguments: An
     assert service.store.jobs.page(owner).jobs == ()
 
 
-@pytest.mark.parametrize("name", ["result", "cancel", "resume"])
-def test_command_in_the_wrong_state_of_a_job_is_rejected(
-    run: Run, service: Service, owner: str, done: str, name: str
-) -> None:
-    job = ahead(service, owner) if name == "result" else done
-    code, _, err = run(name, job)
-    assert code == 2
-    assert "job " + job in err
-    assert len(err.splitlines()) == 1
-
-
 def test_options_name_the_service_and_the_key(
     run: Run, service: Service, owner: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -317,7 +218,3 @@ def test_options_name_the_service_and_the_key(
     assert (
         run("list", "--url", service.url, "--json")[0] == 0
     )  # no key is needed on the service's own machine
-
-
-def test_unreachable_service_is_retried_for_a_short_time() -> None:
-    assert client_options.RETRY_SECONDS <= 5.0

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import typer
 
-from islands.cli.commands.identify import identify
 from islands.cli.search_options import SETTINGS
 from islands_api.cli.commands import jobs as command
 from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome, JobState, Submission
@@ -105,66 +104,6 @@ def test_all_settings_reach_the_job(run: Run, service: Service, owner: str) -> N
     assert Identification.model_validate(spec).changes.keys() == set(SETTINGS)
 
 
-def test_identify_and_submit_have_the_same_search_options() -> None:
-    alone = typer.Typer()
-    alone.command()(identify)
-    ours = {each.name: each.opts for each in typer.main.get_command(command.jobs).commands["submit"].params}  # type: ignore[attr-defined]
-    theirs = {each.name: each.opts for each in typer.main.get_command(alone).params}
-    assert {name: ours[name] for name in (*SETTINGS, "preset", "seed", "dt", "rows")} == {
-        name: theirs[name] for name in (*SETTINGS, "preset", "seed", "dt", "rows")
-    }
-
-
-@pytest.mark.ci
-def test_name_priority_and_idempotency_key_reach_the_job(run: Run, service: Service, owner: str) -> None:
-    words = ("--name", "[red] one", "--priority", 5, "--idempotency-key", "k-1")
-    job = json.loads(run("submit", "r.csv", *COLUMNS, *words, "--json")[1])
-    assert (job["name"], job["priority"]) == ("[red] one", 5)
-    assert run("submit", "r.csv", *COLUMNS, *words)[1].splitlines()[0] == f"job {job['id']}: queued"
-
-
-def test_default_name_is_the_printable_file_name(run: Run, tmp_path: Path) -> None:
-    long = tmp_path / ("x\n" + "y" * 240 + ".csv")
-    long.write_bytes(csv())
-    code, out, err = run("submit", long, *COLUMNS, "--validation", "0.4", "--json")
-    assert code == 0, err
-    assert json.loads(out)["name"] == "x" + "y" * 199
-    assert json.loads(out)["spec"]["validation"] == 0.4
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (("--rows", "0:100", "--validation", "100:"), {"dataset": "r.csv", "rows": "100:"}),
-        pytest.param(("--validation", "v.csv"), {"dataset": "v.csv"}, marks=pytest.mark.nightly),
-    ],
-    ids=["rows", "file"],
-)
-def test_validation_is_rows_or_a_file(
-    run: Run, service: Service, owner: str, tmp_path: Path, words: tuple[str, ...], expected: Any
-) -> None:
-    (tmp_path / "v.csv").write_bytes(csv(120))
-    code, out, err = run("submit", "r.csv", *COLUMNS, *words, "--json")
-    assert code == 0, err
-    found = json.loads(out)["spec"]["validation"]
-    found["dataset"] = service.store.datasets.get(owner, found["dataset"]).name
-    assert found == expected
-
-
-@pytest.mark.ci
-def test_several_recordings_are_one_job(run: Run, service: Service, owner: str, tmp_path: Path) -> None:
-    (tmp_path / "v.csv").write_bytes(csv(120))
-    code, out, err = run("submit", "r.csv", "v.csv", *COLUMNS, "--json")
-    assert code == 0, err
-    job = json.loads(out)
-    datasets = [job["spec"]["dataset"], *(each["dataset"] for each in job["spec"]["recordings"])]
-    assert job["name"] == "r.csv, v.csv"
-    assert [service.store.datasets.get(owner, each).name for each in datasets] == ["r.csv", "v.csv"]
-    code, _, err = run("submit", "r.csv", "v.csv", *COLUMNS, "--validation", "100:")
-    assert (code, "with several recordings, give a file or a fraction" in err) == (2, True)
-
-
 # Discrepancy jobs.
 
 
@@ -229,21 +168,6 @@ def test_the_fmu_of_a_diagnosis_is_uploaded(serve: Any, command_line: Run, tmp_p
     with serve(rate=0, allow_fmus=False) as service:
         code, _, err = diagnose("fmu:mass.fmu")
     assert (code, "ISLANDS_ALLOW_FMUS=true" in err) == (2, True)
-
-
-@pytest.mark.nightly
-def test_recordings_of_a_diagnosis_are_uploaded(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "v.csv").write_bytes(csv(120))
-    words = ("--simulation", "bouc-wen-piezo", "--rows", "0:110", "--json")
-    (tmp_path / "w.csv").write_bytes(csv(90))
-    code, out, err = run("diagnose", "r.csv", "v.csv", "--validation", "w.csv", *COLUMNS, *words)
-    assert (code, err) == (0, "")
-    job = json.loads(out)
-    assert job["name"] == "r.csv, v.csv"
-    assert job["spec"]["validation"].keys() == {"dataset"}
-    (other,) = job["spec"]["recordings"]
-    assert other["rows"] == "0:110"
-    assert other["dataset"] != job["spec"]["dataset"]
 
 
 @pytest.mark.parametrize(
