@@ -12,26 +12,6 @@ from support.repository import ROOT
 PAGE = ROOT / "docs/how-to/plan-capacity.md"
 
 
-@pytest.mark.parametrize(
-    ("epoch", "measured"), [(0.05, 0.75), (0.09, 0.83), (0.09, 0.85), (0.5, 0.97), (1.0, 0.98), (1.0, 0.97)]
-)
-def test_the_model_gives_the_measured_efficiency_of_two_islands(epoch: float, measured: float) -> None:
-    """Measured without checkpoints: docs/explanation/islands-on-ray.md."""
-    assert LargeJob(cores=2, epoch=epoch, checkpoint=1e-9).efficiency == pytest.approx(measured, abs=0.035)
-
-
-@pytest.mark.parametrize(
-    ("flat", "epoch", "islands"),
-    [(0.00035, 1.0, 2_900), (0.001, 1.0, 1_000), (0.00035, 3.5, 10_000), (0.001, 10.0, 10_000)],
-)
-def test_a_single_coordinator_saturates_where_it_was_measured(
-    flat: float, epoch: float, islands: int
-) -> None:
-    job = LargeJob(flat=flat, epoch=epoch, region=1e9, cores=0.97 * islands)
-    assert job.period == pytest.approx(epoch + job.latency)
-    assert replace(job, cores=1.05 * islands).period > epoch + job.latency
-
-
 def test_regions_carry_ten_thousand_islands_at_epochs_of_a_second() -> None:
     """Islands on Ray: a fifth of a core for the driver, a quarter for each of 20 coordinators."""
     job = LargeJob(cores=10_000, checkpoint=1e-9)
@@ -53,10 +33,6 @@ def test_checkpoints_take_no_more_than_their_share(cores: int) -> None:
     job = LargeJob(cores=cores)
     assert job.waiting <= job.share
     assert job.stall <= job.share * job.interval + 1e-9
-
-
-def test_checkpoints_of_regions_are_rendered_at_the_same_time() -> None:
-    assert LargeJob(cores=10_000).stall - LargeJob(cores=500).stall == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("jobs", [1, 1_000, 50_000])

@@ -1,7 +1,6 @@
 """The commands fit, simulate, show and systems: files, numbers, messages."""
 
 import csv
-import importlib.util
 import json
 import re
 from pathlib import Path
@@ -48,43 +47,6 @@ def result(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "fit" / "result.json").read_text())
 
 
-def test_systems_are_listed_and_made(tmp_path: Path) -> None:
-    assert "bouc-wen-piezo" in succeed("systems", "list")
-    options = ("bouc-wen-piezo", "--variant", "consistent", "--part", "validation")
-    succeed("systems", "make", *options, "--out", tmp_path / "sine.csv")
-    with (tmp_path / "sine.csv").open() as stream:
-        rows = list(csv.reader(stream))
-    assert rows[0] == ["t_s", "u_V", "y_um"]
-    assert len(rows) == 20_001
-
-
-def test_result_describes_record_settings_and_search(result: dict[str, Any]) -> None:
-    assert result["record"]["samples"] == 5_000
-    assert result["record"]["dt"] == pytest.approx(1e-3, rel=1e-9)
-    assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
-    assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
-    assert result["settings"]["constraints"] == "hysteresis"
-    assert result["search"]["outcomes"]["ok"] == result["search"]["evaluations"] >= len(result["models"])
-    # Equation (5) for degree 5 and three lags of y and u: C(11, 5).
-    assert result["search"]["full_set"]["candidates"] == 462
-    assert result["search"]["wall_s"] > 0
-
-
-def test_models_are_best_first_with_metrics_and_physics(result: dict[str, Any]) -> None:
-    errors = [model["metrics"]["validation"]["free_run"]["rmse"] for model in result["models"]]
-    assert errors == sorted(errors)
-    best = result["models"][0]
-    assert best["rank"] == 1
-    assert best["metrics"]["validation"]["free_run"]["mape"] < 0.5
-    assert best["physics"]["property_1"] is True
-    assert best["physics"]["hold_drift_percent"] < 1e-6
-    assert best["physics"]["clusters"] == [
-        {"cluster": "y", "sum": pytest.approx(1.0, abs=1e-9), "target": 1.0}
-    ]
-    assert best["terms"][0]["regressor"] == "y(k-1)"
-    assert all(term["standard_error"] >= 0 for term in best["terms"])
-
-
 def test_folder_contains_models_figures_and_a_summary(folder: Path, result: dict[str, Any]) -> None:
     for model in result["models"]:
         document = json.loads((folder / "fit" / "models" / f"{model['rank']:02d}.json").read_text())
@@ -111,15 +73,6 @@ def test_repeated_fit_gives_bit_identical_models(folder: Path) -> None:
     with undrawn_figures():
         fit(folder, "again")
     assert_same_files(folder / "fit", folder / "again")
-
-
-@pytest.mark.nightly
-def test_repeated_fit_draws_bit_identical_figures(records: Path) -> None:
-    for out in ("drawn", "drawn again"):
-        fit(records, out)
-    assert_same_files(records / "drawn", records / "drawn again")
-    for path in (records / "drawn" / "figures").iterdir():
-        assert path.stat().st_size > 5_000, path.name
 
 
 @pytest.mark.parametrize(("mode", "missing"), [("one-step", 3), ("shooting", 3), ("free-run", 3)])
@@ -151,31 +104,6 @@ def test_a_free_run_needs_no_output_after_its_warm_up(folder: Path) -> None:
     succeed("simulate", model, folder / "sine.csv", "--mode", "free-run", "--out", folder / "seen-run.csv")
     assert (folder / "blind-run.csv").read_text() == (folder / "seen-run.csv").read_text()
     assert "missing at sample 10" in fail("simulate", model, folder / "blind.csv", "--mode", "one-step")
-
-
-def test_the_exported_python_function_computes_the_same_numbers(folder: Path) -> None:
-    source = succeed("show", folder / "fit/models/01.json", "--format", "python")
-    (folder / "exported.py").write_text(source)
-    spec = importlib.util.spec_from_file_location("exported", folder / "exported.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    record = np.genfromtxt(folder / "sine.csv", delimiter=",", names=True)
-    succeed("simulate", folder / "fit/models/01.json", folder / "sine.csv", "--out", folder / "run.csv")
-    ours = np.genfromtxt(folder / "run.csv", delimiter=",", names=True)["y_sim"]
-    theirs = module.simulate(record["u_V"].tolist(), record["y_um"].tolist())
-    assert np.array_equal(np.array(theirs)[module.MAXIMUM_LAG :], ours[module.MAXIMUM_LAG :])
-
-
-@pytest.mark.parametrize("number", ["12", "13", "14"])
-def test_published_models_are_shown_in_every_format(number: str) -> None:
-    assert succeed("show", f"published:{number}", "--format", "plain").startswith("y(k) = 1*y(k-1)")
-    assert succeed("show", f"published:{number}", "--format", "latex").startswith("y_{k} = ")
-    assert "def simulate(" in succeed("show", f"published:{number}", "--format", "python")
-    assert (
-        json.loads(succeed("show", f"published:{number}", "--format", "json"))["schema"] == "islands.model/1"
-    )
 
 
 def test_errors_say_what_to_do_and_keep_existing_results(folder: Path) -> None:

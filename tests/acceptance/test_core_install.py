@@ -81,12 +81,6 @@ def test_a_record_is_fitted_simulated_and_exported(folder):
 
 
 @pytest.mark.nightly
-def test_systems_make_records(folder):
-    succeed(folder, "systems", "make", "s1", "--out", "system.csv")
-    assert (folder / "system.csv").is_file()
-
-
-@pytest.mark.nightly
 def test_a_search_of_two_islands_runs_serially_and_says_so(folder):
     done = succeed(folder, "identify", "record.csv", *COLUMNS, *SEARCH, "--out", "found")
     assert "engine: serial, on one core" in done.stderr

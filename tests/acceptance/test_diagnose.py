@@ -67,20 +67,6 @@ def test_report_is_a_single_file_with_a_summary(folder: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
 
 
-@pytest.mark.ci
-def test_report_contains_the_figures(offset_record: Path) -> None:
-    succeed(
-        *("diagnose", offset_record / "record.csv", "--input", "u_V", "--output", "y_um"),
-        *("--simulation", "column:theirs_um", "--out", offset_record / "drawn"),
-    )
-    drawn = re.findall(
-        r'src="data:image/svg\+xml;base64,([^"]+)"', (offset_record / "drawn/report.html").read_text()
-    )
-    # There are no loops of this input.
-    assert len(drawn) == 3
-    assert min(map(len, drawn)) > 10_000
-
-
 @pytest.fixture(scope="module")
 def offset_record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short record and a recorded simulation without the offset of the record."""
@@ -228,15 +214,6 @@ def test_self_test_reports_detection_limits_and_false_alarms(
         r"offset of the output \(<code>offset</code>\)</th><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>"
     )
     assert re.search(row, text)
-
-
-@pytest.mark.nightly
-def test_self_test_does_not_depend_on_the_number_of_workers(offset_record: Path) -> None:
-    (_, serial), (_, parallel) = (
-        run_self_test(offset_record, f"workers-{workers}", "--workers", workers) for workers in (1, 2)
-    )
-    for name in ("detection_limits", "false_alarm_rate", "p_value", "confusion"):
-        assert parallel[name] == serial[name]
 
 
 def test_existing_result_is_not_overwritten_without_force(folder: Path) -> None:

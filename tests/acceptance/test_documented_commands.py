@@ -124,21 +124,3 @@ def test_the_figures_of_operation_have_commands() -> None:
     assert len(speed) > 25
     assert all("`" in row[-1] or row[-1].strip() == "the same" for row in speed)
     assert len(list(script_commands(page))) > 15
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "python benchmarks/absent.py",
-        "python benchmarks/service_load.py accepted",
-        "python benchmarks/service_load.py accept --times 3",
-        "python benchmarks/capacity.py jobs --retain 3",
-        "pytest -m weekly tests/faults/test_service_soak.py",
-    ],
-)
-def test_a_wrong_script_command_is_found(line: str, tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(f"Run `{line}`.\n")
-    (command,) = script_commands(page)
-    with pytest.raises((AssertionError, FileNotFoundError)):
-        check_script_command(command)

@@ -14,7 +14,6 @@ import islands
 
 EXAMPLES = tutorials.list_examples()
 IDS = [path.stem for path in EXAMPLES]
-README = (tutorials.ROOT / "examples" / "README.md").read_text()
 
 #: Public names of the packages that examples may import.
 PUBLIC = {
@@ -81,29 +80,6 @@ def test_cluster_example_gives_the_same_models_on_a_cluster(ray_address: str, tm
     assert (tmp_path / "a" / "model.json").read_bytes() == (tmp_path / "b" / "model.json").read_bytes()
 
 
-def test_there_are_ten_examples_with_consecutive_numbers() -> None:
-    assert [path.name[:2] for path in EXAMPLES] == [f"{number:02d}" for number in range(1, 11)]
-
-
-@pytest.mark.parametrize("path", EXAMPLES, ids=IDS)
-def test_example_is_listed_with_its_title(path: Path) -> None:
-    example = tutorials.parse(path)
-    assert f"| [`{path.name}`]({path.name}) | {example.title} |" in README
-
-
-@pytest.mark.parametrize("path", EXAMPLES, ids=IDS)
-def test_example_has_text_code_links_and_checks(path: Path) -> None:
-    example = tutorials.parse(path)
-    assert example.introduction
-    assert len([cell for cell in example.cells if cell.shown and cell.text and cell.code.strip()]) >= 4
-    *_, following, checks = example.cells
-    links = re.findall(r"\]\(([^)]+)\)", following.text)
-    assert following.text.startswith("## Next")
-    assert links
-    assert not checks.shown
-    assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(checks.code)))
-
-
 @pytest.mark.parametrize("path", EXAMPLES, ids=IDS)
 def test_links_of_an_example_lead_to_other_examples(path: Path) -> None:
     example = tutorials.parse(path)
@@ -128,8 +104,3 @@ def test_example_uses_public_names_only(path: Path) -> None:
             of_package = isinstance(node.value, ast.Name) and node.value.id == "islands"
             assert not of_package or node.attr in PUBLIC["islands"], node.attr
             assert not node.attr.startswith("_"), node.attr
-
-
-@pytest.mark.parametrize("path", EXAMPLES, ids=IDS)
-def test_example_has_the_option_out(path: Path) -> None:
-    assert '"--out"' in path.read_text()

@@ -61,18 +61,6 @@ def test_extended_simulation_reproduces_the_record(folder: Path) -> None:
     assert column(out) == pytest.approx(measured(folder), abs=1e-6)
 
 
-def test_extended_simulation_is_shown_as_text(folder: Path) -> None:
-    printed = succeed("show", folder / "extended.json", "--format", "plain")
-    assert "y_um from u_V: bouc-wen-piezo" in printed
-    assert "cubic-stiffness (coordinate and rate): Odd term of the characteristic: + k x^3" in printed
-    assert "k = 3e-05 um/V^3" in printed
-
-
-def test_json_format_of_an_extended_simulation_is_its_file(folder: Path) -> None:
-    for given in (folder / "extended.json", folder):
-        assert succeed("show", given, "--format", "json") == (folder / "extended.json").read_text()
-
-
 @pytest.mark.ci
 def test_exported_program_reproduces_the_record(folder: Path) -> None:
     program, out = folder / "program.py", folder / "by_program.csv"
@@ -105,15 +93,6 @@ def test_unsupported_format_is_rejected(folder: Path) -> None:
     for options in (("modelica",), ("fmu", "--out", folder / "piezo.fmu")):
         message = fail("show", folder / "extended.json", "--format", *options)
         assert "bouc-wen-piezo has no closed form as a difference equation: take the format plain" in message
-
-
-def test_a_simulation_of_equations_is_written_as_c_and_matlab(folder: Path) -> None:
-    out = folder / "simulation.c"
-    succeed("show", folder, "--format", "c", "--out", out)
-    assert out.read_text().rstrip() == succeed("show", folder / "extended.json", "--format", "c").rstrip()
-    assert "int simulate(const struct parameters *p," in out.read_text()
-    printed = succeed("show", folder, "--format", "matlab")
-    assert printed.startswith("function y = extended_simulation(u, initial, p)")
 
 
 def test_equations_are_simulated_without_a_diagnosis(tmp_path: Path) -> None:

@@ -69,21 +69,6 @@ def test_packages_are_installed_with_their_data(folder: Path) -> None:
     assert Path(done.stdout.strip()).is_relative_to(sysconfig.get_path("purelib"))
 
 
-def test_help_lists_all_commands(folder: Path) -> None:
-    printed = succeed("--help", folder=folder)
-    for command in ("identify", "fit", "diagnose", "simulate", "show", "systems", "serve", "jobs", "keys"):
-        assert command in printed
-
-
-@pytest.mark.parametrize(("group", "command"), [("keys", "create"), ("jobs", "submit")])
-def test_command_groups_have_help(folder: Path, group: str, command: str) -> None:
-    assert command in succeed(group, "--help", folder=folder)
-
-
-def test_systems_are_listed(folder: Path) -> None:
-    assert "bouc-wen-piezo" in succeed("systems", "list", folder=folder)
-
-
 def test_fit_writes_models_and_figures(folder: Path, model: str) -> None:
     result = json.loads((folder / "fit/result.json").read_text())
     assert result["models"][0]["physics"]["property_1"] is True
@@ -124,13 +109,3 @@ def test_diagnosis_writes_a_report(folder: Path) -> None:
     document = json.loads((folder / "diagnosis/discrepancy.json").read_text())
     assert [effect["name"] for effect in document["effects"]] == ["offset"]
     assert "<img " in (folder / "diagnosis/report.html").read_text()
-
-
-def test_empty_record_is_rejected_in_one_line(folder: Path) -> None:
-    (folder / "empty.csv").write_text("")
-    done = run("fit", "empty.csv", *COLUMNS, "--out", "never", folder=folder)
-    assert done.returncode == 2
-    assert "error: " in done.stderr
-    assert "empty.csv is empty" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (folder / "never").exists()

@@ -1,11 +1,9 @@
 """The command ``islands identify`` with several islands: settings, and equal results on all engines."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from islands_service.engines import ENGINES
 from support.command_line import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
 from support.undrawn import undrawn_figures
 
@@ -50,34 +48,6 @@ def test_result_contains_the_settings_of_the_islands(folder: Path) -> None:
     assert result["search"]["evaluations"] == 3 * 7 * 30
     assert result["search"]["ended_by"] == "generations"
     assert (folder / "serial/figures/islands.svg").exists()
-
-
-@pytest.mark.nightly
-def test_engines_give_bit_identical_results(folder: Path, ray_address: str) -> None:
-    assert set(ENGINES) == {"serial", "ray"}
-    identify(folder, "ray", *ISLANDS, "--engine", "ray", "--ray-address", ray_address)
-    assert found(folder / "ray") == found(folder / "serial")
-    assert len(found(folder / "ray")) > 2
-    searches = [stored(folder / engine)["search"] for engine in ENGINES]
-    for name in ("evaluations", "duplicates", "outcomes", "generations", "ended_by"):
-        assert searches[0][name] == searches[1][name], name
-
-
-@pytest.mark.ci
-def test_isolated_islands_are_at_least_as_good_as_a_single_island(folder: Path) -> None:
-    best = []
-    for count in (1, 3):
-        out = f"isolated-{count}"
-        options = ("--generations", 4, "--islands", count, "--topology", "isolated", "--engine", "serial")
-        identify(folder, out, *options)
-        assert stored(folder / out)["search"]["evaluations"] == count * 5 * 30
-        sizes: dict[int, float] = {}
-        for each in json.loads((folder / out / "hall.json").read_text())["hall"]:
-            sizes.setdefault(len(each["regressors"]), each["fitness"])
-        best.append(sizes)
-    alone, together = best
-    assert all(together[size] <= fitness for size, fitness in alone.items())
-    assert any(together[size] < fitness for size, fitness in alone.items())
 
 
 @pytest.mark.nightly

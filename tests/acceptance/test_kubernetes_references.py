@@ -147,15 +147,6 @@ def test_every_secret_and_config_map_of_a_pod_exists(objects):
     assert len(provided(objects)) == 5
 
 
-def test_a_generated_name_that_is_not_rewritten_is_found(tmp_path):
-    """Without a configuration kustomize leaves the references of a custom resource as they are."""
-    folder = shutil.copytree(KUBERNETES, tmp_path / "base")
-    kustomization = read(folder / "kustomization.yaml")
-    kustomization.pop("configurations", None)
-    (folder / "kustomization.yaml").write_text(yaml.safe_dump(kustomization))
-    assert missing_objects(render(folder)) == ["Secret islands-database", "Secret islands-storage"]
-
-
 @pytest.mark.ci
 def test_kustomize_renders_no_reference_to_a_missing_object(tmp_path):
     programs = ({"kustomize": "build", "kubectl": "kustomize"}).items()

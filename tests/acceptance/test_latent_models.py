@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.report.figures.names import LATENT_FIGURES
 from islands.simulation.predictors import free_run
 from support.command_line import ISLANDS, fail, succeed
 from support.latent_systems import spring_record
@@ -47,13 +46,6 @@ def test_the_cubic_spring_is_found(folder):
     _, equations = (folder / "out" / "method.txt").read_text().split("Equations by rank", 1)
     for line in equations.splitlines()[1:]:
         assert line.startswith("    ") != line[:2].strip().isdigit()
-
-
-@pytest.mark.parametrize("figure", LATENT_FIGURES)
-def test_a_figure_of_a_part_is_drawn_on_another_record(folder, tmp_path, figure):
-    options = ("--figure", figure, "--record", folder / "other.csv", "--out", tmp_path / "drawn.svg")
-    succeed("show", folder / "out", *options)
-    assert (tmp_path / "drawn.svg").read_text().count("<path") > 10
 
 
 def test_a_saved_model_simulates_another_record(folder):

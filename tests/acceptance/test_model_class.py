@@ -5,7 +5,7 @@ import pytest
 
 import islands
 from islands.effects.catalogue import CATALOGUE
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError
 from islands.export import export
 from islands.simulation.predictors import free_run
 from islands.simulators.specification.factory import make_simulator
@@ -82,15 +82,6 @@ def test_a_model_of_deviations_reads_the_record_as_measured(record):
     exec(program, module)
     found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
     np.testing.assert_allclose(found[1:], free_run(model, record).y[1:], rtol=1e-12)
-
-
-def test_other_options_are_those_of_narx_models(record):
-    with pytest.raises(SettingsError, match="not for the model gain-scheduled"):
-        islands.fit(record, model="gain-scheduled", max_terms=3)
-    with pytest.raises(SettingsError, match=r"unknown class of models 'gain'.*gain-scheduled"):
-        islands.fit(record, model="gain")
-    with pytest.raises(ModelError, match="a NARX model is needed"):
-        islands.linearise(model_of(record), [1.0])
 
 
 def test_a_damaged_file_names_the_class(record, tmp_path):

@@ -97,28 +97,3 @@ def find_wrong_dashboards(given: dict[str, Any]) -> Iterator[str]:
 def test_every_name_in_the_monitoring_leads_somewhere():
     given = read_monitoring()
     assert not [*find_wrong_scrapes(given), *find_wrong_dashboards(given)]
-
-
-@pytest.mark.parametrize(
-    ("place", "value", "fault"),
-    [
-        (("prometheus", "rule_files", 0), "other.yml", "file other.yml"),
-        (
-            ("services", "prometheus", "volumes", 0),
-            "./x:/etc/prometheus/prometheus.yml",
-            "file prometheus.yml",
-        ),
-        (("services", "prometheus", "secrets", 0), "other", "secret metrics-key"),
-        (("prometheus", "scrape_configs", 1, "dns_sd_configs", 0, "port"), 9101, "port of coordinator"),
-        (("prometheus", "scrape_configs", 0, "job_name"), "other", "job islands-api"),
-        (("sources", 0, "url"), "http://other:9090", "address http://other:9090"),
-        (("sources", 0, "uid"), "other", "source of Queued jobs"),
-        (("dashboards",), [], "dashboards"),
-    ],
-)
-def test_a_name_in_the_monitoring_that_leads_nowhere_is_found(place, value, fault):
-    node = given = read_monitoring()
-    for name in place[:-1]:
-        node = node[name]
-    node[place[-1]] = value
-    assert fault in [*find_wrong_scrapes(given), *find_wrong_dashboards(given)]

@@ -30,8 +30,6 @@ DATASET = "672083eb...-csv"
 #: Id of the job on the page.
 JOB = "b93d8227..."
 
-#: Ways to submit a job.
-WAYS = ("curl", "Python", "Command line")
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -194,22 +192,6 @@ def test_commands_of_the_command_line(user: User, jobs: dict[str, str]) -> None:
     check_best(document["models"])
     for name in ("models/01.json", "figures/loop.svg", "figures/islands.svg"):
         assert (user.folder / "result" / name).stat().st_size > 0, name
-
-
-@pytest.mark.nightly
-def test_all_ways_give_bit_identical_models(user: User, jobs: dict[str, str]) -> None:
-    # The other tests may have run in another worker process.
-    if "curl" not in jobs and shutil.which("curl") is not None:
-        test_commands_with_curl(user, jobs)
-    if "Python" not in jobs:
-        test_python_program(user, jobs)
-    if "Command line" not in jobs:
-        test_commands_of_the_command_line(user, jobs)
-    used = [way for way in WAYS if way in jobs]
-    assert len(set(jobs.values())) == len(used)
-    answers = [user.service.models(jobs[way]) for way in used]
-    assert all(answer == answers[0] for answer in answers)
-    check_best(json.loads(answers[0])["items"])
 
 
 @pytest.mark.ci

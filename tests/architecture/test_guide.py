@@ -24,11 +24,6 @@ def test_the_reference_has_all_texts_of_an_effect(name: str) -> None:
     assert entry.distinguished_by
 
 
-@pytest.mark.parametrize("name", NAMED)
-def test_similar_effects_have_names_of_the_catalogue(name: str) -> None:
-    assert {*re.findall(r"[a-z]+(?:-[a-z]+)+", NAMED[name].similar_to)} <= NAMED.keys()
-
-
 def test_the_guide_has_the_parameters_that_the_reference_does_not_have() -> None:
     _, _, section = TELL_APART.partition("## Read the parameters")
     assert re.findall(r"^\| `([a-z-]+)` \| .+ \|$", section, re.MULTILINE) == [*OF_EACH, *DETECTORS]

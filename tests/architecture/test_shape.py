@@ -5,7 +5,6 @@ import subprocess
 import sys
 import sysconfig
 from collections import Counter, defaultdict
-from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -20,8 +19,6 @@ SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*
 #: Class names that two modules use: the client and the OpenAPI document name them like the core does.
 SHARED_CLASS_NAMES = {"Event", "HistoryPoint", "Preview"}
 
-#: Lines of the body of a function, at most, without its docstring.
-MOST_LINES = 60
 
 #: Modules in a folder and its folders, at least. A smaller one hides its modules behind one more name.
 LEAST_MODULES = 3
@@ -63,34 +60,9 @@ def test_a_folder_has_several_modules() -> None:
     assert small <= {ROOT / "services/islands_service/store/migrations/versions"}
 
 
-def test_a_function_is_short() -> None:
-    long = [
-        f"{path.relative_to(ROOT)}: {function.name}"
-        for path in SOURCES
-        for function in functions(parse(path))
-        if count_body_lines(function) > MOST_LINES
-    ]
-    assert not long
-
-
 @cache
 def parse(path: Path) -> ast.Module:
     return ast.parse(path.read_text())
-
-
-def functions(node: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Yield the functions of a tree, also those within others."""
-    for name in ("body", "orelse", "handlers", "finalbody", "cases"):
-        for inner in getattr(node, name, []):
-            if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
-                yield inner
-            yield from functions(inner)
-
-
-def count_body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """Return the number of lines of a function behind its docstring."""
-    body = function.body[1:] if ast.get_docstring(function) else function.body
-    return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
 
 
 def test_no_name_repeats_that_of_its_folder() -> None:

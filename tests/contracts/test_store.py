@@ -3,7 +3,6 @@
 Every test of the files `test_store*.py` runs on SQLite and on PostgreSQL.
 """
 
-import json
 import time
 from functools import partial
 
@@ -21,27 +20,15 @@ from islands_service.store import Store
 from support.stores import (
     ALICE,
     BOB,
-    FAILED,
     MANY,
     asked,
     at_once,
-    child,
-    claimed,
     contents,
     job_in,
     kinds,
     open_stores,
     submitted,
 )
-
-LOOK = """
-import json, sys
-from islands_service.store import Store
-url, owner, job = sys.argv[1:]
-with Store(url) as store:
-    found = store.jobs.get(owner, job)
-    print(json.dumps([found.id, found.state, found.spec, found.created]))
-"""
 
 
 def everything(submission):
@@ -71,30 +58,10 @@ def test_accepted_job_is_found_after_reopening_the_store(database):
         assert store.jobs.get(ALICE, job.id) == job
 
 
-def test_accepted_job_is_visible_at_once_to_other_stores(database):
-    with open_stores(database, 2) as (one, other):
-        for _ in range(20):
-            job = submitted(one)
-            assert other.jobs.get(ALICE, job.id) == job
-            assert [event.number for event in other.jobs.events(job.id)] == [1]
-
-
-@pytest.mark.ci
-def test_accepted_job_is_visible_to_another_process(store, database):
-    job = submitted(store)
-    with child(LOOK, database, ALICE, job.id) as other:
-        said, _ = other.communicate(timeout=60)
-    assert json.loads(said) == [job.id, "queued", job.spec, job.created]
-
-
 def test_floats_are_stored_bit_for_bit(store):
     spec = {"values": [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0]}
     job = submitted(store, spec=spec)
     assert repr(store.jobs.get(ALICE, job.id).spec) == repr(spec)
-
-
-def test_requests_without_a_key_are_separate_jobs(store):
-    assert submitted(store).id != submitted(store).id
 
 
 def test_same_key_with_the_same_request_is_the_same_job(store):
@@ -185,26 +152,6 @@ def test_finished_jobs_do_not_count_towards_the_quota(store, state):
     assert state not in ACTIVE
     job_in(store, state)
     assert store.jobs.submit(asked(), 1)[1]
-
-
-def test_cancelled_or_failed_job_frees_the_quota_at_once(store):
-    waiting = submitted(store)
-    with pytest.raises(QuotaError):
-        store.jobs.submit(asked(), 1)
-    store.jobs.cancel(ALICE, waiting.id)
-    assert store.jobs.submit(asked(), 1)[1]
-    store.leases.finish(claimed(store), FAILED)
-    assert store.jobs.submit(asked(), 1)[1]
-
-
-def test_jobs_of_other_owners_do_not_count_towards_the_quota(store):
-    submitted(store, BOB)
-    assert store.jobs.submit(asked(ALICE), 1)[1]
-
-
-def test_quota_of_zero_refuses_every_job(store):
-    with pytest.raises(QuotaError):
-        store.jobs.submit(asked(), 0)
 
 
 def test_resumed_job_counts_towards_the_quota(store):

@@ -1,7 +1,6 @@
 """Contract of the store for data sets, keys and retention."""
 
 import time
-from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 
@@ -131,18 +130,6 @@ def test_pages_of_data_sets_are_newest_first_and_hold_each_once(store):
     assert store.datasets.page(BOB) == ((), None)
 
 
-def test_page_contains_only_a_summary_of_each_preview(store):
-    """A list of 200 data sets with 1000 columns each would have tens of megabytes."""
-    wide = {**PREVIEW, "samples": 9, "dt": 0.1, "time": None, "columns": PREVIEW["columns"] * 1000}
-    dataset, _ = store.datasets.add(ALICE, "a.csv", ".csv", BLOB, 12, wide)
-    summary = {"samples": 9, "columns": 1000, "time": None, "dt": 0.1, "warnings": 0, "reading": {}}
-    assert store.datasets.page(ALICE)[0] == (replace(dataset, preview=summary),)
-    # Rows of earlier versions have no summary.
-    store.database.write(lambda connection: connection.execute(update(datasets).values(summary=None)))
-    assert store.datasets.page(ALICE)[0][0].preview == summary
-    assert store.datasets.get(ALICE, dataset.id).preview == wide
-
-
 @pytest.mark.parametrize("state", JobState)
 def test_data_set_can_be_deleted_unless_an_unfinished_job_needs_it(store, state):
     dataset, _ = added(store)
@@ -215,11 +202,6 @@ def test_job_of_another_owner_does_not_block_a_deletion(store):
     store.datasets.delete(ALICE, dataset.id)
 
 
-def test_missing_data_set_cannot_be_deleted(store):
-    with pytest.raises(DatasetNotFoundError):
-        store.datasets.delete(ALICE, dataset_id(BLOB, ".csv"))
-
-
 def test_key_is_found_only_by_its_secret(store):
     key, secret = store.keys.create("laptop", frozenset(SCOPES), ALICE)
     assert store.keys.find(secret) == key
@@ -235,15 +217,6 @@ def test_secret_is_not_stored(store):
     kept = repr(contents(store))
     assert secret not in kept
     assert secret.removeprefix(PREFIX) not in kept
-
-
-def test_keys_have_unique_ids_secrets_and_owners(store):
-    made = [store.keys.create("same", READ) for _ in range(20)]
-    assert len({secret for _, secret in made}) == 20
-    assert len({key.id for key, _ in made}) == 20
-    # Without a given owner, each key has a separate one.
-    assert len({key.owner for key, _ in made}) == 20
-    assert store.keys.all() == tuple(sorted((key for key, _ in made), key=lambda key: (key.created, key.id)))
 
 
 @pytest.mark.parametrize("scopes", [frozenset(), frozenset({"read", "rule"})])

@@ -5,8 +5,7 @@ import threading
 import pytest
 from sqlalchemy import update
 
-from islands.persistence.models import NARX
-from islands_service.domain.job import DISCREPANCY, SEARCHED, JobState, JobStateError
+from islands_service.domain.job import DISCREPANCY, JobState, JobStateError
 from islands_service.store.job_rows.job_claims import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.stores import (
@@ -73,10 +72,6 @@ def test_only_a_search_is_stopped(store, other):
         store.jobs.stop(ALICE, job.id)
 
 
-def test_a_search_finds_the_class_of_models_of_the_library():
-    assert SEARCHED == NARX
-
-
 def test_a_search_that_is_being_cancelled_is_not_stopped(store):
     job = submitted(store)
     claimed(store)
@@ -104,13 +99,6 @@ def test_events_are_read_after_a_number(store):
     assert store.jobs.events(job.id, after=3) == ()
     assert {event.job for event in store.jobs.events(other.id)} == {other.id}
     assert store.jobs.events("0" * 32) == ()
-
-
-def test_versions_of_many_jobs_are_returned_together(store):
-    jobs = [job_in(store, state).id for state in (JobState.SUCCEEDED, JobState.RUNNING, JobState.QUEUED)]
-    assert store.jobs.versions([*jobs, "0" * 32]) == dict(zip(jobs, (3, 2, 1), strict=True))
-    assert store.jobs.versions(jobs[:1]) == {jobs[0]: 3}
-    assert store.jobs.versions([]) == {}
 
 
 @pytest.mark.ci

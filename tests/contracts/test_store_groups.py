@@ -62,16 +62,6 @@ def test_writes_that_arrive_during_a_commit_share_the_next_one(store):
     assert len(times) == 2
 
 
-def test_concurrent_submissions_need_fewer_commits_than_jobs(store):
-    def submit():
-        return [submitted(store).id for _ in range(10)]
-
-    with commits(store) as times:
-        answers = at_once([submit] * MANY)
-    assert len({job for each in answers for job in each}) == 10 * MANY
-    assert len(times) < 10 * MANY / 2
-
-
 def test_group_has_a_largest_size(store, monkeypatch):
     assert MAX_GROUP_SIZE >= MANY
     monkeypatch.setattr(database_module, "MAX_GROUP_SIZE", 4)
@@ -118,11 +108,6 @@ def test_failed_operation_does_not_affect_its_group(store):
     after = contents(store)
     assert after["keys"] == before["keys"]
     assert kinds(store, job.id) == ["queued"]
-
-
-def test_every_operation_returns_its_own_value(store):
-    answers = in_one_group(store, [lambda i=i: store.database.write(lambda _: i) for i in range(MANY)])
-    assert answers == list(range(MANY))
 
 
 def test_write_in_a_group_with_failures_is_visible_after_its_return(database):

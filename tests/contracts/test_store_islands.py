@@ -15,7 +15,6 @@ from support.stores import (
     MANY,
     asked,
     at_once,
-    claimed,
     contents,
     open_stores,
     submitted,
@@ -57,12 +56,6 @@ def test_jobs_are_claimed_up_to_the_quota(store, claim, own):
     assert store.owners.get(BOB).running_islands == 4
     store.leases.finish(next(lease for lease in leases if size(lease) == 2), CANCELLED)
     assert [size(claim(6 if own is None else 4)) for _ in range(2)] == [1, None]
-
-
-def test_number_of_islands_is_unlimited_by_default(store):
-    queue(store, ALICE, *[10**6] * 3)
-    assert [size(claimed(store)) for _ in range(3)] == [10**6] * 3
-    assert store.owners.get(ALICE).running_islands == 3 * 10**6
 
 
 def test_smaller_jobs_do_not_overtake_a_large_one(store, claim):
@@ -139,15 +132,6 @@ def test_quota_of_zero_pauses_an_owner(store, claim):
     assert claim() is None
     store.owners.change(ALICE, {"max_islands": None})
     assert size(claim()) == 1
-
-
-def test_lost_job_counts_once_when_it_is_taken_over(store, claim):
-    queue(store, ALICE, 3, 1, 1)
-    first = claim(seconds=EXPIRED)
-    second = claim()
-    assert (size(first), size(second), second.epoch) == (3, 3, 2)
-    assert store.owners.get(ALICE).running_islands == 3
-    assert [size(claim()) for _ in range(2)] == [1, None]
 
 
 def test_lost_job_is_taken_over_whatever_the_quota(store, claim):

@@ -6,7 +6,7 @@ import pytest
 
 from islands_service.domain.job import JobNotFoundError, JobOutcome, JobState, Requester
 from islands_service.store.audit import Action
-from support.stores import ALICE, BLOB, BOB, FAILED, FOUND, claimed, contents, job_in, kinds, submitted
+from support.stores import ALICE, BLOB, BOB, FAILED, claimed, contents, job_in, kinds, submitted
 
 
 def found(store, owner=ALICE, **filters):
@@ -59,21 +59,6 @@ def test_only_the_owner_labels_a_job(store):
         store.jobs.label(BOB, job.id, "mine")
 
 
-def test_a_running_job_continues_after_a_label(store):
-    job = submitted(store)
-    lease = claimed(store)
-    store.jobs.label(ALICE, job.id, "renamed", ("a",))
-    store.leases.finish(lease, FOUND)
-    done = store.jobs.get(ALICE, job.id)
-    assert (done.state, done.name, done.tags) == (JobState.SUCCEEDED, "renamed", ("a",))
-
-
-def test_a_repeated_request_finds_the_job_after_a_label(store):
-    job = submitted(store, name="name", tags=("a",), idempotency_key="k")
-    store.jobs.label(ALICE, job.id, "renamed", ())
-    assert submitted(store, name="name", tags=("a",), idempotency_key="k").id == job.id
-
-
 def test_a_tag_selects_the_jobs_that_have_exactly_it(store):
     one, both = submitted(store, tags=("rig",)).id, submitted(store, tags=("rig 2", "rig")).id
     submitted(store, tags=("Rig", "ri", "rig%"))
@@ -81,15 +66,6 @@ def test_a_tag_selects_the_jobs_that_have_exactly_it(store):
     assert found(store, tag="rig") == {one, both}
     assert found(store, tag="rig 2") == {both}
     assert found(store, tag="r_g") == found(store, tag="2") == found(store, BOB, tag="rig") == set()
-
-
-def test_filters_are_combined(store):
-    job = submitted(store, kind="discrepancy", name="stage", tags=("a",)).id
-    submitted(store, name="stage", tags=("a",))
-    submitted(store, kind="discrepancy", name="stage")
-    chosen = {"kind": "discrepancy", "tag": "a", "words": ["stage"]}
-    assert found(store, state=JobState.QUEUED, **chosen) == {job}
-    assert found(store, state=JobState.RUNNING, **chosen) == set()
 
 
 def test_words_are_found_in_labels_data_set_and_result(store):

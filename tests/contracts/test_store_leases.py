@@ -155,19 +155,6 @@ def test_every_job_is_claimed_once_by_concurrent_claimers(database):
             assert kinds(stores[0], job.id) == ["queued", "running"]
 
 
-def test_single_job_goes_to_one_of_many_claimers(database):
-    with open_stores(database) as stores:
-        for turn in range(10):
-            job = submitted(stores[0])
-            answers = at_once(
-                [
-                    lambda store=stores[i % 4], name=f"{turn} {i}": store.leases.claim(name, LONG)
-                    for i in range(MANY)
-                ]
-            )
-            assert [lease.job.id for lease in answers if lease is not None] == [job.id]
-
-
 @pytest.mark.ci
 @pytest.mark.parametrize(
     "database", ["sqlite", pytest.param("postgresql", marks=pytest.mark.ci)], indirect=True
@@ -220,12 +207,6 @@ def test_renewal_keeps_a_job(store):
     assert store.leases.claim("second", LONG) is None
 
 
-def test_renewal_can_let_a_lease_expire(store):
-    submitted(store)
-    store.leases.renew(claimed(store, LONG, "first"), EXPIRED)
-    assert claimed(store, LONG, "second").epoch == 2
-
-
 def test_renewal_is_not_an_event(store):
     job = submitted(store)
     lease = claimed(store)
@@ -272,15 +253,6 @@ def test_job_without_progress_fails_after_all_attempts(store):
     assert job.finished >= job.started
     assert kinds(store, job.id) == ["queued", *["running"] * ATTEMPTS, "failed"]
     assert store.jobs.events(job.id)[-1].data == job.problem
-
-
-def test_failed_job_blocks_no_other(store):
-    hopeless = [submitted(store, priority=5), submitted(store, priority=5)]
-    for _ in range(2 * ATTEMPTS):
-        claimed(store, EXPIRED, "unlucky")
-    healthy = submitted(store)
-    assert claimed(store, LONG, "another").job.id == healthy.id
-    assert {store.jobs.get(ALICE, job.id).state for job in hopeless} == {JobState.FAILED}
 
 
 def test_job_without_attempts_left_is_cancelled_if_requested(store):
@@ -333,16 +305,6 @@ def test_release_does_not_count_as_an_attempt(store):
         assert claimed(store, EXPIRED).job.attempt == attempt
 
 
-def test_release_after_a_checkpoint_leaves_all_attempts(store):
-    submitted(store)
-    lease = claimed(store)
-    store.leases.report(lease, brought_on(1))
-    store.leases.release(lease)
-    for _ in range(ATTEMPTS):
-        claimed(store, EXPIRED)
-    assert store.leases.claim("another", LONG) is None
-
-
 def test_release_after_a_failure_counts_as_an_attempt(store):
     job = submitted(store)
     for _ in range(ATTEMPTS):
@@ -350,18 +312,6 @@ def test_release_after_a_failure_counts_as_an_attempt(store):
     assert store.leases.claim("another", LONG) is None
     job = store.jobs.get(ALICE, job.id)
     assert (job.state, job.attempt) == (JobState.FAILED, ATTEMPTS)
-
-
-def test_released_job_can_be_claimed_by_another(store):
-    job = submitted(store)
-    lease = claimed(store, LONG, "first")
-    store.leases.report(lease, brought_on(3))
-    store.leases.release(lease)
-    waiting = store.jobs.get(ALICE, job.id)
-    assert (waiting.state, waiting.finished) == (JobState.QUEUED, None)
-    again = claimed(store, LONG, "second")
-    assert (again.job.id, again.epoch, again.job.checkpoint) == (job.id, 2, brought_on(3).checkpoint)
-    assert kinds(store, job.id) == ["queued", "running", "progress", "queued", "running"]
 
 
 def test_released_job_with_a_cancel_request_is_cancelled(store):

@@ -73,15 +73,6 @@ def test_records_are_claimed_one_by_one_in_the_order_of_their_submission(store):
     assert (found.records, found.version, found.status, found.pending) == (4, 4, "normal", 0)
 
 
-def test_records_delay_neither_other_monitors_nor_other_jobs(store):
-    first, second = created(store), created(store)
-    jobs = [added(store, first), added(store, first), added(store, second), submitted(store)]
-    found = [claimed(store).job.id for _ in range(3)]
-    assert set(found) == {jobs[0].id, jobs[2].id, jobs[3].id}
-    assert store.leases.claim("another", LONG) is None
-    assert store.monitors.get(ALICE, first.id).pending == 2
-
-
 def test_a_record_whose_coordinator_ended_is_claimed_before_later_ones(store):
     monitor = created(store)
     job = added(store, monitor)
@@ -248,18 +239,6 @@ def test_one_more_monitor_than_the_limit_is_refused(store):
     created(store, BOB, most=1)
     with pytest.raises(QuotaError, match="1 monitors exist, and 1 is the most"):
         created(store, most=1)
-
-
-def test_monitors_are_listed_in_pages(store):
-    made = [created(store).id for _ in range(3)]
-    found, after = [], None
-    while True:
-        page, after = store.monitors.page(ALICE, after, 2)
-        found += [each.id for each in page]
-        if after is None:
-            break
-    assert len(found) == 3
-    assert set(found) == set(made)
 
 
 @pytest.mark.ci

@@ -146,21 +146,6 @@ def test_points_replace_those_after_the_given_generation(store, lease):
     assert generations(store, lease) == [3]
 
 
-def test_report_without_points_keeps_the_history(store, lease):
-    store.leases.report(lease, ProgressReport({}, tuple(map(point, range(4)))))
-    store.leases.report(lease, ProgressReport({"phase": "refining"}))
-    assert generations(store, lease) == [0, 1, 2, 3]
-
-
-def test_history_is_read_after_a_generation_up_to_a_limit(store, lease):
-    store.leases.report(lease, ProgressReport({}, tuple(map(point, range(0, 20, 2)))))
-    assert generations(store, lease) == list(range(0, 20, 2))
-    assert generations(store, lease, after=4) == [6, 8, 10, 12, 14, 16, 18]
-    assert generations(store, lease, after=5, limit=2) == [6, 8]
-    assert generations(store, lease, after=18) == []
-    assert store.results.history("0" * 32) == []
-
-
 def test_infinite_values_of_a_history_stay_infinite(store, lease):
     store.leases.report(lease, ProgressReport({}, ((0, 1, {1: float("inf")}, (float("-inf"),)),)))
     assert store.results.history(lease.job.id) == [[0, 1, {"1": float("inf")}, [float("-inf")]]]
@@ -206,14 +191,6 @@ def test_checkpoint_is_kept_unless_the_job_succeeds(store):
     assert kept == {"succeeded": None, "failed": checkpoint, "cancelled": checkpoint}
 
 
-def test_failed_job_has_a_problem(store, lease):
-    store.leases.finish(lease, FAILED)
-    job = store.jobs.get(ALICE, lease.job.id)
-    assert (job.state, job.problem) == (JobState.FAILED, FAILED.problem)
-    assert store.jobs.events(job.id)[-1].data == FAILED.problem
-    assert (store.results.document(job.id), store.results.models(job.id)) == (None, [])
-
-
 def test_cancelled_job_may_have_a_result(store, lease):
     store.leases.finish(lease, JobOutcome(JobState.CANCELLED, FOUND.document, FOUND.models))
     assert store.jobs.get(ALICE, lease.job.id).state == JobState.CANCELLED
@@ -247,13 +224,6 @@ def test_artefacts_of_a_result_are_stored_and_referenced(store, lease):
     assert {BLOB, "c" * 64} <= store.retention.named_blobs()
 
 
-def test_artefacts_of_a_new_result_replace_the_old_ones(store, lease):
-    job = lease.job.id
-    lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, artefacts={"a": BLOB, "b": BLOB}))
-    store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"new": 1}, artefacts={"a": "c" * 64}))
-    assert [store.results.artefact(job, name) for name in "ab"] == ["c" * 64, None]
-
-
 def test_new_result_replaces_the_whole_old_one(store, lease):
     job = lease.job.id
     lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
@@ -276,15 +246,6 @@ def test_finish_without_a_result_keeps_the_old_one(store, lease):
     assert store.results.artefact(job, "pareto.svg") == BLOB
 
 
-def test_artefacts_are_stored_by_name_and_can_be_replaced(store, lease):
-    job = lease.job.id
-    assert store.results.artefact(job, "a") is None
-    store.results.keep(job, {"a": "1" * 64, "b": "2" * 64})
-    store.results.keep(job, {"b": "3" * 64, "c": "4" * 64})
-    assert [store.results.artefact(job, name) for name in "abcd"] == ["1" * 64, "3" * 64, "4" * 64, None]
-    assert store.results.artefact("0" * 32, "a") is None
-
-
 def test_artefacts_of_a_deleted_job_are_refused(store, lease):
     store.leases.finish(lease, FOUND)
     store.jobs.delete(ALICE, lease.job.id)
@@ -294,23 +255,6 @@ def test_artefacts_of_a_deleted_job_are_refused(store, lease):
     with pytest.raises(LeaseLostError):
         store.leases.report(lease, brought_on(1))
     assert {table for table, rows in contents(store).items() if rows} == {"owners"}
-
-
-def test_results_of_different_jobs_are_separate(store):
-    for priority in (2, 1):
-        submitted(store, priority=priority)
-    first, second = claimed(store), claimed(store)
-    store.leases.report(first, ProgressReport({"of": 1}, (point(1),)))
-    store.leases.report(second, ProgressReport({"of": 2}, (point(1), point(2))))
-    store.results.keep(first.job.id, {"a": "1" * 64})
-    store.results.keep(second.job.id, {"a": "2" * 64})
-    store.leases.finish(second, FOUND)
-    assert (generations(store, first), generations(store, second)) == ([1], [1, 2])
-    assert store.results.models(first.job.id) == []
-    assert store.results.artefact(first.job.id, "a") == "1" * 64
-    store.jobs.delete(ALICE, second.job.id)
-    assert generations(store, first) == [1]
-    assert store.results.artefact(first.job.id, "a") == "1" * 64
 
 
 def test_concurrent_artefacts_of_the_same_name_are_both_accepted(database):

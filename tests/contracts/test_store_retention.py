@@ -94,14 +94,6 @@ def test_validation_data_and_recordings_are_named_too(store: Store) -> None:
     assert len(listed(store)) == 3
 
 
-def test_jobs_of_another_owner_do_not_count(store: Store) -> None:
-    dataset = added(store)
-    job_in(store, JobState.SUCCEEDED, BOB, spec=spec(dataset))
-    store.retention.expire_datasets(DAY)
-    pass_time(store, DAY + 1)
-    assert store.retention.expire_datasets(DAY) == 1
-
-
 def test_a_job_that_is_submitted_while_the_data_set_expires_can_read_it(store: Store) -> None:
     dataset = added(store)
     store.retention.expire_datasets(DAY)
@@ -146,12 +138,3 @@ def test_without_a_retention_nothing_expires_and_a_later_one_begins_then(store: 
     store.retention.expire_datasets(0)
     assert store.retention.expire_datasets(DAY) == 0
     assert listed(store) == [dataset]
-
-
-def test_many_data_sets_expire_in_several_transactions(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("islands_service.store.retention.DATASETS_AT_ONCE", 2)
-    for number in range(5):
-        added(store, blob=str(number) * 64)
-    store.retention.expire_datasets(DAY)
-    pass_time(store, DAY + 1)
-    assert store.retention.expire_datasets(DAY) == 5

@@ -8,7 +8,6 @@ from islands.errors import SettingsError
 from islands_service.domain.job import JobState, QuotaError
 from islands_service.domain.webhook import MAX_ATTEMPTS, WebhookNotFoundError, retry_delay
 from islands_service.store import Store
-from islands_service.store.job_rows.job_claims import ATTEMPTS
 from support.stores import (
     ALICE,
     BOB,
@@ -59,34 +58,6 @@ def test_the_end_of_a_job_is_delivered_once_to_every_webhook_that_asks_for_it(st
     assert body["data"]["state"] == state
     assert body["data"]["links"]["job"] == f"/v1/jobs/{job.id}"
     assert set(body["data"]) == {"job", "kind", "name", "state", "links"}
-
-
-def cancel_queued(store):
-    store.jobs.cancel(ALICE, submitted(store).id)
-
-
-def release_cancelled(store):
-    job = submitted(store)
-    lease = claimed(store)
-    store.jobs.cancel(ALICE, job.id)
-    store.leases.release(lease)
-
-
-def give_up(store):
-    submitted(store)
-    for _ in range(ATTEMPTS):
-        claimed(store, EXPIRED)
-    assert store.leases.claim("last", LONG) is None
-
-
-@pytest.mark.parametrize(
-    ("end", "event"),
-    [(cancel_queued, "job.cancelled"), (release_cancelled, "job.cancelled"), (give_up, "job.failed")],
-)
-def test_every_way_in_which_a_job_ends_is_delivered(store, end, event):
-    webhook = created(store)
-    end(store)
-    assert sent(store, webhook) == [(event, "pending")]
 
 
 def test_a_change_that_is_rolled_back_leaves_no_delivery(store):
@@ -195,26 +166,6 @@ def test_deliveries_are_sent_after_the_clock_has_gone_back(store):
     found = store.deliveries.claim(60.0, 10)
     assert {(each.id, each.attempt) for each in found} == {(failed.id, 2), (interrupted.id, 2)}
     assert store.deliveries.claim(60.0, 10) == ()
-
-
-def test_the_representation_of_a_delivery_hides_the_secret(store):
-    _, secret = store.webhooks.create(ALICE, URL, ALL, 1)
-    job_in(store, JobState.FAILED)
-    (due,) = store.deliveries.claim(LONG, 10)
-    assert due.secret == secret
-    assert secret not in repr(due)
-
-
-def test_deliveries_are_counted_while_they_are_pending(store):
-    created(store)
-    assert store.deliveries.pending().count == 0
-    job_in(store, JobState.FAILED)
-    pending = store.deliveries.pending()
-    assert pending.count == 1
-    assert 0.0 <= pending.oldest < 60.0
-    (due,) = store.deliveries.claim(LONG, 10)
-    store.deliveries.record(due, 204, None)
-    assert store.deliveries.pending().count == 0
 
 
 def test_only_old_finished_deliveries_are_deleted(store):

@@ -4,13 +4,10 @@ import resource
 import socket
 import ssl
 from pathlib import Path
-from threading import Timer
 
 import pytest
 import trustme
 
-from islands_api.__main__ import main
-from islands_api.server.listener import open_listener
 from islands_service.liveness import MISCONFIGURED
 from support.command_line import succeed
 from support.processes import eventually, kill
@@ -76,15 +73,6 @@ def test_port_in_use_is_refused(tmp_path: Path) -> None:
         port = other.getsockname()[1]
         said = refused("--data-dir", tmp_path / "data", "--port", port)
     assert f"cannot listen at 127.0.0.1, port {port} (another program uses it): give another --port" in said
-
-
-def test_port_that_becomes_free_soon_is_used() -> None:
-    """The process that has the port may be ending."""
-    with socket.create_server(("127.0.0.1", 0)) as other:
-        port = other.getsockname()[1]
-        Timer(0.3, other.close).start()
-        with open_listener("127.0.0.1", port) as mine:
-            assert mine.getsockname() == ("127.0.0.1", port)
 
 
 def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
@@ -190,11 +178,3 @@ def test_event_stream_ends_cleanly_when_the_service_stops(tmp_path: Path) -> Non
             # A truncated response would raise an error here.
             assert not [line for line in lines if line.startswith("id: ")]
         assert service.process.wait(30) == 0
-
-
-def test_the_server_refuses_arguments(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("sys.argv", ["islands_api", "inspect", "r.csv"])
-    assert main() == MISCONFIGURED
-    assert "takes no arguments, got inspect r.csv: the command line is 'islands'" in capsys.readouterr().err

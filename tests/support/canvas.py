@@ -94,10 +94,5 @@ def get_lines(chart: Any) -> dict[str, list[Part]]:
     return lines
 
 
-def get_faint_lines(chart: Any) -> list[Part]:
-    """Return the lines of the background of a chart, which are those of a small opacity."""
-    return [each["parts"][0] for each in get_drawn(chart)["lines"] if each["alpha"] == 0.25]
-
-
 def count_segments(parts: list[Part]) -> int:
     return sum(len(part) - 1 for part in parts)

@@ -28,8 +28,6 @@ AnyResult = islands.Result | islands.CoupledResult | DiagnosisResult
 #: Settings of a fit that takes less than a second.
 QUICK = {"library": "polynomial", "degree": 2, "lags": 3, "max_terms": 6, "certificate": 0, "average": 1}
 
-#: Settings of a fit of several outputs.
-COUPLED = {"library": "polynomial", "degree": 2, "lags": 2, "certificate": 0}
 
 #: Noise of the laws, as a fraction of the standard deviation of the output.
 LEVELS = (0.0, 0.003, 0.05)

@@ -128,8 +128,3 @@ def test_database_is_in_the_data_folder_unless_another_is_given(tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     assert ServiceSettings(data_dir=Path("data")).url == f"sqlite:///{tmp_path}/data/islands.db"
     assert ServiceSettings(database="postgresql://x").url == "postgresql://x"
-
-
-def test_settings_are_immutable():
-    with pytest.raises(ValueError, match="frozen"):
-        ServiceSettings().port = 1

@@ -203,27 +203,6 @@ def test_role_is_restarted_with_a_role_that_it_uses(supervised: Start) -> None:
     assert len(running.entries("start", "ray")) == 2
 
 
-def test_role_on_demand_runs_while_another_role_needs_it(supervised: Start) -> None:
-    ray = role("ray", on_demand=True)
-    running = supervised(role("api"), role("work", NEEDY, needs=["ray"]), ray, _LINGER_SECONDS=0.3)
-    running.started(2)
-    time.sleep(0.3)
-    assert not running.entries(name="ray")
-    for count in (1, 2):
-        running.note("demand")
-        running.started(count, "ray")
-        time.sleep(0.6)  # longer than it stays without a demand
-        assert len(running.entries("end", "ray")) == count - 1
-        running.note("demand")
-        eventually(lambda count=count: len(running.entries("end", "ray")) == count)
-    running.note("demand")
-    os.kill(running.started(3, "ray")[-1][3], signal.SIGKILL)
-    running.started(4, "ray")
-    running.started(2, "work")
-    assert running.end().count("ray ends, since no job has needed it for 0 s") == 2
-    assert len(running.entries("start", "work")) == 2
-
-
 def test_misconfigured_role_ends_all_roles_and_the_supervisor(supervised: Start) -> None:
     refusing = role("api", "note('start'); heartbeat(); wait('work start'); sys.exit(2)")
     running = supervised(refusing, role("work"))
@@ -368,16 +347,6 @@ def test_roles_share_one_ray_token_that_differs_between_services(
     assert len(tokens[0].pop()) == len("token-") + 32
 
 
-def test_restarts_do_not_leak_file_descriptors(supervised: Start) -> None:
-    running = supervised(role("api", "note('start')"), _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
-    files = Path(f"/proc/{running.process.pid}/fd")
-    running.started(3)
-    before = len(list(files.iterdir()))
-    running.started(10)
-    # A child may be starting at this moment.
-    eventually(lambda: len(list(files.iterdir())) <= before + 1)
-
-
 def test_full_heartbeat_pipe_does_not_block_a_role(supervised: Start) -> None:
     flood = (
         "note('start'); time.sleep(0.3)\n"
@@ -441,11 +410,3 @@ def test_lock_of_a_killed_service_is_released(tmp_path: Path) -> None:
         owner.wait()
         with folder_lock(tmp_path):
             assert (tmp_path / "lock").read_text() == f"{os.getpid()}\n"
-
-
-def test_exit_of_a_role_is_noticed_at_once(supervised: Start) -> None:
-    running = supervised(role("api"), _POLL_SECONDS=60.0, _FIRST_BACKOFF=0.0, _STABLE_AFTER=0.0)
-    pid = running.started()[0][3]
-    time.sleep(0.5)  # the supervisor has read the first heartbeat
-    os.kill(pid, signal.SIGKILL)
-    running.started(2)

@@ -1,6 +1,5 @@
 """Command line in this process: parsing of options, output folders, and errors."""
 
-import json
 import os
 import shutil
 from contextlib import chdir
@@ -10,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import islands
 from islands.cli import options
 from islands.cli.output_folder import check_folder
 from islands.errors import IslandsError, SettingsError
@@ -43,10 +41,6 @@ def undrawn():
 def run(command_line):
     """Run a command in a temporary folder; return exit code, standard output, standard error."""
     return command_line
-
-
-def test_the_version_is_that_of_the_package(run):
-    assert run("--version")[:2] == (0, f"islands {islands.__version__}\n")
 
 
 FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")
@@ -104,12 +98,6 @@ def test_malformed_rows_are_rejected(text):
 # Output folders.
 
 
-def test_new_folder_and_folder_without_result_are_accepted(tmp_path):
-    check_folder(tmp_path, force=False)
-    check_folder(tmp_path / "new" / "deeper", force=False)
-    assert not (tmp_path / "new").exists()
-
-
 def test_result_is_replaced_only_with_force(tmp_path):
     (tmp_path / "result.json").write_text("{}")
     with pytest.raises(SettingsError, match="holds a result already: give another --out, or --force"):
@@ -134,27 +122,6 @@ def test_read_only_folder_is_rejected(tmp_path, monkeypatch):
 
 
 # Commands.
-
-
-def test_fit_prints_the_models_and_the_output_folder(fitted):
-    out = fitted
-    evaluations = json.loads(Path("out/result.json").read_text())["search"]["evaluations"]
-    method = Path("out/method.txt").read_text()
-    assert method.startswith("120 samples, 0.01 s: u_V to y_um\n")
-    assert f"{evaluations} models estimated: {evaluations} ok" in method
-    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
-    assert Path("out/summary.txt").read_text() in out
-    assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
-
-
-@pytest.mark.ci
-def test_force_replaces_a_result_and_all_its_models(run, fitted):
-    assert len(list(Path("out/models").iterdir())) == 3
-    code, _, err = run(*FIT)
-    assert code == 2
-    assert "--force" in err
-    assert run(*FIT, "--force", "--max-terms", "1")[0] == 0
-    assert [path.name for path in Path("out/models").iterdir()] == ["01.json"]
 
 
 def test_simulate_reads_the_columns_of_the_model(run, fitted):
@@ -190,21 +157,6 @@ def test_simulate_writes_prediction_bands(run, fitted):
     assert (code, "need a model of a result folder" in error) == (2, True)
 
 
-@pytest.mark.ci
-def test_simulate_prints_the_errors_that_the_result_reports(run, fitted):
-    result = json.loads(Path("out/result.json").read_text())
-    files = {f"out/models/{entry['rank']:02d}.json": entry for entry in result["models"]}
-    files["out"] = result["models"][result["recommended"]["rank"] - 1]
-    assert min(read_model(path).maximum_lag for path in Path("out/models").iterdir()) < 3
-    for path, entry in files.items():
-        for mode, name in (("free-run", "free_run"), ("shooting", "multiple_shooting")):
-            code, out, _ = run("simulate", path, "r.csv", "--rows", "90:120", "--mode", mode)
-            errors = entry["metrics"]["validation"][name]
-            assert code == 0
-            assert f"{mode} after a warm-up of {entry['warm_up']} samples: ok" in out
-            assert f"MAPE {errors['mape']:.4f} %  R2 {errors['r2']:.5f}  RMSE {errors['rmse']:.6g} um" in out
-
-
 def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(run, fitted):
     shutil.copyfile("out/models/01.json", "model.json")
     lag = read_model("model.json").maximum_lag
@@ -230,16 +182,6 @@ def test_simulate_averages_a_record_for_a_model_of_means(run, name):
     assert time == pytest.approx(0.015 + 0.04 * np.arange(1, 30))
 
 
-def test_simulate_states_that_a_record_at_the_rate_of_the_model_is_not_averaged(run):
-    model = make_model([(parse("u(k-1)"), 2.0)], ("u_V",), "y_um", 0.04)
-    write_model(replace(model, average=4), "model.json")
-    write_record(replace(record(), dt=0.04), "r.csv")
-    code, out, _ = run("simulate", "model.json", "r.csv")
-    assert code == 0
-    assert "the record has the sampling time of the model, 0.04 s, and its samples are read as they" in out
-    assert "as in the model" not in out
-
-
 def test_simulate_takes_a_record_whose_output_has_its_first_values_only(run, fitted):
     """A record to predict has no output: the message says how a free run gets its first values."""
     lines = Path("r.csv").read_text().splitlines()
@@ -255,16 +197,6 @@ def test_simulate_takes_a_record_whose_output_has_its_first_values_only(run, fit
     assert np.isfinite(np.loadtxt("s.csv", delimiter=",", skiprows=4)).all()
 
 
-def test_simulate_states_inputs_beyond_the_estimation_data(run, fitted):
-    assert "extrapolation" not in run("simulate", "out", "r.csv", "--rows", "0:90")[1]
-    write_record(replace(record(), u=100.0 * record().u), "large.csv")
-    code, out, _ = run("simulate", "out", "large.csv")
-    assert code == 0
-    assert "extrapolation: u_V is" in out
-    assert "in the record and" in out
-    assert ("diverged" in out) == ("MAPE" not in out)
-
-
 def test_simulate_rejects_another_sampling_time(run):
     write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
     code, _, err = run("simulate", "published:12", "slow.csv")
@@ -278,13 +210,6 @@ def test_systems_make_writes_into_a_folder_with_brackets(run):
     code, out, _ = run("systems", "make", "s1", "--out", "[red]/a[b].csv")
     assert code == 0
     assert out.startswith("[red]/a[b].csv: 500 samples, ")
-
-
-def test_help_lists_the_commands(run):
-    code, out, _ = run("--help")
-    assert code == 0
-    for name in ("fit", "simulate", "show", "demo", "systems"):
-        assert name in out
 
 
 def test_an_export_is_written_to_a_file(run, tmp_path):
@@ -315,13 +240,6 @@ def test_error_message_with_brackets_is_printed_verbatim(run, arguments, message
     assert err.startswith("error: ")
     assert message in err
     assert "Traceback" not in err
-
-
-def test_model_is_shown_with_its_columns_in_80_columns(run):
-    lines = run("show", "published:12")[1].splitlines()
-    assert lines[0].startswith("y_um(k) =")
-    assert len(lines) == 7
-    assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.parametrize(

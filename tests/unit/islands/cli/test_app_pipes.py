@@ -8,8 +8,7 @@ import sys
 import pytest
 
 from islands.cli.console import CLOSED_OUTPUT
-from islands_api.cli.app import COMMANDS
-from support.command_line import ISLANDS, islands
+from support.command_line import ISLANDS
 
 
 @pytest.mark.ci
@@ -59,10 +58,3 @@ def test_a_signal_after_the_end_of_a_command_does_not_change_its_exit_code() -> 
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=10)
     assert (err, process.returncode) == ("", 0)
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_mistyped_command_suggests_the_command(name: str) -> None:
-    found = islands(name + name[-1])
-    assert found.exit_code == 2
-    assert f"Did you mean '{name}'" in " ".join(found.output.split())

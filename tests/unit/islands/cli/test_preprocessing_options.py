@@ -1,5 +1,3 @@
-import json
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ from islands.records.signal_map import match_rate
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.factory import make_simulator
-from support.command_line import fail, stored, succeed
+from support.command_line import fail, succeed
 from support.exported_programs import run_c
 from support.undrawn import undrawn_figures
 
@@ -51,13 +49,6 @@ def folder(tmp_path_factory):
     with undrawn_figures():
         succeed("fit", record, *columns, *steps, "--max-terms", "4", "--out", folder / "out")
     return folder
-
-
-def test_result_states_the_steps(folder):
-    preprocessing = stored(folder / "out")["preprocessing"]
-    assert preprocessing["steps"]["steps"] == {"lowpass": None, "decimate": 4, "detrend": "constant"}
-    assert preprocessing["steps"]["output_offset"] == pytest.approx(7.0, abs=0.3)
-    assert preprocessing["dt"] == pytest.approx(0.04)
 
 
 def test_simulation_repeats_the_steps_and_restores_the_offset(folder):
@@ -129,14 +120,6 @@ def test_a_model_without_steps_may_read_a_record_less_its_means(folder, tmp_path
     np.testing.assert_allclose(*simulated, atol=1e-9)
     message = fail("simulate", folder / "out", record, "--detrend", "constant")
     assert "a model that states its preprocessing reads the record as measured" in message
-
-
-def test_a_result_without_steps_has_none(tmp_path):
-    record = write(tmp_path / "r.csv", 0)
-    options = ("--input", "u_V", "--output", "y_um", "--max-terms", "2", "--out", tmp_path / "out")
-    with undrawn_figures():
-        succeed("fit", record, *options)
-    assert json.loads((tmp_path / "out" / "result.json").read_text())["preprocessing"]["steps"] is None
 
 
 def test_wrong_values_are_errors_of_one_line(tmp_path):

@@ -1,11 +1,9 @@
 """Recordings of a command: joined in the given order, with validation data from each or from another file."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from islands.cli.recordings import Recordings, state_extrapolation
+from islands.cli.recordings import Recordings
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_inputs
@@ -74,13 +72,3 @@ def test_an_input_is_read_early_behind_the_filter(files, steps):
 def test_validation_rows_must_not_overlap_estimation_rows(files, text, used):
     with pytest.raises(SettingsError, match="give --rows START:STOP, other samples for estimation"):
         recordings(files, "r.csv").read_held_out(text, used)
-
-
-def test_inputs_outside_of_the_estimation_range_are_stated(capsys):
-    data, wide = record(), record(60, 1)
-    state_extrapolation(data, 0.25)
-    assert capsys.readouterr().err == ""
-    wide = replace(wide, u=10.0 * wide.u)
-    state_extrapolation(data, wide)
-    low, high = wide.u.min(), wide.u.max()
-    assert f"Validation extrapolates: u_V is {low:.4g} to {high:.4g} in" in capsys.readouterr().err

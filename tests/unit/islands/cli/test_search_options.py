@@ -1,11 +1,9 @@
 """Options of a search: generated from the fields of `Settings`."""
 
-from typing import Any
-
 import typer
 from typer.testing import CliRunner
 
-from islands.cli.search_options import DEFAULTS, SETTINGS, SearchOptions, with_search_options
+from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_options
 
 
 def run(*words: str) -> SearchOptions:
@@ -21,18 +19,6 @@ def run(*words: str) -> SearchOptions:
     result = CliRunner().invoke(app, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return found[0]
-
-
-def parameters() -> dict[str, Any]:
-    """Return the parameters of such a command, by name."""
-
-    @with_search_options
-    def command(search: SearchOptions = DEFAULTS) -> None:
-        pass
-
-    app = typer.Typer(add_completion=False)
-    app.command()(command)
-    return {each.name: each for each in typer.main.get_command(app).params}
 
 
 def test_command_without_options_receives_the_defaults() -> None:
@@ -75,12 +61,6 @@ def test_every_switch_of_the_search_is_one_option() -> None:
         "niches": False,
         "err_target": "increment",
     }
-
-
-def test_options_lie_between_preset_and_seed_in_declared_order() -> None:
-    names = list(parameters())
-    assert names == ["preset", *SETTINGS, "seed"]
-    assert names[names.index("max_height") + 1] == "shooting"
 
 
 def test_tuples_are_repeatable_and_unions_are_text() -> None:

@@ -2,17 +2,15 @@
 
 from dataclasses import replace
 from io import StringIO
-from math import inf
 
 import pytest
 from rich.console import Console
 
 from islands.cli import progress_display
 from islands.cli import search_progress as showing
-from islands.cli.search_progress import SHOWN_ISLANDS, SearchDisplay
+from islands.cli.search_progress import SearchDisplay
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.history import HistoryPoint
-from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 
@@ -67,63 +65,6 @@ def test_display_has_generation_speed_time_left_and_best_by_size(displayed):
     assert 0.0 < found[0][1] < found[1][1] < 1.0
 
 
-def test_time_left_counts_all_islands(displayed):
-    states = (at(0, 150, [0.25] * 3), at(2, 450, [0.25] * 3))
-    # 300 in 4 s; 18 generations of three times 50.
-    text, _, _, left = displayed(Settings(population=50, generations=20, islands=3), *states)[1]
-    one = displayed(Settings(population=50, generations=20), at(0, 50, [0.25]), at(2, 150, [0.25]))[1][3]
-    assert "75/s" in text
-    assert 36.0 < left < one
-
-
-def test_search_without_generations_is_displayed(displayed):
-    assert 0.0 < displayed(Settings(generations=0), at(0, 50, [0.25]))[0][1] < 1.0
-
-
-def test_each_island_has_its_best_error_and_its_age(displayed):
-    state = at(3, 50, [4.0, 1.0, inf], [1.0, 1.0, inf], [1.0, 1.0, inf], [0.25, 1.0, inf])
-    assert displayed(Settings(islands=3), state)[0][2][1:] == [
-        "  island   0  RMSE 0.5, for 0 generations",
-        "  island   1  RMSE 1, for 3 generations",
-        "  island   2  no model yet, for 3 generations",
-    ]
-
-
-def test_age_of_an_error_is_counted_in_generations(displayed):
-    """Epochs have several generations, and the history may begin at any generation."""
-    settings = Settings(islands=2)
-    state = at(20, 50, [2.25, 9.0], [1.0, 9.0], [1.0, 4.0], [1.0, 4.0])
-    assert displayed(settings, state)[0][2][1:] == [
-        "  island   0  RMSE 1, for 2 generations",
-        "  island   1  RMSE 2, for 1 generations",
-    ]
-
-
-def test_single_island_is_not_listed(displayed):
-    assert displayed(Settings(), at(0, 50, [0.25]))[0][2][1:] == []
-
-
-def test_largest_number_of_islands_is_listed_completely(displayed):
-    lines = displayed(Settings(islands=SHOWN_ISLANDS), at(0, 50, [1.0] * SHOWN_ISLANDS))[0][2][1:]
-    assert [line.split()[1] for line in lines] == [str(island) for island in range(SHOWN_ISLANDS)]
-
-
-def test_best_of_many_islands_are_listed_and_the_others_counted(displayed):
-    many = 2 * SHOWN_ISLANDS + 3
-    # The error falls from the first to the last island; the first has no model.
-    least = [inf, *(float(many - island) for island in range(1, many))]
-    lines = displayed(Settings(islands=many), at(0, 50, least))[0][2][1:]
-    assert [int(line.split()[1]) for line in lines[:-1]] == list(range(many - SHOWN_ISLANDS, many))
-    assert lines[-2] == f"  island  {many - 1}  RMSE 1, for 0 generations"
-    assert lines[-1] == f"  and {many - SHOWN_ISLANDS} more"
-
-
-def test_first_of_equally_good_islands_are_listed(displayed):
-    lines = displayed(Settings(islands=SHOWN_ISLANDS + 1), at(0, 50, [1.0] * (SHOWN_ISLANDS + 1)))[0][2][1:]
-    assert [int(line.split()[1]) for line in lines[:-1]] == list(range(SHOWN_ISLANDS))
-    assert lines[-1] == "  and 1 more"
-
-
 def test_lines_below_the_bar_are_verbatim_and_erased_at_the_end(monkeypatch):
     stream = StringIO()
     monkeypatch.setattr(progress_display, "errors", Console(file=stream, force_terminal=True, width=100))
@@ -135,10 +76,3 @@ def test_lines_below_the_bar_are_verbatim_and_erased_at_the_end(monkeypatch):
     assert shown.index("generation 3") < shown.index("island 0 [red]") < shown.index("island 1")
     # Each line is erased at the end (cursor up, erase).
     assert shown.rindex("\x1b[2K") > shown.rindex("island 1")
-
-
-def test_latent_models_are_displayed_by_parameters_on_their_front(displayed):
-    best = {12: 4.0, 5: 9.0, 16: 4.5, 19: 0.25}
-    state = replace(at(0, 48, [0.25]), history=(HistoryPoint(0, 48, best, (0.25,)),))
-    ((_, _, lines, _),) = displayed(resolve_settings("latent", {"islands": 1}), state)
-    assert lines == ["  RMSE by parameters  5:3 12:2 19:0.5"]

@@ -114,17 +114,6 @@ def test_clean_surrogates_do_not_contain_the_named_effect(diagnosis: Diagnosis) 
 
 
 @pytest.mark.ci
-def test_injection_at_nominal_values_does_not_change_the_surrogate(
-    surrogates: Surrogates, effects: Sequence[Effect]
-) -> None:
-    clean = surrogates.draw_record(SurrogateCase(None, 7)).y
-    for effect in effects:
-        nominal = tuple(each.nominal for each in effect.parameters(surrogates.simulation.context))
-        nothing = Injection(effect.name, nominal, 0.0, "", 0.0)
-        assert np.array_equal(surrogates.draw_record(SurrogateCase(nothing, 7)).y, clean), effect.name
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.nightly)])
 def test_stronger_injection_has_a_larger_misfit(
     surrogates: Surrogates, effects: Sequence[Effect], seed: int
@@ -214,12 +203,6 @@ def test_result_does_not_depend_on_the_order_of_evaluation(
 
 
 @pytest.mark.ci
-def test_result_depends_on_the_seed(column: tuple[Diagnosis, RecordedOutput], tested: SelfTest) -> None:
-    other = self_test(*column, seed=4, effects=INJECTED[-1:], clean_surrogates=0)
-    assert other.detection_limits[INJECTED[-1]] != tested.detection_limits[INJECTED[-1]]
-
-
-@pytest.mark.ci
 def test_detection_limit_does_not_depend_on_other_effects(
     column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
@@ -277,16 +260,6 @@ def test_detection_limit_is_the_smallest_recognised_strength(
             assert limit is not None
             assert limit.misfit == pytest.approx(STRENGTHS[first], rel=0.02)
         assert len(evaluated) <= 4
-
-
-@pytest.mark.ci
-def test_progress_counts_the_completed_analyses(diagnosis: Diagnosis) -> None:
-    reports: list[tuple[str, float | None]] = []
-    self_test(
-        *(diagnosis, SIMULATOR, TOLERANCE, 0, stub_map(NOTHING, 0.0), ("offset",), 2),
-        progress=lambda message, fraction=None: reports.append((message, fraction)),
-    )
-    assert reports == [(f"{ended} of 6 analyses", ended / 6) for ended in range(1, 7)]
 
 
 @pytest.mark.ci

@@ -10,7 +10,6 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
-from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
 from support.simulated_records import recorded
 
 SAMPLES, DT = 400, 0.1
@@ -86,11 +85,6 @@ def test_extended_simulation_of_a_creep_test_repeats_the_creep() -> None:
         extended_document(found.best, found.record), record, columns={"theirs": 0.8 * record.u[:, 0]}
     )
     np.testing.assert_allclose(repeated.y, found.best.output, rtol=1e-9)
-
-
-@pytest.mark.ci
-def test_figures_show_a_resting_record(crept: islands.DiagnosisResult) -> None:
-    assert all(draw(crept).axes for draw in DIAGNOSIS_FIGURES.values())
 
 
 def test_output_that_rests_at_a_held_input_has_lost_no_samples() -> None:

@@ -9,10 +9,6 @@ import pytest
 
 import islands
 from islands.errors import RecordError, SettingsError
-from islands.facade.fit import fit_record
-from islands.facade.identify import identify_record
-from islands.models.equations import equation, latex_equation
-from islands.progress import StoppedError
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import record_document, result_document, result_json
 from islands.report.figures.names import ALL_FIGURES
@@ -77,28 +73,6 @@ def test_an_extrapolating_validation_is_a_warning_before_the_fit() -> None:
         islands.fit(data, validation=within, **settings)
 
 
-@pytest.mark.parametrize("search", [fit_record, identify_record])
-def test_a_caller_that_states_an_extrapolation_itself_is_not_warned(search) -> None:
-    data = tank()
-    wide = Dataset(3.0 * data.u[:100], data.y[:100], data.dt)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises(StoppedError):
-            search(data, wide, stop=lambda: True)
-
-
-def test_best_model_has_the_documented_attributes(result):
-    best = result.best
-    assert best.equation.startswith("y(k) = 1*y(k-1) ")
-    assert best.latex.startswith("y_{k} = 1 ")
-    assert best.metrics["validation"]["free_run"].mape < 1.0
-    assert best.physics.property_1 is True
-    assert isinstance(best.residual_tests.passed, bool)
-    assert (best.equation, best.latex) == (equation(best.model), latex_equation(best.model))
-    assert str(best) == best.equation
-    assert (best.model.input_names, best.model.output_name, best.model.dt) == (("u_V",), "y_um", 0.01)
-
-
 def test_models_are_ordered_by_error_and_have_ranks(result):
     assert [model.rank for model in result.models] == [1, 2, 3, 4, 5]
     assert result.best.model == result.models[result.recommendation.rank - 1].model
@@ -142,31 +116,6 @@ def test_free_run_uses_measured_outputs_only_in_the_warm_up(result):
 KINDS = ("free-run", "loop", "hold", "residuals")
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("kind", KINDS)
-def test_model_draws_every_figure(result, kind):
-    figure = result.best.plot(kind)
-    assert figure.axes
-    assert any(axes.get_lines() or axes.collections for axes in figure.axes)
-
-
-def test_unknown_figure_raises_settings_error(result):
-    with pytest.raises(SettingsError, match=r"unknown figure 'pie': take one of free-run, structure, "):
-        result.best.plot("pie")
-
-
-def test_model_is_exported_and_read_back(result, tmp_path):
-    assert result.best.export("plain") == result.best.equation
-    assert result.best.export("latex") == result.best.latex
-    namespace = {}
-    exec(result.best.export(), namespace)
-    record, lag = piezo(100, seed=9), result.best.model.maximum_lag
-    simulated = namespace["simulate"](record.u[:, 0].tolist(), record.y.tolist())
-    assert simulated[lag:] == result.best.simulate(record, warm_up=lag).y[lag:].tolist()
-    (tmp_path / "model.json").write_text(result.best.export("json"))
-    assert islands.read_model(tmp_path / "model.json") == result.best.model
-
-
 def test_result_is_saved_as_a_folder(result, tmp_path):
     with undrawn_figures():
         folder = result.with_wall_time(2.0).save(tmp_path / "new" / "out")
@@ -195,46 +144,6 @@ def test_equal_arguments_give_equal_bits(result):
     assert [model.export("json") for model in again.models] == [
         model.export("json") for model in result.models
     ]
-
-
-@pytest.mark.ci
-def test_seed_is_stored_and_does_not_affect_the_models():
-    first, second = (islands.fit(tank(), library="polynomial", max_terms=3, seed=seed) for seed in (1, 2))
-    assert (first.search_result.seed, second.search_result.seed) == (1, 2)
-    assert [model.model for model in first.models] == [model.model for model in second.models]
-
-
-def test_result_has_the_values_of_default_settings():
-    settings = dict(islands.fit(tank(), library="polynomial", max_terms=2).search_result.settings)
-    assert settings == {
-        "method": "fit",
-        "library": "polynomial",
-        "degree": 3,
-        "lags": 3,
-        "delays": (),
-        "max_terms": 2,
-        "constraints": "none",
-        "estimator": "",
-        "refit": "none",
-        "average": "auto",
-        "feedthrough": "auto",
-        "shooting": 30,
-        "certificate": 10_000,
-        "validation": 0.25,
-    }
-    changes = {"degree": 2, "lags": 1, "constraints": "hysteresis", "shooting": 8}
-    asked = islands.fit(tank(), library="polynomial", max_terms=2, **changes).search_result
-    assert {name: asked.settings[name] for name in changes} == changes
-    assert asked.search.full_set == {"candidates": 6, "bytes": 8 * 6 * 299}
-
-
-def test_settings_may_be_numpy_numbers(tmp_path):
-    numbers = {"validation": np.float64(0.5), "max_terms": np.int64(2), "seed": np.int64(3)}
-    made = islands.fit(tank(), library="polynomial", **numbers)
-    with undrawn_figures():
-        made.save(tmp_path)
-    saved = json.loads((tmp_path / "result.json").read_text())
-    assert (saved["settings"]["max_terms"], saved["settings"]["validation"], saved["seed"]) == (2, 0.5, 3)
 
 
 # Validation data.
@@ -412,14 +321,6 @@ def test_too_short_record_raises_an_error_with_advice(samples, error, message):
 @pytest.mark.ci
 def test_shortest_possible_record_is_fitted():
     assert islands.fit(tank(24), library="polynomial").models
-
-
-def test_output_of_zeros_raises_settings_error():
-    zeros = with_output(tank(), np.zeros(400))
-    with pytest.raises(
-        SettingsError, match=r"no model could be estimated: no term of the library reduces the error"
-    ):
-        islands.fit(zeros, library="polynomial")
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(0, 0.003), pytest.param(4, 0.01, marks=pytest.mark.ci)])

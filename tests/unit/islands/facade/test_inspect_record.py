@@ -6,10 +6,8 @@ import pytest
 
 import islands
 from islands.cli.options import columns
-from islands.errors import RecordError
 from islands.records.inspection.findings import SCHEMA
 from islands.records.reading.options import ReadingOptions
-from islands.report.text.inspection import WIDTH, format_inspection
 from support.known_records import delay, lag, measure, steps
 from support.parsed_files import list_parsed
 
@@ -58,13 +56,6 @@ def test_gaps_are_reported_with_rows_and_no_fact_reads_across_them(tmp_path):
     assert found.find("dead-time").value == 4
 
 
-def test_gaps_are_repaired_as_for_identify(tmp_path):
-    file = write(tmp_path / "r.csv", drop=range(400, 420))
-    found = islands.inspect_record(file, reading=ReadingOptions(gaps="interpolate"))
-    assert found.record.segments == (1500,)
-    assert "--gaps interpolate" in found.command
-
-
 @pytest.mark.parametrize("rows_between", [False, True])
 def test_columns_of_different_rates_are_described_at_their_common_clock(tmp_path, rows_between):
     """The input has five samples for one of the output, at the same times or between them."""
@@ -106,45 +97,6 @@ def test_the_suggested_command_can_read_the_record(tmp_path, change, option):
     assert islands.read_record(file, ["u_V"], "y_um", **repair).samples > 1400
 
 
-def test_missing_inputs_cut_the_record(tmp_path):
-    found = islands.inspect_record(write(tmp_path / "r.csv", blank=range(700, 705)))
-    assert found.columns[1].missing == 5
-    assert found.record.segments == (700, 795)
-    assert any("line 702" in warning for warning in found.warnings)
-
-
-def test_repeated_time_stamps_are_reported(tmp_path):
-    stamps = 0.1 * np.arange(1500)
-    stamps[200] = stamps[199]
-    found = islands.inspect_record(write(tmp_path / "r.csv", stamps))
-    assert found.sampling.repeated == ("line 202",)
-
-
-def test_unknown_sampling_time_counts_samples(tmp_path):
-    file = write(tmp_path / "r.csv", header="k,u_V,y_um")
-    found = islands.inspect_record(file)
-    assert found.sampling.dt is None
-    assert found.find("dead-time").value == 4
-    assert "--dt SECONDS" in found.command
-    assert islands.inspect_record(file, dt=0.1).sampling.dt == 0.1
-
-
-def test_rows_select_samples(tmp_path):
-    found = islands.inspect_record(write(tmp_path / "r.csv"), rows=slice(100, 900))
-    assert found.record.samples == 800
-    assert "--rows 100:900" in found.command
-
-
-def test_errors_are_those_of_reading(tmp_path):
-    file = write(tmp_path / "r.csv")
-    for path, choice in ((tmp_path / "none.csv", {}), (file, {"inputs": ["v"], "output": "y_um"})):
-        with pytest.raises(RecordError) as inspected:
-            islands.inspect_record(path, **choice)
-        with pytest.raises(RecordError) as read:
-            islands.read_record(path, **({"inputs": ["u_V"], "output": "y_um"} | choice))
-        assert str(inspected.value) == str(read.value)
-
-
 def test_a_record_in_memory_has_the_same_facts(tmp_path):
     file = write(tmp_path / "r.csv")
     record = islands.read_record(file, ["u_V"], "y_um")
@@ -158,15 +110,6 @@ def test_the_document_is_json(tmp_path):
     assert {fact["name"] for fact in document["facts"]} >= {"dead-time", "rest", "noise"}
 
 
-def test_text_has_80_columns(tmp_path):
-    long = "t_s,u_" + "very_long_name_" * 5 + "V,y_um"
-    for options in ({}, {"header": long}, {"drop": range(100, 900, 50)}):
-        text = format_inspection(islands.inspect_record(write(tmp_path / "r.csv", **options)))
-        lines = [line for line in text.splitlines() if "very_long" not in line and str(tmp_path) not in line]
-        assert max(map(len, lines)) <= WIDTH
-        assert "Next:" in text
-
-
 def test_a_column_of_dates_is_read_with_that_of_the_time_of_day(tmp_path):
     """It was stated as unusable, with the advice to rename it."""
     lines = ["Datum;Uhrzeit;u;y"]
@@ -178,15 +121,6 @@ def test_a_column_of_dates_is_read_with_that_of_the_time_of_day(tmp_path):
     found = islands.inspect_record(tmp_path / "r.txt")
     assert [(column.role, column.problem) for column in found.columns[:2]] == [("date", ""), ("time", "")]
     assert found.sampling.dt == 2.0
-
-
-def test_long_names_with_equal_beginnings_differ_in_the_table(tmp_path):
-    names = [f"Temp (LGR S/N: 10412233, LBL: {place})" for place in ("room", "outdoor")]
-    path = tmp_path / "r.csv"
-    rows = [f"{k},{k % 7},{k % 11}" for k in range(60)]
-    path.write_text("\n".join([f't_s,"{names[0]}","{names[1]}"', *rows]) + "\n")
-    table = format_inspection(islands.inspect_record(path)).splitlines()[3:6]
-    assert [line[:28].rstrip()[-6:] for line in table] == ["t_s", " room)", "tdoor)"]
 
 
 def test_a_remedy_makes_the_record_usable_and_has_no_problem_left(tmp_path):
@@ -206,10 +140,3 @@ def test_a_remedy_makes_the_record_usable_and_has_no_problem_left(tmp_path):
     # Rows are counted from the beginning of the file.
     part = islands.inspect_record(tmp_path / "a.csv", ["u"], "y", rows=slice(50, 200))
     assert [note.rows for note in part.notes if note.is_problem] == [(100,)]
-
-
-def test_the_text_says_why_columns_are_unusable_if_none_can_be_chosen(tmp_path):
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join(["t,u,y", *(f"{k},a{k},{k % 3}" for k in range(90))]) + "\n")
-    text = " ".join(format_inspection(islands.inspect_record(path)).split())
-    assert "r.csv, line 2, column u: 'a0' is not a number: correct the cell" in text

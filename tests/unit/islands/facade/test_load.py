@@ -10,7 +10,6 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.persistence.models import write_model
 from islands.records.writer import write_record
@@ -90,23 +89,6 @@ def test_a_result_simulates_as_the_command(base, tmp_path, name, arguments):
     printed = command(folder / "models" / f"{last.rank:02d}.json", base / "r.csv", "--bands", "0.8", out=out)
     np.testing.assert_array_equal(bands_of(last, record, 0.8), printed)
     assert loaded.export("c") == succeed("show", folder, "--format", "c")
-
-
-@pytest.mark.ci
-def test_two_outputs_simulate_as_the_command(base, tmp_path):
-    folder, out = tmp_path / "result", tmp_path / "s.csv"
-    search = ("--lags", "2", "--degree", "1", "--max-terms", "4", "--certificate", "0", "--average", "1")
-    with undrawn_figures():
-        succeed("fit", base / "masses.csv", "--input", "u", "--output", "y1,y2", *search, "--out", folder)
-    record = islands.CoupledRecord(
-        tuple(islands.read_record(base / "masses.csv", "u", name) for name in ("y1", "y2"))
-    )
-    for path in (folder, folder / "model.json", folder / "result.json"):
-        loaded = islands.load(path)
-        assert isinstance(loaded, FittedCoupledModel)
-        printed = command(path, base / "masses.csv", out=out)
-        np.testing.assert_array_equal(loaded.simulate(record).y.T, printed)
-    assert isinstance(islands.load(folder / "outputs" / "1-y1"), islands.Result)
 
 
 @pytest.mark.ci

@@ -14,7 +14,6 @@ from islands.facade.refit import join_data, refit_models
 from islands.persistence.models import read_validated_model
 from islands.progress import Steps
 from islands.records.dataset import Dataset
-from islands.report.documents.result_folder import result_document
 from islands.report.figures.registry import FIGURES
 from islands.report.text.headlines import write_headline
 from islands.report.text.statements import BEFORE_REFIT, describe, name_statements
@@ -65,12 +64,6 @@ def test_a_refit_changes_neither_the_ranking_nor_any_error(estimator):
     assert found.best.model != without.best.model
 
 
-def test_equal_calls_have_equal_results():
-    record = make_noisy_record("output", 2, 400)
-    one, other = (json.dumps(result_document(fit_law(record).search_result)) for _ in range(2))
-    assert one == other
-
-
 def test_least_squares_of_all_samples_are_the_parameters_of_a_refit():
     record = make_noisy_record("equation", 3, 400)
     found = find_law(fit_law(record, estimator="least-squares"))
@@ -96,19 +89,6 @@ def test_parameters_that_increase_the_error_on_all_data_are_discarded():
         else:
             assert after <= 1.05 * before
     assert states == {True, False}
-
-
-def test_a_summary_states_why_a_refit_is_discarded():
-    record = make_noisy_record("output", 4, 300)
-    found = fit_law(record, lags=2, max_terms=6, estimator="least-squares").search_result
-    entry = next(each for each in found.models if each.refit.discarded)
-    document = result_document(replace(found, models=(entry,)))
-    assert {"discarded-refit", "refit"}.intersection(name_statements(document)) == {"discarded-refit"}
-    assert "Refit: discarded, the parameters are those of the estimation data. With estimation and " in (
-        words := " ".join(describe(document))
-    )
-    assert entry.refit.discarded in words
-    assert BEFORE_REFIT not in write_headline(document)
 
 
 @pytest.mark.parametrize("statements", ["fixed-point = 0, 0; gain = 3", "[u(k-1)] >= 0; gain = 3"])

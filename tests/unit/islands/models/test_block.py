@@ -38,12 +38,6 @@ def test_an_unknown_format_names_the_others() -> None:
     assert all(export(renamed, kind) for kind in EXPORTS)
 
 
-def test_a_sampling_time_is_stated_without_its_rounding_error() -> None:
-    """It was 0.09999999999999999 s."""
-    made = CoupledModel(tuple(replace(each, dt=0.3 - 0.2) for each in TWO_MASSES.models))
-    assert "sampling time 0.1 s." in export(made, "c")
-
-
 def test_a_state_space_starts_at_rest_at_its_operating_point() -> None:
     block = measured_block(OF_BLOCKS["state space of deviations"])
     y, *states, u = block.start_values()

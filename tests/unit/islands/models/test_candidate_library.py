@@ -8,7 +8,7 @@ import pytest
 from islands.errors import SettingsError
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply
-from islands.models.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, get_library
+from islands.models.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set
 from islands.models.clusters import steady_state
 from islands.models.narx import canonical_order
 
@@ -96,13 +96,6 @@ def test_polynomial_library_is_the_full_set():
     assert len(candidates("polynomial", 3, 3, 1)) == full_set(3, 3, 3) == 84
 
 
-def test_library_defaults_match_the_documentation():
-    phi, polynomial = LIBRARIES["phi-polynomial"], LIBRARIES["polynomial"]
-    assert (phi.degree, phi.lags, phi.constraints) == (5, 3, "hysteresis")
-    assert (polynomial.degree, polynomial.lags, polynomial.constraints) == (3, 3, "none")
-    assert len(candidates("phi-polynomial", phi.degree, phi.lags, 1)) == 1 + 6 * comb(4 + 2, 2)
-
-
 def test_phi_polynomial_candidates_only_use_the_paper_s_functions():
     found = candidates("phi-polynomial", 3, 3, 1)
     used = {node.primitive.name for item in found for node in _find_calls(item.expression)}
@@ -148,13 +141,3 @@ def test_candidate_limit_applies_to_the_library_not_the_full_set():
     # The full set has 435 897 monomials of degree 5 in 16 + 16 lags; phi-polynomial has a hundredth of them.
     assert full_set(5, 16, 16) == 435_897
     assert len(candidates("phi-polynomial", 5, 16, 1)) == 1 + 15 * 16 * 15 == 3601 <= MAX_CANDIDATES
-
-
-@pytest.mark.parametrize("look_up", [get_library, lambda name: candidates(name, 2, 2, 1)])
-def test_unknown_library_error_lists_the_known_libraries(look_up):
-    with pytest.raises(SettingsError) as caught:
-        look_up("wavelets")
-    assert (
-        str(caught.value)
-        == "unknown library 'wavelets': take one of phi-polynomial, polynomial, friction, magnitude"
-    )

@@ -10,7 +10,7 @@ from islands.errors import ModelError
 from islands.export import export
 from islands.expressions.parsing import parse
 from islands.models.coupled_narx import CoupledModel
-from islands.models.equations import mathml_equation, named_signals
+from islands.models.equations import mathml_equation
 from islands.models.narx import make_model
 from islands.models.signal_statement import describe_signals
 from islands.records.averaging import average_samples
@@ -60,12 +60,6 @@ def test_every_text_of_an_equation_has_the_statement(steps, expected):
     assert (rf"\text{{where {expected}}}" in export(model, "latex")) == bool(expected)
     rows = [each.text for each in ElementTree.fromstring(mathml_equation(model)).iter("mtext")]
     assert " ".join(rows) == (f"where {expected}" if expected else "")
-
-
-def test_the_names_are_those_of_the_equation():
-    assert named_signals(model_of((("detrend", "constant"),))) == (
-        "level is the deviation from 3.25 cm, pump from 4.5 V"
-    )
 
 
 def coupled(steps):

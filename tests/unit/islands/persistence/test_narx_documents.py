@@ -90,19 +90,6 @@ def halved(a):
 # The file.
 
 
-def test_a_model_file_has_schema_columns_sampling_time_terms_and_equation():
-    model = PUBLISHED["12"].model
-    fields = json.loads(model_json(model))
-    assert list(fields) == ["schema", "inputs", "output", "dt", "average", "equation", "latex", "terms"]
-    assert fields["schema"] == "islands.model/1"
-    assert (fields["inputs"], fields["output"], fields["dt"]) == (["u_V"], "y_um", 1e-3)
-    assert fields["equation"].startswith("y(k) = 1*y(k-1)")
-    assert fields["latex"].startswith("y_{k} = 1 ")
-    assert fields["terms"] == terms_document(model)
-    assert fields["terms"][0] == {"regressor": "y(k-1)", "parameter": 1.0, "standard_error": None}
-    assert len(fields["terms"]) == 6
-
-
 def test_a_model_file_does_not_depend_on_the_machine(tmp_path, monkeypatch):
     model = PUBLISHED["13"].model
     texts = []
@@ -114,11 +101,6 @@ def test_a_model_file_does_not_depend_on_the_machine(tmp_path, monkeypatch):
         texts.append(Path("model.json").read_bytes())
     assert texts[0] == texts[1]
     assert str(tmp_path).encode() not in texts[0]
-
-
-def test_equation_and_latex_are_never_read_back():
-    model = model_from_json(document(equation="y(k) = 7", latex="nonsense"))
-    assert model == model_from_json(document())
 
 
 def test_terms_may_be_in_any_form():

@@ -5,20 +5,16 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 import structlog
 
-from islands.evolution.engine import SerialEngine
-from islands.records.reading.preview import preview
 from islands.report.documents.result_folder import result_document
 from islands.report.text.statements import describe
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import CoordinatorStopping, JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.domain.free_runs import write_free_run
 from islands_service.domain.job import (
     SEARCH_FREE_RUN,
     Job,
@@ -31,7 +27,7 @@ from islands_service.domain.job import (
 from islands_service.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import StorageFullError, StoreUnavailableError
+from islands_service.store.database import StoreUnavailableError
 from support.job_runs import Interruption, make_run
 from support.stores import ALICE
 
@@ -99,24 +95,6 @@ def test_last_attempt_ends_with_the_models_of_the_search(
 
 
 @pytest.mark.ci
-def test_free_run_stored_with_the_result_is_that_of_the_figures(
-    store: Store, blobs: Blobs, job: Job, undisturbed: Found
-) -> None:
-    lease = claim(store)
-    outcome = run_job(lease, store, blobs)
-    store.leases.finish(lease, outcome)
-    ended = store.jobs.get(ALICE, job.id)
-    assert ended.summary is not None
-    rank = ended.summary["rank"]
-    (name,) = outcome.artefacts
-    blob = store.results.artefact(job.id, name)
-    assert blob is not None
-    found = read_search_result(ended, store, blobs, rank)
-    assert {name: blobs.read(blob)} == write_free_run(found.models[0], found.split.validation, rank)
-    assert json.loads(blobs.read(blob))["band"]["level"] == 0.9
-
-
-@pytest.mark.ci
 def test_free_run_of_the_best_model_is_stored_while_the_job_searches(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -144,58 +122,6 @@ def test_free_run_of_the_best_model_is_stored_while_the_job_searches(
     assert max(seen.values()) <= 5
     store.leases.finish(lease, outcome)
     assert store.results.artefact(job.id, SEARCH_FREE_RUN) is None
-
-
-class FullDisk:
-    """Blobs of which none can be written."""
-
-    def __init__(self, blobs: Blobs) -> None:
-        self._blobs = blobs
-
-    def write(self, _data: bytes) -> str:
-        raise StorageFullError("full")
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._blobs, name)
-
-
-@pytest.mark.ci
-def test_job_succeeds_without_space_for_its_free_run(store: Store, blobs: Blobs, job: Job) -> None:
-    lease = claim(store)
-    with structlog.testing.capture_logs() as logged:
-        outcome = run_job(lease, store, FullDisk(blobs), every=600.0)
-    assert (outcome.state, dict(outcome.artefacts)) == (JobState.SUCCEEDED, {})
-    assert "free run not stored" in [each["event"] for each in logged]
-
-
-@pytest.mark.ci
-def test_an_extrapolating_validation_is_stated_before_the_search(
-    store: Store, blobs: Blobs, job: Job, record: Path, tmp_path: Path
-) -> None:
-    head, *lines = record.read_text().splitlines()
-    name = head.split(",").index("u_V")
-    wide = [line.split(",") for line in lines]
-    for cells in wide[-100:]:
-        cells[name] = str(3.0 * float(cells[name]))
-    path = tmp_path / "wide.csv"
-    path.write_text("\n".join([head, *(",".join(cells) for cells in wide)]))
-    data, described = path.read_bytes(), asdict(preview(path))
-    dataset, _ = store.datasets.add(ALICE, "wide.csv", ".csv", blobs.write(data), len(data), described)
-    store.jobs.cancel(ALICE, job.id)
-    changed, _ = store.jobs.submit(Submission(ALICE, {**job.spec, "dataset": dataset.id}))
-
-    def stop_once_warned() -> None:
-        progress = store.jobs.get(ALICE, changed.id).progress or {}
-        if "warnings" in progress:
-            raise CoordinatorStopping("enough")
-
-    with pytest.raises(CoordinatorStopping):
-        run_job(claim(store), store, blobs, stop_once_warned)
-    progress = store.jobs.get(ALICE, changed.id).progress
-    assert progress is not None
-    assert "generation" not in progress
-    (warning,) = progress["warnings"]
-    assert warning.startswith("validation extrapolates: u_V is ")
 
 
 @pytest.mark.ci
@@ -363,36 +289,6 @@ def test_request_to_stop_is_not_lost_with_the_coordinator(
     assert outcome.models
 
 
-class LateEngine(SerialEngine):
-    """Engine whose first epoch takes long, as with actors that have to start."""
-
-    def run(self, problem: Any, start: Any, stop: Any) -> Any:
-        time.sleep(2.0)
-        yield from super().run(problem, start, stop)
-
-
-@pytest.mark.ci
-def test_time_left_of_the_epochs_does_not_depend_on_the_wait_before_them(
-    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    store.jobs.cancel(ALICE, job.id)
-    changed = store.jobs.submit(Submission(ALICE, {**job.spec, "preset": "auto"}))[0]
-    before, first = [0.0], []
-
-    def watch() -> None:
-        progress = store.jobs.get(ALICE, changed.id).progress or {}
-        if progress.get("generation", 0) >= 3:
-            raise CoordinatorStopping("enough")
-        (first if "generation" in progress else before).append(progress.get("seconds_left") or 0.0)
-
-    with pytest.raises(CoordinatorStopping):
-        run_identification_job(replace(make_run(claim(store), store, blobs, watch), engine=LateEngine()))
-    assert first
-    # It only decreases until the speed of the epochs is known.
-    assert max(first) <= before[-1]
-
-
 @pytest.mark.ci
 def test_progress_has_the_front_and_the_last_migration(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
@@ -421,14 +317,6 @@ def test_search_without_models_fails_at_its_limit_of_run_time(store: Store, blob
 
 
 @pytest.mark.ci
-def test_rare_reports_store_the_same_history_as_frequent_ones(
-    store: Store, blobs: Blobs, job: Job, undisturbed: Found
-) -> None:
-    run_job(claim(store), store, blobs)
-    assert store.results.history(job.id) == undisturbed[1]
-
-
-@pytest.mark.ci
 def test_wall_time_includes_all_attempts(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -454,28 +342,6 @@ def test_wall_time_includes_all_attempts(
     assert before > 0.2
     spent = outcome.document["search"]["wall_s"]
     assert before + checks[-1] - checks[0] <= spent <= before + last + 0.01
-
-
-@pytest.mark.ci
-def test_stages_of_a_job_are_its_phases_and_keep_its_generation(store: Store, blobs: Blobs, job: Job) -> None:
-    seen: list[Any] = []
-
-    def watch() -> None:
-        seen.append(store.jobs.get(ALICE, job.id).progress)
-
-    run_job(claim(store), store, blobs, watch)
-    phases = [progress["phase"] for progress in seen if progress]
-    assert list(dict.fromkeys(phases))[:2] == ["reading the record", "sampling rate and direct feedthrough"]
-    assert {phase.split(" of ")[0] for phase in phases} >= {"search", "estimation"}
-    ended = store.jobs.get(ALICE, job.id).progress
-    assert ended is not None
-    assert ended["phase"] == "storing the result"
-    reached = [progress.get("generation", -1) for progress in seen if progress]
-    assert reached == sorted(reached)
-    fractions = [progress.get("fraction", 0.0) for progress in seen if progress]
-    assert fractions == sorted(fractions)
-    searching = phases.index("search")
-    assert fractions[searching] < fractions[-1] <= 1.0
 
 
 def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:

@@ -15,11 +15,7 @@ from islands_service.coordinator import identification_job
 from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.coordinator.job_run import JobRun
-from islands_service.coordinator.main_loop import Coordinator
 from islands_service.domain.job import (
-    DISCREPANCY,
-    IDENTIFICATION,
-    MONITORING,
     Job,
     JobOutcome,
     JobState,
@@ -33,7 +29,6 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError, StoreUnavailableError
-from islands_service.store.job_rows import job_claims
 from islands_service.store.job_rows.job_claims import ATTEMPTS
 from islands_service.store.leases import Leases
 from support.coordinators import (
@@ -45,7 +40,6 @@ from support.coordinators import (
     wait_until_finished,
 )
 from support.processes import eventually
-from support.service import held
 from support.stores import ALICE, BOB, child
 
 Found = tuple[list[Any], list[Any]]
@@ -60,21 +54,6 @@ def test_coordinator_runs_one_job_after_the_other(
     for each in (job, second):
         assert wait_until_finished(store, each).state == JobState.SUCCEEDED
         assert [model.document for model in store.results.models(each.id)] == undisturbed[0]
-
-
-@pytest.mark.ci
-def test_coordinator_runs_jobs_of_every_kind(
-    store: Store, job: Job, coordinator: Callable[..., Thread]
-) -> None:
-    assert set(coordinator_module.JOB_RUNNERS) == {IDENTIFICATION, DISCREPANCY, MONITORING}
-    short = store.jobs.submit(Submission(ALICE, held(job.spec["dataset"], rows="0:99"), DISCREPANCY))[0]
-    coordinator()
-    assert wait_until_finished(store, job).state == JobState.SUCCEEDED
-    failed = wait_until_finished(store, short)
-    assert failed.state == JobState.FAILED
-    assert failed.problem is not None
-    assert failed.problem["type"] == "invalid-record"
-    assert "99 samples, and a diagnosis needs " in failed.problem["detail"]
 
 
 def test_stopping_coordinator_releases_its_job_without_an_attempt(
@@ -161,45 +140,6 @@ def test_outcome_is_stored_as_soon_as_the_disk_has_space(
     assert logged == ["cannot finish yet", "job can be finished", "job finished"]
 
 
-class Away(SerialCoordinator):
-    """A coordinator whose cluster does not answer at first, and then its store."""
-
-    def run(self) -> None:
-        self._settings = self._settings.model_copy(update={"ray_address": "cluster:6379"})
-        self.claims = self.connections = 5
-        self._attempt, self._store.leases.claim = self._store.leases.claim, self.claim  # type: ignore[method-assign]
-        super().run()
-
-    def claim(self, *arguments: Any, **named: Any) -> Lease | None:
-        self.claims -= 1
-        if self.claims >= 0:
-            raise StoreUnavailableError("the database does not answer")
-        return self._attempt(*arguments, **named)
-
-    def _connect(self) -> None:
-        self.connections -= 1
-        if self.connections >= 0:
-            raise ClusterError("the cluster does not answer")
-        self._connected = True
-
-
-def test_an_outage_is_logged_at_its_begin_and_its_end(
-    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    replace_runner(monkeypatch, lambda _run: DONE)
-    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.01)
-    with structlog.testing.capture_logs() as logs:
-        coordinator(Away)
-        wait_until_finished(store, job)
-    logged = [(entry["event"], entry.get("failures")) for entry in logs]
-    assert [each for each in logged if each[0].split()[0] in ("no", "cluster", "store")] == [
-        ("no cluster", None),
-        ("cluster back", 5),
-        ("store unavailable", None),
-        ("store back", 5),
-    ]
-
-
 def test_unavailable_store_during_a_job_is_not_an_attempt(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -231,33 +171,6 @@ def test_lost_cluster_ends_the_coordinator_and_is_an_attempt(
         doomed.run()
     back = store.jobs.get(ALICE, job.id)
     assert (back.state, back.attempt) == (JobState.QUEUED, 1)
-
-
-def test_coordinator_with_the_same_name_takes_a_job_over_at_once(
-    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    died = store.leases.claim("me", 3600.0)
-    assert died is not None
-    replace_runner(monkeypatch, lambda _run: DONE)
-    coordinator(name="me")
-    assert wait_until_finished(store, job).attempt == 2  # long before the lease of an hour has expired
-
-
-@pytest.mark.parametrize("quota", ["max_running", "max_running_islands"])
-def test_coordinator_keeps_the_quotas_of_its_settings(
-    store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch, quota: str
-) -> None:
-    monkeypatch.setattr(coordinator_module, "POLL_SECONDS", 0.0)
-    claims: list[tuple[str, str]] = []
-    monkeypatch.setattr(
-        Coordinator, "_process", lambda self, lease: claims.append((self._name, lease.job.id))
-    )
-    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
-    limited = settings.model_copy(update={quota: 1})
-    for name, changed in (("one", limited), ("two", limited), ("three", settings)):
-        Coordinator(changed, name, StopRequest())._claim_next()
-    assert [name for name, _ in claims] == ["one", "three"]
-    assert {claimed for _, claimed in claims} == {job.id, second.id}
 
 
 @pytest.mark.ci
@@ -392,24 +305,6 @@ def test_blob_referenced_during_a_sweep_is_kept(
     assert blobs.read(written[0]) == b"named meanwhile"
 
 
-@pytest.mark.ci
-def test_starts_of_ray_that_fail_do_not_count_as_attempts(
-    store: Store,
-    job: Job,
-    settings: ServiceSettings,
-    coordinator: Callable[..., Thread],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The supervisor kills a coordinator if Ray ends, and on a busy machine Ray may not start for minutes."""
-    monkeypatch.setattr(job_claims, "ATTEMPTS", 1)
-    with child(WAITING, str(settings.data_dir)) as waiting:
-        assert waiting.stdout is not None
-        assert "waiting\n" in waiting.stdout  # the line after those of the log
-        waiting.kill()
-    coordinator(name="waiting")
-    assert wait_until_finished(store, job).state == JobState.SUCCEEDED
-
-
 def test_wait_for_ray_counts_as_an_attempt_if_it_ends(
     store: Store, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
@@ -489,22 +384,6 @@ def test_coordinator_continues_in_a_new_process_after_jobs(
         assert process.wait(20.0) in (0, -signal.SIGTERM)
     assert said == ["started\n"] * 2
 
-
-#: A coordinator that reports when it waits for Ray.
-WAITING = """
-import sys, time
-from pathlib import Path
-from islands_service.liveness import StopRequest
-from islands_service.coordinator.main_loop import Coordinator
-from islands_service.coordinator.job_run import JobRun
-from islands_service.settings import ServiceSettings
-class Waiting(Coordinator):
-    def _wait_for_address(self, *_):
-        print("waiting", flush=True)
-        time.sleep(60)
-settings = ServiceSettings(data_dir=Path(sys.argv[1]), short_search=0.0)
-Waiting(settings, "waiting", StopRequest()).run()
-"""
 
 HANGING = """
 import sys, time

@@ -1,6 +1,5 @@
 """View of a running search: the front has at most one bounded entry per size, and migrations are named."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -24,9 +23,6 @@ from islands.models.regressor import regressor
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands_service.coordinator.search_view import (
-    MAX_CHARACTERS,
-    MAX_ISLANDS,
-    MAX_MODELS,
     SearchFront,
     describe_migration,
 )
@@ -65,20 +61,6 @@ def test_front_has_the_best_model_of_each_size_that_no_smaller_one_equals() -> N
     ]
 
 
-def test_size_of_a_front_is_bounded() -> None:
-    many = [individual(size, 1.0 / size) for size in range(1, 61)]
-    found = shown(searched(many))
-    assert (len(found), found[0]["size"], found[-1]["size"]) == (MAX_MODELS, 1, 60)
-    assert max(len(each["equation"]) for each in found) == MAX_CHARACTERS
-    assert found[-1]["equation"].endswith("…")
-    assert len(json.dumps(found)) < 7000
-
-
-def test_equation_in_deviations_names_the_offsets() -> None:
-    (found,) = shown(searched([individual(1, 1.0)]), replace(PROBLEM, offsets=(101300.0, 0.0)))
-    assert found["equation"] == "y_um(k) = 0.5*y_um(k-1), with y_um minus 101300"
-
-
 def test_state_spaces_are_described_by_their_states_and_units(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("islands_service.coordinator.search_view._simulate", lambda *_: None)
 
@@ -103,15 +85,6 @@ def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.Monke
     first = front.update(searched([individual(1, 1.0)]))
     assert front.update(searched([individual(1, 1.0)])) is first
     assert front.update(searched([individual(1, 0.25)]))[0]["error"] == 0.5
-
-
-def test_the_time_of_the_first_front_does_not_delay_the_second(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e-9)
-    front = SearchFront()
-    for _ in range(2):
-        front.begin(PROBLEM)
-        errors = [front.update(searched([individual(1, fitness)]))[0]["error"] for fitness in (9.0, 4.0, 1.0)]
-        assert errors == [3.0, 2.0, 2.0]
 
 
 def test_free_run_is_that_of_the_smallest_model_near_the_least_error() -> None:
@@ -174,13 +147,3 @@ def test_last_migration_names_the_sources_of_every_island() -> None:
             "emigrants": 2,
             "sources": [[2], [0], [1]],
         }
-
-
-@pytest.mark.parametrize(
-    ("islands", "changes"),
-    [(1, {}), (MAX_ISLANDS + 1, {}), (3, {"topology": "isolated"}), (3, {"migrants": 0})],
-)
-def test_without_migrations_or_with_many_islands_none_is_described(
-    islands: int, changes: dict[str, Any]
-) -> None:
-    assert migration(20, islands, **changes) is None

@@ -90,12 +90,6 @@ def test_messages_that_a_library_prints_are_no_part_of_the_answer(tmp_path):
         read_confined(tmp_path / "b.xlsx", RecordRequest(["u"], "y", None, None, {}), MEMORY, SECONDS)
 
 
-def test_record_is_described(record):
-    found = inspect(record, InspectionRequest(("u_V",), "y_um", 0.01, "0:100"))
-    assert [column["name"] for column in found["columns"]] == ["t_s", "u_V", "y_um"]
-    assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
-
-
 @pytest.mark.parametrize("asked", [InspectionRequest(), InspectionRequest(("u",), "y")])
 def test_assumptions_about_the_time_are_warnings(tmp_path, asked):
     """Days are read as days, and an output that is held for five rows has a clock of five rows."""
@@ -115,14 +109,6 @@ def test_a_record_without_a_choice_of_columns_has_the_reason(tmp_path):
     found = describe_file(tmp_path / "a.csv", InspectionRequest())["inspection"]
     assert (found["choice"]["output"], found["facts"]) == ("", [])
     assert found["choice"]["reason"].startswith("Only y is a signal")
-
-
-def test_facts_of_a_record_without_a_sampling_time_say_so(tmp_path):
-    lines = (line.partition(",")[2] for line in csv().decode().splitlines())
-    (tmp_path / "a.csv").write_text("\n".join(lines))
-    found = describe_file(tmp_path / "a.csv", InspectionRequest())
-    assert found["dt"] is None
-    assert any("sampling time is unknown: the facts count" in each for each in found["warnings"])
 
 
 def test_missing_cells_are_refused_in_an_input_and_skipped_in_an_output(tmp_path):
@@ -285,15 +271,6 @@ def test_an_endless_answer_is_refused(record, monkeypatch, programs):
     monkeypatch.setattr(confined_answer, "_MAX_OUTPUT", 1_000_000)
     with pytest.raises(RecordError, match="it is damaged, or unpacks to more"):
         inspect(record)
-
-
-@pytest.mark.ci
-def test_the_facts_of_a_long_record_are_those_of_its_middle(tmp_path):
-    rng = np.random.default_rng(0)
-    np.savez(tmp_path / "long.npz", u=rng.random(120_000), y=rng.random(120_000), dt=0.01)
-    found = inspect(tmp_path / "long.npz")["inspection"]
-    assert found["rows"] == "10000:110000"
-    assert found["facts"][0]["value"] == 100_000
 
 
 @pytest.mark.ci

@@ -89,13 +89,6 @@ def send(deliveries, client, monkeypatch, until):
     return outcomes
 
 
-def test_many_due_deliveries_are_claimed_in_short_transactions(monkeypatch):
-    deliveries = _Deliveries(90)
-    outcomes = send(deliveries, _Client(), monkeypatch, lambda: len(deliveries.recorded) == 90)
-    assert outcomes == {"delivered": 90}
-    assert max(deliveries.claims) == delivery_sender.MAX_CLAIMS
-
-
 def test_a_receiver_that_never_answers_delays_no_other(monkeypatch):
     deliveries = _Deliveries(5)
     send(deliveries, _Client(silent="https://h0/"), monkeypatch, lambda: len(deliveries.recorded) == 4)

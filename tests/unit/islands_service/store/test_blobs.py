@@ -42,10 +42,6 @@ def test_blob_holds_the_written_bytes_and_is_named_by_their_hash(blobs, data):
     assert blobs.path(blob).read_bytes() == data
 
 
-def test_blob_is_visible_to_other_instances_on_the_folder(blobs, folder):
-    assert Blobs(folder).read(blobs.write(b"a")) == b"a"
-
-
 def test_the_same_bytes_are_one_file(blobs, folder):
     """A process that may open only this file is not disturbed, and a sweep finds it as young as a new one."""
     path = blobs.path(blobs.write(b"a"))

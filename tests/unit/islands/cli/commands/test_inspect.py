@@ -10,12 +10,6 @@ def record(tmp_path_factory):
     return write_hysteresis(tmp_path_factory.mktemp("inspect") / "record.csv")
 
 
-def test_the_text_ends_with_the_next_command(record):
-    last = succeed("inspect", record).replace("\\\n", "").splitlines()[-1].split()
-    assert last[:2] == ["islands", "identify"]
-    assert last[-6:] == ["--input", "u_V", "--output", "y_um", "--out", "result"]
-
-
 def test_json_is_the_document(record):
     document = json.loads(succeed("inspect", record, "--json"))
     assert document["choice"]["output"] == "y_um"

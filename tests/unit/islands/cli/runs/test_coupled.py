@@ -110,22 +110,6 @@ def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(recor
     assert (part / "model.json").read_bytes() == (whole / "model.json").read_bytes()
 
 
-@pytest.mark.ci
-def test_an_evolution_of_latent_models_of_two_outputs_is_resumed_and_simulated(record, tmp_path) -> None:
-    settings = ("--preset", "latent", "--population", 4, "--generations", 1, "--islands", 1)
-    whole, part = tmp_path / "whole", tmp_path / "part"
-    with undrawn_figures():
-        printed = succeed("identify", record, *COLUMNS, *settings, "--engine", "serial", "--out", whole)
-        succeed("identify", record, *COLUMNS, *settings, "--wall-time", 1e-9, "--out", part)
-        succeed("identify", "--resume", part, "--engine", "serial")
-    assert (part / "model.json").read_bytes() == (whole / "model.json").read_bytes()
-    assert "2 outputs, " in printed
-    assert "those of separate searches" in printed
-    printed = succeed("simulate", whole, record, "--bands", 0.9)
-    assert "y2: 90 % band: median half-width" in printed
-    assert succeed("show", whole, "--format", "plain").startswith("y1(k) =")
-
-
 @pytest.mark.parametrize(
     ("command", "options", "message"),
     [

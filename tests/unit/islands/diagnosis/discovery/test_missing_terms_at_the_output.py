@@ -1,6 +1,5 @@
 """Missing terms of simulations without equations: a recorded output, a function, and an identified model."""
 
-import json
 from collections.abc import Callable
 from functools import cache
 
@@ -9,13 +8,10 @@ import pytest
 import scipy
 
 import islands
-from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
-from islands.export.extension import export_extended
-from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json
 from islands.simulators.interface import Simulator
@@ -106,19 +102,6 @@ def test_effect_of_the_catalogue_keeps_its_name() -> None:
     found = diagnose(record, make_column(record))
     assert found.verdict == "named"
     assert [each.name for each in found.effects] == ["cubic-stiffness"]
-
-
-@pytest.mark.ci
-def test_document_and_text_contain_the_terms() -> None:
-    record, found = find("u**5")
-    columns = {"y_model": follow(record.u[:, 0], DT)}
-    document = json.loads(extended_json(found.best, record))
-    spec = LocalExtendedSpec.model_validate(document)
-    np.testing.assert_allclose(simulate_spec(spec, record, columns), found.best.output, rtol=1e-9)
-    assert "u**5" in export_extended(spec, "plain")
-    assert json.loads(export_extended(spec, "json")) == document
-    assert "pow(in->u, 5.0)" in export_extended(spec, "c")
-    assert "u**5" in DiagnosisResult.from_diagnosis(found).summary
 
 
 @pytest.mark.ci

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import islands
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.target import Target
@@ -14,8 +13,6 @@ from islands.diagnosis.inference.exchanged_parts import ExchangedParts, exchange
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
 from islands.records.split import hold_out
-from islands.report.documents.diagnosis_json import diagnosis_document
-from islands.report.text.diagnosis_statements import describe_details
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.specification.factory import make_simulator
@@ -81,17 +78,3 @@ def test_a_simulation_that_diverges_on_the_estimation_data_has_no_gain(
 def test_the_end_of_a_recording_is_no_other_input() -> None:
     one, _ = oscillator_recordings(1, LENGTHS, "cubic-stiffness", 3000.0)
     assert exchange(one) is None
-
-
-@pytest.mark.ci
-def test_the_text_states_both_values_where_they_contradict_each_other() -> None:
-    effects = (CATALOGUE["cubic-stiffness"],)
-    found = islands.diagnose(record(3000.0, 1500.0), "second-order", effects=effects)
-    document = diagnosis_document(found)
-    assert not document["exchange"]["values"][0]["agrees"]
-    assert "The reverse: with all values fitted to the validation recording alone" in found.summary
-    assert "Both parts have different values: cubic-stiffness k = 3e+03 and 1." in found.summary
-    document["exchange"]["gain"] = None
-    assert any("alone, a simulation diverges on the data" in each for each in describe_details(document))
-    found = islands.diagnose(record(3000.0, 3000.0), "second-order", effects=effects)
-    assert "Both parts have the same values" in found.summary

@@ -107,13 +107,3 @@ def test_causes_are_at_most_separable_where_they_are_detectable() -> None:
         others = [misfit for place, misfit in enumerate(row.misfits) if place != index]
         assert min(others) >= row.detectable.misfit
         assert all(misfit <= MISFITS[-1] or misfit == inf for misfit in others)
-
-
-def test_progress_counts_the_causes() -> None:
-    messages: list[tuple[str, float | None]] = []
-    find_isolability(
-        amplifier_experiment(SLOW),
-        take_effects("offset", "linear-drift"),
-        progress=lambda message, fraction=None: messages.append((message, fraction)),
-    )
-    assert messages == [("1 of 2 causes", 0.5), ("2 of 2 causes", 1.0)]

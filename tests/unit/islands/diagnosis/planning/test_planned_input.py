@@ -61,10 +61,3 @@ def test_impossible_limits_are_refused() -> None:
         find_limits(wave((1.0,)), DT, amplitude=-1.0)
     with pytest.raises(SettingsError, match="positive rate"):
         find_limits(wave((1.0,)), DT, rate=0.0)
-
-
-def test_a_description_has_the_numbers_of_the_input() -> None:
-    limits = InputLimits(-4.0, 4.0)
-    steps = PlannedInput(InputForm.STEPS, 0.5, 2.0)
-    assert steps.describe(limits, "V") == "random steps with holds of 0.5 s, amplitude 2 V"
-    assert "from 0.1 to 2 Hz" in PlannedInput(InputForm.MULTISINE, 1.0, 2.0, 0.1).describe(limits, "")

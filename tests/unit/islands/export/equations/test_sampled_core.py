@@ -140,14 +140,6 @@ def test_every_effect_has_a_program(name, tmp_path):
             compare(run_c(spec, RECORD, tmp_path, COLUMNS), expected)
 
 
-def test_the_heading_says_what_the_program_reads():
-    spec, _ = extend(add_term(make("model")), RECORD)
-    text = export_extended(spec, "c")
-    assert "Runge-Kutta" not in text
-    assert '    y_measured = "y_um"' in text
-    assert "free run of the model y(k) = " in " ".join(text.split())
-
-
 def test_coefficients_that_a_record_determines_have_no_program():
     spec, _ = extend(add_term(make("linear")), RECORD)
     estimated = LinearSpec(kind="linear", order=2)

@@ -135,38 +135,6 @@ def test_a_column_name_is_read_back_from_its_comment_line(name, kind):
     assert line.endswith("; sampling time any.")
 
 
-def test_the_file_describes_the_model():
-    text = export(PUBLISHED["12"].model, "c")
-    comment = text[: text.index("*/")]
-    assert "NARX model: y(k) = 1*y(k-1) - 0.000246*" in comment
-    assert 'Inputs u = "u_V"; output y = "y_um"; sampling time 0.001 s.' in comment
-    assert "-ffp-contract=off" in comment
-    assert "exp, log, sin, cos and tanh" in comment
-    assert max(map(len, text.splitlines())) <= 110
-    assert "enum { MAXIMUM_LAG = 3 };" in text
-    assert "double predict(const double *y, const double *u)" in text
-
-
-@pytest.mark.parametrize(("kind", "mark"), [("c", " *"), ("matlab", "%")])
-def test_a_long_equation_is_wrapped_between_its_parts(kind, mark):
-    exported = model(
-        {"*".join(f"u(k-{lag})" for lag in range(1, 30)): 0.5, "y(k-1)*u(k-1)^2": -0.25, "1": 1.0}
-    )
-    lines = export(exported, kind).splitlines()
-    first = next(index for index, line in enumerate(lines) if "NARX model:" in line)
-    broken = lines[first : lines.index(mark, first)]
-    assert len(broken) > 2
-    text = " ".join(line.removeprefix(mark).strip() for line in broken)
-    assert text == f"NARX model: {export(exported, 'plain')}"
-
-
-def test_functions_are_defined_once_and_only_if_used():
-    text = export(model({"y(k-1)*sign(u(k-1))": 1.0, "sign(u(k-2))": 2.0}), "c")
-    assert text.count("static double") == 1
-    assert "total += 2.0*f_sign(u[-2]);" in text
-    assert "static double" not in export(model({"y(k-1)": 1.0}), "c")
-
-
 # User-defined primitives.
 
 

@@ -5,14 +5,13 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-import islands
 from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from support.exported_programs import needs_octave, octave, run_matlab
-from support.programs import CASES, HOSTILE_NAMES, at_the_edges, model, record, record_of
+from support.programs import CASES, at_the_edges, model, record, record_of
 from support.strategies import models
 
 
@@ -58,14 +57,6 @@ def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
         np.testing.assert_allclose(theirs[lag:], run.y[lag:], rtol=1e-12)
 
 
-@needs_octave
-def test_a_column_name_cannot_break_the_file(tmp_path):
-    data = islands.Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
-    named = [islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name) for name in HOSTILE_NAMES]
-    found = run_matlab([(each, data) for each in named], tmp_path)
-    assert [y.tolist() for y in found] == [[0.5, 2.0]] * len(HOSTILE_NAMES)
-
-
 #: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and Octave's output for them.
 CALLS = {
     # The output is a row or a column like the input; y0 may be either.
@@ -104,25 +95,6 @@ def test_too_few_first_outputs_are_an_error_in_octave(tmp_path):
     shown = octave("try, narx_model(1:9, 1), catch e, disp(e.message), end", tmp_path)
     assert "out of bound 1" in shown
     assert "y0" in shown
-
-
-def test_the_file_describes_the_model():
-    text = export(PUBLISHED["12"].model, "matlab")
-    assert text.startswith("function y = narx_model(u, y0)\n% NARX_MODEL  Free run")
-    assert "% NARX model: y(k) = 1*y(k-1) - 0.000246*" in text
-    assert '% Inputs u = "u_V"; output y = "y_um"; sampling time 0.001 s.' in text
-    assert "y0 holds the first 3 samples" in text
-    assert "Save this file as narx_model.m" in text
-    assert max(map(len, text.splitlines())) <= 110
-
-
-def test_functions_are_defined_once_after_the_model():
-    text = export(model({"y(k-1)*sign(u(k-1))": 1.0, "sign(u(k-2))": 2.0}), "matlab")
-    assert [line for line in text.splitlines() if line.startswith("function")] == [
-        "function y = narx_model(u, y0)",
-        "function r = f_sign(a)",
-    ]
-    assert text.count("\nend\n") == 2
 
 
 # User-defined primitives.

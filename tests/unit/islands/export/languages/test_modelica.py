@@ -46,14 +46,6 @@ def test_the_right_hand_side_is_the_model(name):
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", SAMPLED)
-def test_functions_are_defined_if_and_only_if_they_are_called(name):
-    text = export(SAMPLED[name], "modelica")
-    defined = re.findall(r"  function (f_\w+)\n", text)
-    assert set(defined) == set(re.findall(r"\bf_\w+(?=\()", text))
-    assert all(text.count(f"end {each};") == 1 for each in defined)
-
-
 def test_the_block_has_the_units_and_the_columns():
     exported = replace(model({"u(k-1)": 1.0}), input_names=('u "1" \\ [V]',), output_name="y_um", dt=1e-3)
     text = export(exported, "modelica")

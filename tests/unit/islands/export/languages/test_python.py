@@ -93,14 +93,6 @@ def test_predict_is_one_step_ahead():
     assert bits(predicted) == bits(one_step_ahead(chosen, data).y[3:])
 
 
-def test_the_module_describes_the_model():
-    text = export(PUBLISHED["12"].model, "python")
-    assert text.startswith('"""NARX model: y(k) = 1*y(k-1)')
-    assert "Inputs u = u_V; output y = y_um; sampling time 0.001 s." in text
-    assert text.count("import ") == 1
-    assert "sampling time any" in export(model({"y(k-1)": 1.0}), "python")
-
-
 @pytest.mark.parametrize(("kind", "quote"), [("python", ""), ("c", '"'), ("matlab", '"')])
 def test_every_program_names_the_columns_of_its_inputs(kind, quote):
     text = export(CASES["several inputs"], kind)
@@ -191,18 +183,6 @@ def test_a_user_defined_primitive_is_exported_with_its_globals(scalar):
 def test_two_primitives_may_have_functions_of_the_same_name():
     known = PRIMITIVES | {"a": primitive("a", saturation), "b": primitive("b", renamed(0.1))}
     assert_same_free_run(model({"a(u(k-1))*b(y(k-1))": 0.3}, primitives=known), record())
-
-
-def test_constants_are_defined_once_under_their_names():
-    known = PRIMITIVES | {"a": primitive("a", saturation)}
-    text = export(model({"a(u(k-1)) + exp(u(k-2))": 1.0}, primitives=known), "python")
-    lines = text.splitlines()
-    assert [line for line in lines if " = " in line and line[0].isupper() and "Inputs" not in line] == [
-        "MAXIMUM_LAG = 2",
-        "STRENGTH = 2.0",
-        "OFFSET = 3",
-        "LARGEST_EXPONENT = 50.0",
-    ]
 
 
 def refused(scalar, **others):

@@ -15,7 +15,6 @@ from islands.facade.automatic.kind_choice import (
     list_others,
     measure_share,
 )
-from islands.facade.automatic.kind_trials import percent
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.library_fit import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
@@ -87,41 +86,6 @@ def test_models_without_a_dead_time_compete_with_those_that_have_one(monkeypatch
     assert choice.delays == tuple(result.settings["delays"]) == ()
     assert "A dead time of 20 samples is not used" in choice.reasons[1]
     assert "validation data" in choice.reasons[1]
-
-
-@pytest.mark.ci
-def test_reasons_are_two_sentences(chosen):
-    _, choice, _ = chosen
-    assert len(choice.reasons) == 2
-    assert choice.reasons[0].startswith("Preset auto chose smooth (library polynomial of degree 2")
-
-
-@pytest.mark.ci
-def test_the_reason_states_the_error_and_its_scale():
-    """A summary stated errors of 1e-13 % and of 0.0001 % of the output range for one model."""
-    clean = choose(record("first order, clean", 300))[0]
-    assert "RMSE of its recommended model on the validation data is less than 0.0001 %" in clean.reasons[0]
-    assert " of the output range of the estimation data" in clean.reasons[0]
-
-
-@pytest.mark.parametrize(
-    ("error", "text"),
-    [
-        (0.0, "less than 0.0001 %"),
-        (1e-6, "less than 0.0001 %"),
-        (2e-6, "0.0002 %"),
-        (np.inf, "no finite error"),
-    ],
-)
-def test_a_rounding_error_has_no_digits(error, text):
-    assert percent(error) == text
-
-
-@pytest.mark.nightly
-def test_choice_is_the_same_again_and_survives_json(chosen):
-    data, choice, _ = chosen
-    assert choose(data)[0] == choice
-    assert choice_from_document(choice.to_document()) == choice
 
 
 def test_damaged_choice_is_refused():
@@ -196,19 +160,6 @@ def test_result_of_identify_contains_the_choice():
     again = islands.identify(data, preset=choice, **SMALL, library_degree=1)
     assert [each.model for each in again.models] == [each.model for each in result.models]
     assert again.search_result.settings == settings
-
-
-@pytest.mark.ci
-def test_result_of_fit_contains_the_choice():
-    data = record("first order", 300)
-    result = islands.fit(data, degree=1, max_terms=2, certificate=0)
-    settings = result.search_result.settings
-    choice = choice_from_document(settings["choice"])
-    assert settings["library"] == resolve_kind(choice.kind, (), {}).library
-    assert " ".join(choice.reasons) in " ".join(str(result).split())
-    named = islands.fit(data, library=settings["library"], degree=1, max_terms=2, certificate=0)
-    assert [each.model for each in named.models] == [each.model for each in result.models]
-    assert "choice" not in named.search_result.settings
 
 
 @pytest.mark.ci

@@ -108,15 +108,6 @@ def test_settings_of_narx_models_exclude_latent_models(tried, changes, count):
     assert tried == ["smooth"] * count
 
 
-def test_models_of_hysteresis_are_not_compared_and_the_reason_is_stated(tried, monkeypatch):
-    found = Choice("hysteresis", (), ("", ""), {}, {})
-    monkeypatch.setattr(preset_choice, "choose_kind", lambda *_given: (found, {}))
-    *others, last = choose_preset(lag_record(True), 0.25, {}).reasons
-    assert tried == []
-    assert others == ["", ""]
-    assert last == "Latent models, which have no continuum of equilibria, were not compared."
-
-
 def test_a_constant_output_is_not_compared(tried):
     record = lag_record(True)
     choose_preset(replace(record, y=np.ones(record.samples)), 0.25, {})

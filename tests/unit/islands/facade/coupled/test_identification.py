@@ -20,9 +20,7 @@ from islands.persistence.checkpoints import (
     state_from_document,
 )
 from islands.progress import StoppedError
-from islands.records.averaging import average_samples
 from islands.records.coupled import CoupledRecord
-from islands.records.dataset import join
 from islands.simulation.predictors import free_run
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
@@ -96,34 +94,6 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
     with pytest.raises(ModelError, match="several outputs"):
         read_result(folder)
     assert read_result(folder / "outputs" / "1-y1").models[0].model.output_name == "y1"
-
-
-@pytest.mark.ci
-def test_a_model_of_means_simulates_the_record_before_averaging() -> None:
-    record = make_coupled_record(TWO_MASSES, samples=300, noise=0.01)
-    result = fit_coupled(record, **(FAST | {"degree": 1, "average": 2}))
-    assert (result.model.average, result.split.validation.dt) == (2, 0.2)
-    np.testing.assert_array_equal(
-        result.simulate(record).y,
-        result.simulate(record.map(lambda each: average_samples(each, 2))).y,
-    )
-
-
-@pytest.mark.ci
-def test_several_recordings_give_their_ends_to_the_validation_data() -> None:
-    records = [make_coupled_record(TWO_MASSES, samples=120, seed=seed) for seed in (1, 2)]
-    joined = CoupledRecord(tuple(join(each) for each in zip(*(r.records for r in records), strict=True)))
-    result = fit_coupled(joined, **(FAST | {"degree": 1}))
-    assert result.split.validation.records[0].segments == (30, 30)
-    assert result.metrics["y2"]["validation"]["free_run"].mape < 1e-6
-
-
-@pytest.mark.ci
-def test_a_data_frame_has_the_result_of_a_record(found) -> None:
-    record = make_coupled_record(PREY, samples=150)
-    frame = {"u": record.records[0].u[:, 0], "y1": record.y[:, 0], "y2": record.y[:, 1]}
-    again = fit_coupled(frame, inputs="u", outputs=["y1", "y2"], dt=0.1, **FAST)
-    assert again.model == found.model
 
 
 @pytest.mark.ci

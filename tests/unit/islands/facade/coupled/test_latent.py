@@ -11,7 +11,6 @@ import pytest
 import islands
 from islands.errors import SettingsError
 from islands.facade.coupled.identification import StoppedCouplingError, fit_coupled, identify_coupled
-from islands.models.coupled_latent import CoupledLatentModel
 from islands.persistence.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
@@ -30,23 +29,6 @@ SHORT = {"preset": "latent", "population": 6, "generations": 4, "migrate_every":
 @pytest.fixture(scope="module")
 def found():
     return identify_coupled(curves_record(300, 1), **SHORT)
-
-
-@pytest.mark.nightly
-def test_two_outputs_with_different_curves_are_found():
-    record, test = curves_record(400, 1), curves_record(1500, 7)
-    result = fit_coupled(record, model="latent")
-    assert isinstance(result.model, CoupledLatentModel)
-    assert [model.order for model in result.model.models] == [1, 2]
-    assert [model.units for model in result.model.models] == [("tanh",), ("square",)]
-    errors = np.sqrt(np.mean((result.simulate(test, 100).y - test.y)[100:] ** 2, axis=0))
-    assert errors == pytest.approx([0.01, 0.01], rel=0.15)
-    for name, model in zip(("y1", "y2"), result.model.models, strict=True):
-        # The inputs alone determine a latent model, so that its errors are those of the free run.
-        errors = result.metrics[name]["validation"]
-        assert errors["one_step_ahead"].rmse == pytest.approx(errors["free_run"].rmse, rel=1e-9)
-        assert model.input_names == result.split.estimation.input_names
-    assert "One latent model of the inputs for each of 2 outputs" in result.sentences()[0]
 
 
 @pytest.mark.ci
@@ -120,8 +102,3 @@ def test_inputs_that_one_output_reads_at_once_are_read_early_by_all():
 def test_settings_without_effect_are_refused(options, message):
     with pytest.raises(SettingsError, match=message):
         fit_coupled(curves_record(60, 1), **options)
-
-
-def test_settings_of_equations_are_refused_by_the_preset():
-    with pytest.raises(SettingsError, match="max_terms is a setting of NARX models"):
-        identify_coupled(curves_record(60, 1), preset="latent", max_terms=4)

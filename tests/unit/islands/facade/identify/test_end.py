@@ -87,39 +87,6 @@ def test_exact_model_meets_every_positive_target_error():
     assert stop_reason(exact, resolve_settings("narx", {"target_error": 0.0})) == ""
 
 
-@pytest.mark.parametrize(
-    "budget",
-    [
-        31,
-        91,
-        pytest.param(1, marks=pytest.mark.ci),
-        *(pytest.param(each, marks=pytest.mark.nightly) for each in (30, 151)),
-    ],
-)
-def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, states, budget):
-    seen = []
-    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, on_epoch=record_states(seen))
-    last = next((place for place, state in enumerate(states) if state.evaluations >= budget), 4)
-    assert seen == states[: last + 1]
-    search = found.search_result.search
-    assert search.evaluations == states[last].evaluations
-    assert search.ended_by == ("generations" if last == 4 else "evaluations")
-    assert found.search_result.settings["max_evaluations"] == budget
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("place", [2, *(pytest.param(each, marks=pytest.mark.nightly) for each in (0, 4))])
-def test_search_ends_with_the_first_epoch_that_reaches_target_error(data, states, place):
-    seen = []
-    target = nextafter(min(states[place].history[-1].islands) ** 0.5, inf)
-    found = identify(data, **BUDGET, target_error=target, seed=5, on_epoch=record_states(seen))
-    last = next(at for at, state in enumerate(states) if min(state.history[-1].islands) <= target**2)
-    assert last <= place
-    assert seen == states[: last + 1]
-    assert found.search_result.search.ended_by == ("generations" if last == 4 else "target error")
-    assert found.search_result.search.history == states[last].history
-
-
 def test_epoch_in_which_a_budget_is_reached_is_completed(data, states):
     """A longer run has the same epochs, because no epoch is cut short."""
     seen = []

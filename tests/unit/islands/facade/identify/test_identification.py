@@ -1,6 +1,6 @@
 """`islands.identify`: results, seeds, start states and engines."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,20 +21,6 @@ from islands.validation.physics import check_physics
 from support.identifications import BUDGET, RecordingEngine, identify, parameters, record
 
 # Contents of a result.
-
-
-def test_result_has_the_statistics_of_the_search(result):
-    search = result.search_result.search
-    assert search.generations == 4
-    assert search.evaluations == 5 * 30
-    assert sum(search.outcomes.values()) == search.evaluations
-    assert 0 < search.duplicates < search.evaluations
-    # Abandoned individuals count as feasible.
-    assert search.outcomes["abandoned"] > 0
-    models = search.outcomes["ok"] + search.outcomes["abandoned"]
-    assert search.feasible_share == models / search.evaluations > 0.5
-    assert search.wall_s is None
-    assert search.ended_by == "generations"
 
 
 def test_result_has_the_history_of_the_search(result, states):
@@ -60,16 +46,6 @@ def test_full_set_has_the_lags_and_degree_of_the_hall_of_fame(result, states):
     assert full["candidates"] == full_set(full["degree"], lags, lags)
     rows = 2250 - resolve_settings("hysteresis", BUDGET).maximum_lag
     assert full["bytes"] == 8 * rows * full["candidates"]
-
-
-def test_result_has_all_settings_that_determine_it(result):
-    settings = dict(result.search_result.settings)
-    expected = asdict(resolve_settings("hysteresis", BUDGET))
-    assert {name: settings[name] for name in expected} == expected
-    assert (settings["method"], settings["preset"], settings["islands"]) == ("identify", "hysteresis", 1)
-    assert settings["validation"] == 0.25
-    assert result.search_result.seed == 5
-    assert result.search_result.record.samples == 3000
 
 
 def test_models_are_ordered_and_have_different_sizes_up_to_max_terms(result):
@@ -249,8 +225,3 @@ def test_stages_before_and_after_the_epochs_are_reported_and_have_no_effect():
     assessment = news.index("assessment of the final models")
     assert all(message.startswith("estimation of the final models of") for message in news[last:assessment])
     assert set(news[assessment + 1 :]) == {"prediction bands"}
-
-
-def test_stages_are_not_printed_by_default(capsys):
-    identify(record(600), **BUDGET | {"generations": 0, "population": 10, "library_degree": 1})
-    assert capsys.readouterr() == ("", "")

@@ -6,18 +6,11 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError, SettingsError
-from islands.estimation.estimate import estimate
-from islands.evolution.presets import PRESETS, resolve_settings
-from islands.evolution.problem import make_problem
-from islands.evolution.settings import LATENT
+from islands.evolution.presets import resolve_settings
 from islands.records.dataset import Dataset
 from islands.records.split import split
-from islands.simulation.predictors import free_run
 from islands.systems import appendix
-from islands.validation.metrics import metrics
-from islands.validation.physics import check_physics
 from support.identifications import BUDGET, identify, parameters, record, two_inputs
-from support.searches import distinct_genes
 
 
 @pytest.mark.ci
@@ -40,33 +33,6 @@ def test_validation_data_do_not_affect_the_search(data, result):
     assert other.search_result.search.history == result.search_result.search.history
     assert other.search_result.search.outcomes == result.search_result.search.outcomes
     assert parameters(other) != parameters(result)
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    ("seed", "changes"),
-    # Strong pruning removes the seeds from the first population, but they remain final candidates.
-    [
-        *(pytest.param(seed, {}, marks=pytest.mark.nightly) for seed in (0, 1)),
-        (1, {"prune": 1.0, "tolerance": 0.05}),
-    ],
-)
-def test_result_is_never_worse_than_its_forward_selection_seeds(seed, changes):
-    """The comparison uses the validation data, for each size."""
-    data = record(seed=seed)
-    parts = split(data, 0.25)
-    budget = {**BUDGET, "population": 8, "generations": 1, **changes}
-    settings = resolve_settings("hysteresis", budget)
-    found = identify(data, **budget, seed=seed)
-    errors = {fitted.model.size: fitted.metrics["validation"]["free_run"].rmse for fitted in found.models}
-    compared = 0
-    for genes in make_problem(parts.estimation, settings).seeds:
-        seeded = estimate(distinct_genes(genes), parts.estimation, "hysteresis", settings.maximum_lag).model
-        simulated = free_run(seeded, parts.validation, settings.maximum_lag)
-        if simulated.outcome and check_physics(seeded, parts.estimation).property_1:
-            compared += 1
-            assert errors[seeded.size] <= metrics(parts.validation.y, simulated.y).rmse * (1 + 1e-12)
-    assert compared >= 3
 
 
 @pytest.mark.ci
@@ -99,22 +65,6 @@ def test_record_with_two_inputs_and_segments_is_identified():
     assert found.best.model.inputs == 2
     assert found.search_result.record.segments == (1200, 1200)
     assert found.best.metrics["validation"]["free_run"].mape < 2.0
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("preset", PRESETS)
-def test_presets_run_with_a_small_budget(data, preset):
-    is_latent = PRESETS[preset].model_class == LATENT
-    limits = {} if is_latent else {"max_terms": 4}
-    found = identify(data[:1500], preset=preset, population=12, generations=1, **limits)
-    assert found.search_result.settings["preset"] == preset
-    search = found.search_result.search
-    assert search.evaluations == 24 * PRESETS[preset].islands
-    assert (
-        search.feasible_share
-        == sum(search.outcomes.get(name, 0) for name in ("ok", "abandoned")) / search.evaluations
-    )
-    assert is_latent or all(fitted.model.size <= 4 for fitted in found.models)
 
 
 # Errors before the search starts.

@@ -35,12 +35,6 @@ def test_errors_on_different_validation_data_are_marked(result):
     assert "differ: give a record" in result.compare(other).data
 
 
-def test_a_notebook_shows_the_table_and_the_figure(result, small):
-    shown = result.compare(small)._repr_html_()
-    assert shown.count("<tr>") == 3
-    assert "data:image/svg+xml" in shown
-
-
 def test_the_figure_draws_every_model_of_both_results(result, small):
     from matplotlib.figure import Figure
 

@@ -10,7 +10,6 @@ from scipy.signal import lfilter
 
 import islands
 from islands.diagnosis.inference.verdict import Verdict
-from islands.progress import Steps
 from islands.records.writer import write_record
 from support.command_line import succeed
 
@@ -54,12 +53,6 @@ def test_the_files_are_those_of_the_command(files, found, tmp_path):
     assert documents[0] == documents[1]
 
 
-def test_the_sentences_are_those_of_the_command(files, found):
-    assert str(found) == found.summary
-    assert " ".join(found.summary.split()) in " ".join((files / "printed.txt").read_text().split())
-    assert repr(found) == "<DiagnosisResult 'named': delay>"
-
-
 def test_the_extended_simulation_is_that_of_the_folder(found, tmp_path):
     folder, other = found.save(tmp_path / "saved"), made()[:200]
     np.testing.assert_array_equal(found.simulate(other).y, islands.load(folder).simulate(other).y)
@@ -94,18 +87,6 @@ def test_an_extension_that_may_diverge_is_refused(found, tmp_path):
             each.simulate(made())
 
 
-def test_a_notebook_shows_the_sentences_and_a_figure(found):
-    html = found._repr_html_()
-    assert (
-        "<p>The simulation probably lacks a known effect, delay of the input (<code>delay</code>), which "
-        "explains the discrepancy.</p>"
-    ) in html
-    assert 'alt="measured and simulated output"' in html
-    assert found.plot("residual").axes
-    with pytest.raises(islands.SettingsError, match="unknown figure 'loop'"):
-        found.plot("loop")
-
-
 def test_a_diagnosis_without_an_effect_has_no_simulation(found, tmp_path):
     nothing = replace(found, verdict=Verdict.NOTHING, effects=(), gain=None)
     with pytest.raises(islands.ModelError, match=r"no extended simulation, because .* 'nothing'"):
@@ -116,29 +97,6 @@ def test_a_diagnosis_without_an_effect_has_no_simulation(found, tmp_path):
         "report.html",
     ]
     assert islands.load(tmp_path).verdict == "nothing"
-
-
-def test_a_folder_states_what_the_run_stated(found, tmp_path):
-    loaded = islands.load(found.save(tmp_path / "saved"))
-    assert str(loaded) == found.summary
-    assert "<p>The simulation probably lacks a known effect" in loaded._repr_html_()
-
-
-def test_properties_of_the_noise_are_no_claimed_causes(found):
-    noise = replace(found.effects[0], name="outliers", explained_fraction=None)
-    unclaimed = replace(found.effects[0], name="jump", is_claimed=False)
-    assert replace(found, effects=(*found.effects, unclaimed, noise)).claimed_names == ("delay",)
-    assert repr(replace(found, verdict=Verdict.NOTHING, effects=(noise,), gain=None)) == (
-        "<DiagnosisResult 'nothing': no causes>"
-    )
-
-
-def test_a_formula_and_steps_that_were_left_out_are_in_every_text(found):
-    steps = Steps()
-    steps.leave_out("a formula")
-    complete = found.with_steps(steps)
-    assert "was stopped, without: a formula" in complete.summary
-    assert complete.document["left_out"] == ["a formula"]
 
 
 @pytest.mark.parametrize(

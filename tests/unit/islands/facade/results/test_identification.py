@@ -1,15 +1,12 @@
 """Result of a search: the recommended model and the folder."""
 
 import json
-import re
-from base64 import b64decode
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import islands
-from islands.models.equations import mathml_equation
 from support.searches import record
 from support.undrawn import undrawn_figures
 
@@ -29,24 +26,6 @@ def test_a_result_without_a_loop_replaces_the_loop_figure_of_an_earlier_one(resu
         result.save(tmp_path, figures=("free-run", "loop", "front"))
     assert {path.name for path in figures.iterdir()} == {"free-run.svg", "front.svg"}
     assert json.loads((tmp_path / "result.json").read_text())["loop"] is False
-
-
-def test_results_models_and_records_are_represented_in_one_line(result):
-    text = repr(result)
-    assert text == f"<Result of {len(result.models)} models, recommended: {result.best.equation}>"
-    assert repr(result.models[1]) == f"<FittedModel of rank 2: {result.models[1].equation}>"
-    assert repr(record(400)) == "<Dataset of 400 samples of 0.04 s: u to y>"
-
-
-def test_a_notebook_shows_the_equation_the_sentences_and_a_figure(result):
-    shown = result._repr_html_()
-    assert mathml_equation(result.best.model) in shown
-    assert "<p>Recommended: model " in shown
-    assert "<p>Next: " in shown
-    image = re.search(r'src="data:image/svg\+xml;base64,([^"]+)"', shown)
-    assert b"</svg>" in b64decode(image[1])
-    rmse = result.models[1].metrics["validation"]["free_run"].rmse
-    assert f"<p>Rank 2: free-run RMSE on the validation data {rmse:.4g}</p>" in result.models[1]._repr_html_()
 
 
 def test_predictions_of_a_frame_have_one_value_per_row(result):
@@ -97,15 +76,6 @@ def test_rows_of_a_model_of_means_have_the_prediction_of_their_mean():
     assert np.isnan(predicted[604])
 
 
-def test_the_table_of_models_has_their_errors_by_rank(result):
-    table = result.to_pandas()
-    assert [*table.index] == [model.rank for model in result.models]
-    assert table.loc[table["recommended"]].index == [result.best.rank]
-    assert [*table["rmse_val"]] == [model.metrics["validation"]["free_run"].rmse for model in result.models]
-    assert [*table["terms"]] == [model.model.size for model in result.models]
-    assert table.loc[1, "equation"] == result.models[0].equation
-
-
 @pytest.mark.ci
 def test_a_figure_of_another_record_is_that_of_its_simulation(result):
     other = record(200, seed=5)
@@ -117,10 +87,6 @@ def test_a_figure_of_another_record_is_that_of_its_simulation(result):
 
 def test_a_result_draws_its_recommended_model(result):
     assert result.plot()._repr_html_() == result.best.plot()._repr_html_()
-
-
-def test_a_notebook_shows_a_figure_without_pyplot(result):
-    assert "data:image/svg+xml" in result.best.plot()._repr_html_()
 
 
 @pytest.mark.parametrize("kind", ["free-run", "loop"])

@@ -36,19 +36,6 @@ def test_the_system_of_control_simulates_as_the_linear_model():
     assert control.dcgain(system) == pytest.approx(np.array([[2.5, 2.5]]))
 
 
-@pytest.mark.ci
-def test_models_of_a_result_have_their_analyses(result):
-    model = result.best
-    system = model.linearise(0.0)
-    assert system.nstates == model.model.maximum_lag
-    assert model.to_sympy().lhs.func.__name__ == "y"
-    assert model.step_response(0.0, 1.0).y[-1] == pytest.approx(
-        model.static_characteristic([1.0])[0], rel=0.05
-    )
-    assert len(model.plot_step_response(0.0, 1.0).axes) == 2
-    assert len(model.plot_static_characteristic([0.0, 0.5, 1.0]).axes) == 1
-
-
 def test_a_response_is_drawn_into_the_axes_of_the_user(result):
     from matplotlib.figure import Figure
 

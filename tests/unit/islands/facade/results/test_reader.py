@@ -1,7 +1,6 @@
 """Results read from a folder."""
 
 import json
-import re
 import shutil
 
 import numpy as np
@@ -25,26 +24,6 @@ def test_a_folder_gives_the_models_errors_and_settings_of_the_result(result, sto
     assert stored.to_pandas().equals(result.to_pandas())
     assert str(stored) == str(result)
     assert repr(stored) == f"<Result of {len(result.models)} models, recommended: {result.best.equation}>"
-
-
-def test_a_folder_gives_the_statements_of_the_result(result, folder, tmp_path):
-    copied = shutil.copytree(folder, tmp_path / "copy")
-    (copied / "summary.txt").unlink()
-    stored = islands.read_result(copied)
-    assert str(stored) == str(result)
-    sentences = re.findall("<p>(.*?)</p>", result._repr_html_())
-    assert len(sentences) > 5
-    assert re.findall("<p>(.*?)</p>", stored._repr_html_()) == sentences
-
-
-def test_a_folder_of_an_earlier_version_keeps_its_summary(folder, tmp_path):
-    """It lacks facts about the data, such as the ranges that an extrapolation is known from."""
-    copied = shutil.copytree(folder, tmp_path / "copy")
-    document = json.loads((copied / "result.json").read_text())
-    document.pop("data")
-    (copied / "result.json").write_text(json.dumps(document))
-    (copied / "summary.txt").write_text("of an earlier version")
-    assert str(islands.read_result(copied)) == "of an earlier version"
 
 
 def test_predictions_and_bands_of_a_folder_are_those_of_the_result(result, stored):

@@ -12,7 +12,6 @@ from islands.errors import SettingsError
 from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.rate_selection import TrialLibrary
-from islands.persistence.models import model_from_json, model_json
 from islands.records.dataset import Dataset, join
 from islands.records.split import split
 from islands.report.documents.result_folder import result_json
@@ -126,24 +125,6 @@ def test_the_defaults_find_the_static_map_of_two_inputs():
 @pytest.fixture(scope="module")
 def found():
     return islands.fit(lag(white(0), 0), **LIBRARY)
-
-
-def test_the_equation_the_summary_and_the_document_state_it(found):
-    assert found.best.equation == "y(k) = 0.7*y(k-1) + 0.3*u(k)"
-    assert "the output responds to u_V within the sample" in " ".join(str(found).split())
-    document = json.loads(result_json(found.search_result))
-    assert document["preprocessing"]["feedthrough"] == ["u_V"]
-    assert document["settings"]["feedthrough"] == "auto"
-    assert document["record"]["names"]["inputs"] == ["u_V"]
-
-
-def test_a_saved_model_simulates_the_record_as_it_was_measured(found):
-    record = join((lag(white(4, 50), 0), lag(white(5, 70), 0)))
-    again = model_from_json(model_json(found.best.model))
-    for run in (found.best.simulate(record), islands.simulate(again, record)):
-        assert run.outcome
-        assert np.nanmax(np.abs(run.y - record.y)) < 1e-9
-    assert np.isfinite(found.best.bands(record).upper).any()
 
 
 def test_a_record_with_a_delay_gives_the_same_result_as_without_the_test():

@@ -99,16 +99,6 @@ def test_the_choice_is_deterministic(averaged):
     assert result_json(islands.fit(lag(), **LIBRARY).search_result) == result_json(averaged.search_result)
 
 
-def test_the_result_states_the_averages(averaged):
-    count, dt = averaged.search_result.average, averaged.best.model.dt
-    assert dt == 0.001 * count
-    document = json.loads(result_json(averaged.search_result))
-    assert document["preprocessing"].items() >= {"average": count, "dt": dt}.items()
-    assert document["settings"]["average"] == "auto"
-    assert f"the mean of {count} samples of the record" in " ".join(str(averaged).split())
-    assert f"sampling time {dt} s; each value is the mean of {count} samples" in averaged.best.export("c")
-
-
 def test_simulation_of_the_validation_data_has_the_reported_errors(averaged):
     best = averaged.best
     validation = split(lag()).validation

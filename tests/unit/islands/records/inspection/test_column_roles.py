@@ -85,13 +85,6 @@ def test_another_response_is_not_an_input(kind):
     assert_right(kind, test=True, seeds=[0])
 
 
-def test_other_responses_are_stated():
-    u = steps(3000, 0, 10)
-    choice = choose_columns({"a": u, "b": lag(u, 5.0) + 0.01 * white(3000, 1), "c": 2 * lag(u, 9.0)})
-    assert choice.inputs == ("a",)
-    assert f"{'c' if choice.output == 'b' else 'b'} responds to a too" in choice.reason
-
-
 def test_no_pair_without_a_visible_response_is_proposed():
     for seed in range(3):
         choice = choose_columns(make_record("no relation", seed, False).columns)
@@ -193,12 +186,6 @@ def test_the_choice_of_the_user_stays():
 def test_one_signal_is_not_enough():
     choice = choose_columns({"k": np.arange(100.0), "y": white(100, 0)})
     assert choice.output == ""
-
-
-@pytest.mark.ci
-def test_columns_that_are_not_compared_are_stated():
-    columns = make() | {f"c{place}": white(3000, place) for place in range(12)}
-    assert choose_columns(columns).reason.endswith("; of 14 columns 12 are compared.")
 
 
 def test_a_short_record_needs_names():

@@ -132,14 +132,6 @@ def test_a_small_inverse_response_is_a_response():
     assert estimate(measure(u, y, 0.005)).value == 4
 
 
-def test_sentence_states_samples_seconds_and_range():
-    fact = estimate(make_record(white, 4, noise=1.0))
-    assert "after 5 samples (0.5 s)" in fact.sentence
-    low, high = fact.interval
-    assert low < high
-    assert f"between {low:.0f} and {high:.0f} samples with a probability of 95 %" in fact.sentence
-
-
 def test_a_lag_that_is_probably_wrong_is_stated_as_an_interval():
     """Ramps excite a slow response so little that a dead time and a time constant are equal."""
     levels = np.random.default_rng(0).normal(size=10)

@@ -19,13 +19,6 @@ def test_every_fact_is_measured_once_for_each_signal():
     assert [keys.count(("dead-time", name)) for name in ("u1", "u2", "y")] == [1, 1, 0]
 
 
-def test_every_fact_is_one_sentence():
-    for fact in measure_facts(measure(steps(2000, 0), lag(steps(2000, 0), 5.0), 0.05)).facts[1:]:
-        assert fact.sentence[0] == fact.sentence[0].strip()
-        assert fact.sentence.endswith(".")
-        assert ". " not in fact.sentence
-
-
 def test_equal_records_have_equal_facts():
     record = measure(slow(2000, 0), lag(slow(2000, 0), 5.0), 0.05)
     assert measure_facts(record) == measure_facts(record)

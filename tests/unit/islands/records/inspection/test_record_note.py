@@ -21,11 +21,6 @@ def test_a_note_advises_the_options_of_its_text(option: str, value: object) -> N
         assert make_note(join_text("give ", name_option(option, value))).advice == advice
 
 
-def test_a_value_is_rounded_as_it_is_written() -> None:
-    named = name_option("resample", 0.1 + 0.2)
-    assert (named, get_options(named)) == ("resample=0.3", (("resample", 0.3),))
-
-
 def test_a_value_that_only_the_user_knows_is_none() -> None:
     text = join_text(
         "name it by ", name_option("time"), " or ", name_option("timezone", example="Europe/Berlin")
@@ -40,16 +35,6 @@ def test_options_have_the_order_of_the_text_and_occur_once() -> None:
         ("gaps", "split"),
         ("dt", 1.0),
     )
-
-
-def test_a_text_that_looks_like_an_option_has_no_advice() -> None:
-    """Names of columns and cells may be anything."""
-    assert make_note('column gaps="split" has --dt 3').advice == ()
-
-
-def test_options_for_the_names_of_columns_are_no_advice() -> None:
-    text = join_text(name_option("header", False), name_option("names", ["a", "b"]))
-    assert make_note(text).advice == ()
 
 
 def test_a_message_keeps_its_options_in_an_error_and_in_copies() -> None:

@@ -123,10 +123,6 @@ def test_columns_may_have_numbers_as_names(inputs):
     assert (made.input_names, made.output_name) == (("0",), "1")
 
 
-def test_a_list_of_one_output_is_this_output():
-    assert islands.as_record(FRAME, dt=0.04, inputs=("u_V",), output=["y"]).output_name == "y"
-
-
 #: Natural calls that raised an exception of Python, and what the message says.
 UNUSUAL = [
     (lambda: islands.fit(FRAME, inputs="u_V", output=["y", "u_V"], dt=0.04), "got y, u_V: .* fit_coupled"),
@@ -211,11 +207,6 @@ def test_fit_of_a_frame_equals_fit_of_the_record():
     assert made.best.model == same.best.model == arrays.best.model
 
 
-def test_diagnosis_of_a_frame_reads_its_columns():
-    with pytest.raises(islands.RecordError, match="no column volt"):
-        islands.diagnose(FRAME, "linear:1", inputs="volt", output="y", dt=0.04)
-
-
 def test_arrays_import_no_library_of_frames():
     code = (
         "import sys, islands; islands.as_record([0.0, 1.0] * 20, [1.0, 2.0] * 20, 0.1);"
@@ -248,13 +239,6 @@ def test_options_of_reading_are_those_of_a_file(tmp_path, frame, options):
     assert np.array_equal(found.u, same.u)
     assert np.array_equal(found.y, same.y, equal_nan=True)
     assert len(found.reading) == len(same.reading) > 0 or "time" in options
-
-
-def test_searches_take_options_of_reading():
-    found = islands.fit(WITH_GAPS, **CHOICE, library="polynomial", reading={"gaps": "split"})
-    assert found.search_result.record.segments == (50, 248, 99)
-    with pytest.raises(islands.errors.SettingsError, match="already has"):
-        islands.fit(RECORD, reading={"gaps": "split"})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.records.reading import READERS, preview, read_columns, read_record
+from islands.records.reading import READERS, preview, read_record
 
 SAMPLES = 60
 K = np.arange(SAMPLES)
@@ -145,24 +145,6 @@ def test_a_preview_is_plain_data(tmp_path):
 # Problems of columns
 
 
-@pytest.mark.parametrize(
-    "column",
-    [
-        cells(U, c5="off"),
-        [""] * SAMPLES,
-        cells(U, c5="inf"),
-        [2.5] * SAMPLES,
-        cells(U, c5="1,5", c6="0.5"),
-    ],
-    ids=["text", "empty", "infinite", "constant", "both marks"],
-)
-def test_a_problem_is_the_message_of_read_record(tmp_path, column):
-    file = table(tmp_path, separator=";", x=column)
-    message = refusal(file, ["x"], "y_um")
-    assert problems(file) == {"x": message}
-    assert preview(file).warnings == ()
-
-
 @pytest.mark.parametrize("empty", [[5], range(40, SAMPLES)], ids=["single", "at the end"])
 def test_missing_values_are_counted_and_are_no_problem_of_an_output(tmp_path, empty):
     file = table(tmp_path, x=cells(U, **{f"c{k}": "" for k in empty}))
@@ -195,12 +177,6 @@ def test_a_ragged_line_is_the_problem_of_every_column(tmp_path):
     assert preview(file).samples == 0
 
 
-def test_unnamed_columns_are_omitted(tmp_path):
-    file = table(tmp_path)
-    file.write_text(file.read_text().replace("\n", ",\n") + ",")
-    assert [column.name for column in preview(file).columns] == ["t_s", "u_V", "y_um"]
-
-
 def test_an_array_of_unique_length_has_a_problem(tmp_path):
     file = archive(tmp_path, u=U, y=Y, short=U[:50], gain=2.0 * np.ones(1), dt=0.1)
     found = problems(file)
@@ -229,50 +205,18 @@ def test_single_numbers_are_not_a_recording(tmp_path):
     assert preview(file).warnings == ()
 
 
-def test_an_array_of_another_shape_or_kind_is_a_problem(tmp_path):
-    file = archive(tmp_path, u=U, y=Y, dt=0.1, cube=np.ones((2, 3, 4)), text=np.array(["a"] * SAMPLES))
-    assert problems(file)["cube"] == refusal(file, ["cube"], "y")
-    assert problems(file)["text"] == refusal(file, ["text"], "y")
-
-
 def test_a_file_without_channels_still_has_a_sampling_time(tmp_path):
     seen = preview(archive(tmp_path, cube=np.ones((2, 3, 4)), fs=100.0))
     assert (seen.samples, seen.dt, seen.warnings) == (0, pytest.approx(0.01), ())
 
 
-def test_an_empty_array_is_a_problem(tmp_path):
-    seen = preview(archive(tmp_path, x=np.empty(0), u=U, y=Y))
-    assert (seen.columns[0].samples, seen.columns[0].mean) == (0, None)
-    assert "column u has 60 samples, column x 0" in seen.columns[0].problem
-    seen = preview(archive(tmp_path, x=np.empty(0), u=np.empty(0)))
-    assert seen.columns[0].problem == "r.npz has no samples: use another record"
-
-
 # Warnings
-
-
-def test_few_samples_are_a_warning(tmp_path):
-    file = table(tmp_path)
-    file.write_text("\n".join(file.read_text().splitlines()[:21]))
-    assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
-    assert problems(file) == {}
-
-
-def test_columns_of_one_name_are_a_warning(tmp_path):
-    file = table(tmp_path)
-    file.write_text(file.read_text().replace("t_s,", "y_um,"))
-    assert refusal(file, ["u_V"], "y_um") in preview(file).warnings
 
 
 def test_a_decimal_comma_is_a_warning_that_shows_the_first(tmp_path):
     seen = preview(table(tmp_path, separator=";", comma=True))
     assert seen.warnings == ("the comma in r.csv, line 2, column t_s (0,0) is read as a decimal mark",)
     assert seen.dt == pytest.approx(0.01)
-
-
-def test_commas_in_one_column_and_points_in_another_are_a_warning(tmp_path):
-    file = table(tmp_path, separator=";", x=[f"1,{100 + k}" for k in range(SAMPLES)])
-    assert preview(file).warnings == (refusal(file, ["x"], "y_um").replace("y_um (0.5)", "t_s (0.0)"),)
 
 
 # Time
@@ -296,17 +240,6 @@ def test_an_unusable_time_column_is_a_warning(tmp_path, time):
     assert seen.warnings == (refusal(file, ["u_V"], "y_um"),)
 
 
-def test_a_constant_time_is_a_warning_not_a_constant_column(tmp_path):
-    seen = preview(table(tmp_path, t_s=[1.0] * SAMPLES))
-    assert "line 3, column t_s repeats the time stamp 1" in seen.warnings[0]
-    assert seen.columns[0].problem == ""
-
-
-def test_a_time_too_large_for_single_precision_is_checked_for_uniformity(tmp_path):
-    file = table(tmp_path, t_s=[k * 1e39 + (k == 30) * 1e38 for k in range(SAMPLES)])
-    assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
-
-
 def test_a_file_without_a_sampling_time_is_a_warning(tmp_path):
     file = table(tmp_path, drop=["t_s"])
     seen = preview(file)
@@ -327,45 +260,11 @@ def test_a_first_column_in_a_unit_of_time_that_increases_is_the_time(tmp_path):
         assert preview(file).time is None
 
 
-def test_two_possible_time_columns_are_a_warning(tmp_path):
-    file = table(tmp_path, time_ms=T * 1000)
-    seen = preview(file)
-    assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
-
-
 def test_a_stated_sampling_time_is_shown_and_compared_with_the_time(tmp_path):
     assert preview(archive(tmp_path, u=U, y=Y, fs=250.0)).dt == pytest.approx(0.004)
     file = archive(tmp_path, u=U, y=Y, t=T, fs=250.0)
     assert preview(file).dt is None
     assert preview(file).warnings == (refusal(file, ["u"], "y"),)
-
-
-@pytest.mark.ci
-def test_an_invalid_stated_sampling_time_is_a_warning(tmp_path):
-    file = archive(tmp_path, u=U, y=Y, dt=0.0)
-    assert read_columns(file) == ("u", "y", "dt")
-    assert preview(file).dt is None
-    assert preview(file).warnings == (refusal(file, ["u"], "y"),)
-
-
-def test_a_structure_is_shown_with_its_own_time(save):
-    seen = preview(save("7", a={"t": T[:50], "u": U[:50]}, b_1={"t": T * 2, "u_V": U, "y": Y}))
-    assert (seen.time, seen.dt, seen.samples) == ("b_1.t", pytest.approx(0.02), SAMPLES)
-    units = {column.name: column.unit for column in seen.columns}
-    assert (units["b_1.u_V"], units["b_1.y"]) == ("V", "")
-
-
-@pytest.mark.parametrize("content", [b"", b"t_s,u,y\n", b"\x89PNG\r\n\x1a\n" + bytes(range(256))])
-def test_an_unreadable_file_is_refused(tmp_path, content):
-    (tmp_path / "r.csv").write_bytes(content)
-    with pytest.raises(RecordError, match=r"r\.csv"):
-        preview(tmp_path / "r.csv")
-
-
-def test_one_sample_has_no_sampling_time(tmp_path):
-    (tmp_path / "r.csv").write_text("t_s,u,y\n0,1,2")
-    seen = preview(tmp_path / "r.csv")
-    assert (seen.samples, seen.dt, seen.time) == (1, None, "t_s")
 
 
 def test_readers_of_rare_formats_import_their_libraries_on_demand():

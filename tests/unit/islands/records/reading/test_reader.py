@@ -78,14 +78,6 @@ def test_inputs_keep_the_order_in_which_they_are_given(tmp_path):
     assert record.u[:, 1].tolist() == U.tolist()
 
 
-def test_a_single_input_may_be_given_by_its_bare_name(tmp_path):
-    assert read_record(written(tmp_path), "u_V", "y_um").input_names == ("u_V",)
-
-
-def test_a_path_may_be_a_string(tmp_path):
-    assert read_record(str(written(tmp_path)), ["u_V"], "y_um").samples == SAMPLES
-
-
 def test_a_byte_order_mark_and_trailing_blank_lines_are_accepted(tmp_path):
     file = written(tmp_path)
     file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes() + b"\n  \n,,\n\n")
@@ -98,19 +90,6 @@ def test_a_separator_at_the_end_of_every_line_is_accepted(tmp_path):
     file = written(tmp_path, ";", comma=True)
     file.write_text(file.read_text().replace("\n", ";\n"))
     assert read_record(file, ["u_V"], "y_um").y.tolist() == Y.tolist()
-
-
-def test_a_file_of_numpy_savetxt_is_read(tmp_path):
-    np.savetxt(tmp_path / "r.txt", np.column_stack([T, U, Y]), header="t_s u_V y_um")
-    record = read_record(tmp_path / "r.txt", ["u_V"], "y_um")
-    assert record.u[:, 0].tolist() == U.tolist()
-
-
-def test_a_name_may_contain_an_unused_separator(tmp_path):
-    file = written(tmp_path)
-    file.write_text(file.read_text().replace("u_V", "u (a;b)"))
-    assert read_columns(file) == ("t_s", "u (a;b)", "y_um")
-    assert read_record(file, ["u (a;b)"], "y_um").u[:, 0].tolist() == U.tolist()
 
 
 def test_quoted_names_may_contain_the_separator_and_blanks(tmp_path):
@@ -239,14 +218,6 @@ def test_time_in_single_precision_is_uniform(tmp_path):
     assert read_record(file, ["u"], "y").dt == pytest.approx(1 / 610.35, rel=1e-6)
 
 
-def test_seconds_since_1970_are_a_time_like_any_other(tmp_path):
-    rows = (f"{1_700_000_000 + k * 0.01:.2f},{k % 7},{k % 11}" for k in range(100))
-    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *rows]))
-    record = read_record(tmp_path / "r.csv", ["u"], "y")
-    assert record.dt == pytest.approx(0.01, rel=1e-5)
-    assert record.start == 1_700_000_000
-
-
 def test_the_given_sampling_time_is_used_without_a_time_column(tmp_path):
     file = written(tmp_path)
     file.write_text(file.read_text().replace("t_s", "k"))
@@ -360,16 +331,6 @@ def test_a_fingerprint_is_the_sha_256_of_the_bytes(tmp_path):
     assert fingerprint(other) != fingerprint(file)
 
 
-def test_a_fingerprint_of_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(RecordError, match="there is no file"):
-        fingerprint(tmp_path / "none.csv")
-
-
-def test_every_known_suffix_is_lower_case_with_its_dot():
-    assert set(READERS) >= {".csv", ".txt", ".tsv", ".dat", ".npz"}
-    assert all(suffix == suffix.lower() and suffix.startswith(".") for suffix in READERS)
-
-
 def test_an_input_with_the_suffix_plus_one_is_read_one_sample_early(tmp_path):
     file = tmp_path / "record.csv"
     file.write_text("t_s,u_V,y_um\n" + "\n".join(f"{k / 10:g},{k * k},{k}" for k in range(40)))
@@ -416,10 +377,6 @@ def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
 def test_an_argument_of_another_type_is_refused(tmp_path, given, words):
     with pytest.raises(IslandsError, match=words):
         read_record(written(tmp_path), ["u_V"], "y_um", **given)
-
-
-def test_names_may_be_one_text_as_on_the_command_line(tmp_path):
-    assert read_record(written(tmp_path), "a", ["b"], names="t, a, b").input_names == ("a",)
 
 
 def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path):

@@ -36,10 +36,6 @@ def archive(tmp_path):
     return archive
 
 
-def test_the_valid_archive_of_these_tests_is_read(archive):
-    assert read_record(archive(x=member(U)), ["x"], "y").u[:, 0].tolist() == U.tolist()
-
-
 def test_a_header_with_a_size_above_that_of_its_member_is_refused(archive, refusal):
     for samples in (61, 2**26):
         message = refusal(archive(x=member(U, (samples,))))

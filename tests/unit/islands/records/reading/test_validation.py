@@ -7,12 +7,6 @@ from islands.records.reading import read_record
 from islands.records.reading.validation import MIN_SAMPLES
 from support.bad_records import HEADER, changed, lines, refusal
 
-
-def test_the_valid_record_of_these_tests_is_read(tmp_path):
-    (tmp_path / "good.csv").write_text("\n".join(lines()))
-    assert read_record(tmp_path / "good.csv", ["u_V"], "y_um").dt == pytest.approx(0.01)
-
-
 # Values
 
 
@@ -214,16 +208,6 @@ def test_jittered_sampling_is_refused(tmp_path):
     assert "dt=0.01" in message
 
 
-def test_one_displaced_time_stamp_is_named(tmp_path):
-    message = refusal(tmp_path, changed(33, 0, "0.3125"))
-    assert "line 33, column t_s is off the uniform grid: the time changes from 0.3 to 0.3125" in message
-
-
-def test_a_displaced_first_time_stamp_is_shown_with_the_next_step(tmp_path):
-    message = refusal(tmp_path, changed(2, 0, "0.0025"))
-    assert "line 3, column t_s is off the uniform grid: the time changes from 0.0025 to 0.01" in message
-
-
 def test_early_stamps_are_checked_with_their_own_number_of_digits(tmp_path):
     rows = [HEADER, *(f"{2.13e-4 * k:.5g},{k % 7},{k % 11}" for k in range(10_000))]
     rows[100] = f"{2.13e-4 * 99 + 1e-5:.5g},1,1"
@@ -284,11 +268,6 @@ def test_two_possible_time_columns_are_refused(tmp_path):
 def test_a_missing_column_is_refused_with_all_columns_and_the_closest(tmp_path):
     message = refusal(tmp_path, lines(), inputs=["U_v"])
     assert message == "bad.csv has no column U_v; it has t_s, u_V, y_um. Did you mean 'u_V'?"
-
-
-def test_a_missing_output_column_is_refused(tmp_path):
-    message = refusal(tmp_path, lines(), output="position")
-    assert message == "bad.csv has no column position; it has t_s, u_V, y_um"
 
 
 def test_columns_of_one_name_are_refused(tmp_path):

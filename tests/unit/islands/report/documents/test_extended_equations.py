@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -175,17 +174,3 @@ def test_calibrated_values_have_the_interval_of_the_finding() -> None:
     assert written.values[0].estimate == interval
     assert written.values[1].estimate.unit == "m"
     assert "u is u_V, output is y_m" in written.notes
-
-
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_each_effect_of_the_catalogue_is_written_and_shown(name: str) -> None:
-    simulation = (
-        "bouc-wen-piezo" if name in ("relaxation", "rate-dependent-loop", "loop-asymmetry") else "linear:1"
-    )
-    written = write(simulation, [name])
-    assert written.lines[-1].left == "output"
-    assert any(
-        each.effect == name for each in written.values
-    ) or "in the figure of the free forms" in " ".join(written.notes)
-    assert all("{" not in note for note in written.notes)
-    ElementTree.fromstring(written.mathml)

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.estimation.estimator_table import Criterion
 from islands.persistence.models import read_model, terms_document
-from islands.persistence.result_models import read_criterion
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import content_sha256, result_document, result_json, write_result
 from islands.report.text.summary import summary
@@ -53,121 +51,12 @@ def with_best(findings, **changes):
 # The contract: the fields that issue 2 lists, and those that docs/reference/result-json.md adds.
 
 
-def test_a_result_has_every_field_of_the_contract(findings):
-    result = loaded(findings)
-    assert list(result) == [
-        *("schema", "record", "preprocessing", "seed", "settings", "search", "not_computed", "data", "loop"),
-        *("recommended", "models", "ensemble", "linear"),
-    ]
-    assert result["schema"] == "islands.result/1"
-    assert list(result["record"]) == [
-        *("sha256", "samples", "dt", "start", "names", "units", "segments", "recordings", "reading")
-    ]
-    contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
-    assert list(result["search"])[:5] == contract
-    assert set(result["data"]) == {
-        "left_out",
-        "missing_outputs",
-        "output_range",
-        "output_limits",
-        "noise",
-        "inputs",
-    }
-    assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
-    for model in result["models"]:
-        assert list(model) == [
-            *("rank", "recommended", "size", "equation", "latex", "signals", "named_equation"),
-            *("named_signals", "terms", "bands", "recordings", "warm_up", "estimated_start", "refit"),
-            *("information", "constraints", "criterion", "metrics", "outcomes", "physics"),
-            "residual_tests",
-        ]
-        for term in model["terms"]:
-            assert list(term) == ["regressor", "parameter", "standard_error", "term", "inclusion"]
-        for named, inner in (("metrics", {"mape", "r2", "rmse", "fit_percent"}), ("outcomes", None)):
-            assert set(model[named]) == {"estimation", "validation"}
-            for modes in model[named].values():
-                assert set(modes) == {"one_step_ahead", "multiple_shooting", "free_run"}
-                assert all(inner is None or set(mode) == inner for mode in modes.values())
-        assert set(model["information"]) == {"aic", "bic", "fpe"}
-        (check,) = model["constraints"]
-        text = "hysteresis"
-        assert check == {"text": text, "target": 0.0, "value": check["value"], "met": True, "named": text}
-        assert check["value"] <= 1e-9
-
-
-def test_a_result_states_the_error_that_the_parameters_minimise(findings):
-    squares = {"estimator": "least-squares", "interval": 1, "error": "one_step_ahead"}
-    free_run = {"estimator": "free-run", "interval": None, "error": "free_run"}
-    assert all(model["criterion"] in (squares, free_run) for model in loaded(findings)["models"])
-    given = with_best(findings, criterion=None)
-    assert loaded(given)["models"][0]["criterion"] is None
-    criteria = {
-        ("shooting", 500): "multiple_shooting",
-        ("free-run", None): "free_run",
-        ("output-error", None): "free_run",
-    }
-    for (estimator, interval), error in criteria.items():
-        found = with_best(findings, criterion=Criterion(estimator, interval))
-        expected = {"estimator": estimator, "interval": interval, "error": error}
-        entry = loaded(found)["models"][0]
-        assert entry["criterion"] == expected
-        assert read_criterion(entry) == Criterion(estimator, interval)
-    assert read_criterion({}) is None
-
-
 def test_a_result_names_the_recommended_model_with_reasons(findings):
     result = loaded(findings)
     found = findings.recommendation
     assert result["recommended"] == json.loads(json.dumps(asdict(found)))
     assert found.excluded
     assert [model["rank"] for model in result["models"] if model["recommended"]] == [found.rank]
-
-
-def test_a_result_has_the_reason_that_ended_an_evolution(findings):
-    assert loaded(findings)["search"]["ended_by"] is None
-    evolved = replace(findings, search=replace(findings.search, ended_by="target error"))
-    assert loaded(evolved)["search"]["ended_by"] == "target error"
-
-
-def test_a_result_lists_physics_checks_and_residual_tests(findings):
-    for model in loaded(findings)["models"]:
-        physics, tests = model["physics"], model["residual_tests"]
-        assert set(physics) == {
-            *("property_1", "clusters", "hold_drift_percent", "holds", "excursions", "extremes"),
-            "not_computed",
-        }
-        assert physics["not_computed"] is tests["not_computed"] is None
-        assert physics["property_1"] is True
-        assert physics["clusters"] == [{"cluster": "y", "sum": pytest.approx(1.0), "target": 1.0}]
-        assert len(physics["holds"]) == 10
-        assert set(physics["holds"][0]) == {"level", "loading", "bounded", "constant", "drift_percent"}
-        assert len(physics["excursions"]) == 4
-        assert set(tests) == {
-            *("passed", "whiteness_p", "ljung_box", "tests"),
-            *("verdict", "predictable_share", "predictable_percent", "not_computed"),
-        }
-        assert tests["verdict"] in ("adequate", "minor", "inadequate")
-        assert all(0.0 <= share <= 1.0 for share in tests["predictable_share"].values())
-        assert [test["name"] for test in tests["tests"]] == ["xi_xi", "u_xi", "xi_xiu", "u2_xi", "u2_xi2"]
-        for test in tests["tests"]:
-            assert set(test) == {"name", "input", "passed", "inside_percent", "limit", "largest", "note"}
-            assert test["passed"] is (test["largest"] <= test["limit"])
-            assert 0.0 < test["largest"] < 1.0
-
-
-def test_a_result_has_the_settings_and_the_search_statistics(findings):
-    result = loaded(findings)
-    assert result["seed"] == 7
-    assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
-    assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
-    assert (result["record"]["samples"], result["record"]["dt"]) == (300, 0.1)
-    assert result["record"]["segments"] == [300]
-    count = findings.search.evaluations
-    assert result["search"]["evaluations"] == count >= 4
-    assert result["search"]["evaluations_per_second"] == pytest.approx(2.0 * count)
-    assert result["search"]["outcomes"] == {"ok": count}
-    # Equation (5): C(6 + 5, 5) terms of 3 + 3 lags to degree 5, over 225 rows less 3.
-    assert result["search"]["full_set"] == {"candidates": 462, "bytes": 8 * 462 * 222}
 
 
 def test_models_are_in_rank_order_with_their_numbers(findings):

@@ -43,8 +43,3 @@ def test_an_input_without_an_effect_has_no_line():
     assert labels == ["y (mm) over u (V)", "y (mm) over load (N): no effect"]
     assert [line.get_label() for line in below.lines if not line.get_label().startswith("_")] == labels[:1]
     assert above.get_ylabel() == "magnitude"
-
-
-def test_the_magnitude_has_the_quotient_of_the_units():
-    record = Dataset(np.zeros(50), np.zeros(50), 0.01, ("u_V",), "y_mm", ("V",), "mm")
-    assert draw_bode(make_model(), record).axes[0].get_ylabel() == "magnitude (mm/V)"

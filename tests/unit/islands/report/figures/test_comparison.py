@@ -1,11 +1,9 @@
 """Figure of the free runs of several models."""
 
 import numpy as np
-import pytest
 
 from islands.report.figures.comparison import RUN_STYLES, draw_comparison
 from islands.report.figures.style import MEASURED
-from support.contrast import DARK_PAPER, LINE_CONTRAST, contrast, shown_in_dark
 from support.undrawn import undrawn_figures
 
 TIME = np.linspace(0.0, 1.0, 200)
@@ -35,10 +33,3 @@ def test_every_run_has_a_line_and_a_residual_in_its_style():
 def test_a_diverging_run_does_not_hide_the_others():
     low, high = draw({"A": 1e5 * TIME, "B": MEASURED_OUTPUT}).axes[0].get_ylim()
     assert -2.0 < low < -1.0 < 1.0 < high < 2.0
-
-
-@pytest.mark.parametrize("colour", [colour for colour, _ in RUN_STYLES])
-def test_lines_are_legible_on_white_and_in_the_dark(colour):
-    channels = [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
-    assert contrast(channels, (255, 255, 255)) >= LINE_CONTRAST
-    assert contrast(shown_in_dark(channels), DARK_PAPER) >= LINE_CONTRAST

@@ -1,15 +1,13 @@
 """Confusion matrix: positions, colours and legibility."""
 
 from collections.abc import Mapping
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from islands.report.figures.confusion import draw_confusion
-from islands.report.figures.style import FRAME, RESIDUAL, SIMULATED, save
-from islands_measurements.detection.injection.piezo import PIEZO
+from islands.report.figures.style import FRAME, RESIDUAL, SIMULATED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,38 +80,3 @@ def test_colours_distinguish_right_wrong_and_unnamed(
     }
     tint = 0.25 + 0.75 * share
     assert patches[cell] == pytest.approx(1 - tint * (1 - np.array(to_rgb(colour))))
-
-
-def test_labels_of_a_full_catalogue_are_legible() -> None:
-    """Names are neither cut off nor overlapping, and numbers fit into their cells."""
-    names = [*PIEZO.known, *(f"another-effect-{number}" for number in range(5))]
-    every = {(name, name): 100 for name in names} | {("", ""): 300, ("ripple", "unknown"): 50}
-    figure = draw_confusion(every, names, "every name of the catalogue")
-    figure.draw_without_rendering()
-    axes, page = figure.axes[0], figure.bbox
-    cell = axes.get_window_extent().width / len(columns(figure))
-    for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
-        box = label.get_window_extent()
-        assert page.x0 <= box.x0, label
-        assert box.x1 <= page.x1, label
-        assert box.y1 <= page.y1, label
-    assert all(label.get_window_extent().height <= cell for label in axes.get_yticklabels())
-    assert all(text.get_window_extent().width <= cell for text in axes.texts)
-    assert min(label.get_fontsize() for label in axes.get_yticklabels()) >= 6.0
-
-
-def test_title_does_not_touch_the_names(figure: "Figure") -> None:
-    figure.draw_without_rendering()
-    title = figure._suptitle.get_window_extent()
-    assert all(label.get_window_extent().y1 < title.y0 for label in figure.axes[0].get_xticklabels())
-
-
-def test_equal_counts_give_equal_files() -> None:
-    first, second = BytesIO(), BytesIO()
-    for stream in (first, second):
-        save(draw_confusion(COUNTS, NAMES), stream)
-    assert first.getvalue() == second.getvalue()
-
-
-def test_empty_counts_give_an_empty_matrix() -> None:
-    assert rows(draw_confusion({}, NAMES)) == []

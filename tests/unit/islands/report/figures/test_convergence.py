@@ -7,8 +7,6 @@ import pytest
 
 from islands.evolution.history import HistoryPoint
 from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
-from islands.report.figures.registry import search_figures
-from islands.report.figures.style import save
 
 
 def make_result(history=(), models=()):
@@ -73,18 +71,6 @@ def test_convergence_shows_the_rmse_of_every_size_over_generations():
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["1", "2", "3"]
 
 
-def test_size_with_one_generation_is_drawn_as_a_point():
-    figure = draw_convergence(make_result(HISTORY))
-    markers = {line.get_label(): line.get_marker() for line in get_axes(figure).lines}
-    assert markers == {"1": "", "2": "o", "3": ""}
-
-
-def test_search_of_one_generation_has_points_over_an_integer_tick():
-    figure = draw_convergence(make_result(HISTORY[:1]))
-    assert {line.get_marker() for line in get_axes(figure).lines} == {"o"}
-    assert integer_ticks(get_axes(figure)) == [0]
-
-
 def test_front_shows_both_parts_over_the_number_of_terms():
     figure = draw_front(make_result(models=MODELS))
     assert get_lines(figure) == {
@@ -93,10 +79,6 @@ def test_front_shows_both_parts_over_the_number_of_terms():
         "recommended": [[2.0, 1.0]],
     }
     assert integer_ticks(get_axes(figure)) == [1, 2, 3]
-
-
-def test_front_of_one_model_has_an_integer_tick():
-    assert integer_ticks(get_axes(draw_front(make_result(models=MODELS[:1])))) == [3]
 
 
 @pytest.mark.parametrize("errors", [(2.7, 4.2), (0.051, 0.062), (9.5, 10.5), (0.01, 100.0)])
@@ -124,24 +106,6 @@ def test_diverged_and_exact_models_do_not_affect_the_error_axis():
     assert 30.0 < high < 1000.0
 
 
-@pytest.mark.parametrize("sizes", [1, 9, 30])
-def test_legend_of_many_sizes_stays_inside_the_figure(sizes):
-    history = [
-        HistoryPoint(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)}, (1.0 / sizes,))
-        for generation in (0, 1, 2)
-    ]
-    figure = draw_convergence(make_result(history))
-    legend = get_axes(figure).get_legend()
-    assert len(legend.get_texts()) == sizes
-    box = legend.get_window_extent()
-    assert figure.bbox.x0 <= box.x0
-    assert box.x1 <= figure.bbox.x1
-    assert figure.bbox.y0 <= box.y0
-    assert box.y1 <= figure.bbox.y1
-    assert get_axes(figure).get_position().width > 0.4
-    assert box.x0 >= get_axes(figure).get_window_extent().x1
-
-
 def test_islands_figure_has_a_line_per_island_and_one_for_the_best():
     figure = draw_islands(make_result(ISLANDS_HISTORY))
     *islands, best = (line.get_xydata() for line in get_axes(figure).lines)
@@ -155,32 +119,3 @@ def test_islands_figure_has_a_line_per_island_and_one_for_the_best():
     assert integer_ticks(axes) == [4, 5, 6]
     # One legend entry is enough for all islands.
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["one island", "best island"]
-
-
-def test_generation_without_models_is_left_empty():
-    blank = (HistoryPoint(0, 1, {}, (np.inf, np.inf)), *ISLANDS_HISTORY)
-    figure = draw_islands(make_result([HistoryPoint(p.generation, 1, {}, p.islands[:2]) for p in blank]))
-    best = get_axes(figure).lines[-1].get_xydata()[:, 1]
-    np.testing.assert_array_equal(best, [np.nan, 2.0, 1.0, 0.5])
-
-
-@pytest.mark.parametrize(
-    ("history", "names"),
-    [
-        ((), ("record", "front")),
-        (HISTORY, ("record", "front", "convergence")),
-        (ISLANDS_HISTORY, ("record", "front", "convergence", "islands")),
-    ],
-)
-def test_search_figures_depend_on_the_history(history, names):
-    assert search_figures(make_result(history)) == names
-
-
-@pytest.mark.parametrize(
-    "draw",
-    [draw_convergence, *(pytest.param(each, marks=pytest.mark.ci) for each in (draw_front, draw_islands))],
-)
-def test_saving_twice_gives_the_same_bytes(draw, tmp_path):
-    for name in ("first", "second"):
-        save(draw(make_result(HISTORY, MODELS)), tmp_path / f"{name}.svg")
-    assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()

@@ -8,8 +8,7 @@ import pytest
 
 import islands
 from islands.effects.catalogue import get_title
-from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES, draw_residual, draw_screening
-from islands.report.figures.style import save
+from islands.report.figures.diagnosis import draw_residual, draw_screening
 
 pytestmark = pytest.mark.usefixtures("without_layout")
 
@@ -38,13 +37,6 @@ def residual_figure():
     return draw_residual(diagnosis())
 
 
-@cache
-def figures_of_long_record():
-    """Return the figures of a diagnosis of a figures_of_long_record record, by name."""
-    found = diagnosis(samples=6000)
-    return {name: draw(found) for name, draw in DIAGNOSIS_FIGURES.items()}
-
-
 def test_residual_figure_has_a_panel_per_signal() -> None:
     axes = residual_figure().axes
     assert [panel.get_xlabel() for panel in axes] == [
@@ -68,21 +60,6 @@ def divide(samples: int, boundary: int):
     u = np.array(found.record.u)
     u[boundary:] += 20.0
     return replace(found, record=replace(found.record, u=u, segments=(boundary, samples - boundary)))
-
-
-@pytest.mark.ci
-def test_lines_are_interrupted_between_recordings() -> None:
-    divided = divide(900, 600)
-    for name, panels in (("over-time", 3), ("loops", 2)):
-        axes = DIAGNOSIS_FIGURES[name](divided).axes
-        assert len(axes) == panels
-        for line in [line for panel in axes for line in panel.lines if len(line.get_xdata()) > 2]:
-            assert np.flatnonzero(np.isnan(line.get_xdata() + line.get_ydata())).size == 1
-    # One boundary in each panel over time.
-    shown = DIAGNOSIS_FIGURES["over-time"](divided).axes
-    assert [line.get_xdata()[0] for panel in shown for line in panel.lines if len(line.get_xdata()) == 2] == [
-        pytest.approx(599.5 * DT)
-    ] * 2
 
 
 @pytest.mark.ci
@@ -120,31 +97,6 @@ def test_spectrum_integrates_to_the_variance_of_the_residual() -> None:
     assert np.trapezoid(density**2, frequency) == pytest.approx(np.var(residual), rel=0.25)
 
 
-@pytest.mark.ci
-def test_input_with_few_levels_has_no_empty_cells() -> None:
-    """An empty cell has no mean; zero would look like a residual that vanishes."""
-    found = diagnosis(levels=2)
-    over_input = draw_residual(found).axes[0].lines[0]
-    assert set(over_input.get_xdata()) <= set(np.unique(found.record.u))
-
-
-@pytest.mark.ci
-def test_long_record_is_shown_completely_and_in_a_section() -> None:
-    shown = figures_of_long_record()["over-time"].axes
-    whole, part = (np.ptp(shown[place].get_xlim()) for place in (0, 2))
-    assert len(shown) == 5
-    assert part < whole / 4
-    assert len(DIAGNOSIS_FIGURES["over-time"](diagnosis()).axes) == 3
-
-
-def test_diagnosis_without_effects_has_no_lines_after_extension() -> None:
-    clean = diagnosis(friction=0.0)
-    assert clean.best is clean.base
-    for draw in DIAGNOSIS_FIGURES.values():
-        texts = {text.get_text() for panel in draw(clean).axes for text in _legend(panel)}
-        assert not texts & {"extended"}
-
-
 def test_screening_figure_colours_the_named_effects() -> None:
     found = diagnosis()
     axes = draw_screening(found).axes[0]
@@ -152,16 +104,3 @@ def test_screening_figure_colours_the_named_effects() -> None:
     orange = [name for name, bar in zip(names, axes.patches, strict=True) if bar.get_facecolor()[0] > 0.8]
     assert orange == ["dry friction"]
     assert names[-1] == get_title(found.candidates[0].name)
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("name", DIAGNOSIS_FIGURES)
-def test_figure_files_are_smaller_than_300_kilobytes(name: str, tmp_path) -> None:
-    path = tmp_path / "figure.svg"
-    save(figures_of_long_record()[name], path)
-    assert path.stat().st_size < 300_000
-
-
-def _legend(panel):
-    legend = panel.get_legend()
-    return legend.get_texts() if legend else []

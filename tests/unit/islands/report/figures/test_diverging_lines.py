@@ -53,10 +53,6 @@ def test_axis_follows_the_simulation_without_measured_output():
     np.testing.assert_array_equal(within_reach(record([NAN, NAN]), values), values)
 
 
-def test_limits_leave_a_margin_around_all_values():
-    assert limits(np.array([0.0, NAN]), np.array([10.0])) == pytest.approx((-0.5, 10.5))
-
-
 @pytest.mark.parametrize(
     ("values", "expected"), [([0.0], (-1.0, 1.0)), ([5.0, 5.0], (4.75, 5.25)), ([NAN, NAN], (-1.0, 1.0))]
 )
@@ -92,21 +88,6 @@ def test_mark_is_where_the_line_finally_leaves_the_axes():
     figure = draw_diverging(([1.0, 2.0, 3.0, 4.0, 5.0], [5.0, 20.0, 5.0, 30.0, -900.0]))
     assert marks(figure) == [(4.0, 10.0)]
     assert annotations(figure) == ["diverged"]
-
-
-def test_mark_of_a_line_inside_the_axes_is_at_its_end():
-    assert marks(draw_diverging(([1.0, 2.0], [5.0, 6.0]))) == [(2.0, 6.0)]
-
-
-def test_neighbouring_divergences_share_one_annotation():
-    figure = draw_diverging(([10.0], [5.0]), ([11.0], [6.0]), ([60.0], [5.0]))
-    assert len(marks(figure)) == 3
-    assert annotations(figure) == ["diverged", "diverged"]
-
-
-def test_annotation_stays_inside_at_the_right_edge():
-    assert draw_diverging(([10.0], [5.0])).axes[0].texts[0].get_ha() == "left"
-    assert draw_diverging(([95.0], [5.0])).axes[0].texts[0].get_ha() == "right"
 
 
 def test_empty_line_has_no_mark():

@@ -13,7 +13,6 @@ from islands.validation.prediction_bands import PredictionBand
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 pytestmark = pytest.mark.usefixtures("without_layout")
 
@@ -46,64 +45,8 @@ def curve(axes: "Axes", colour: str) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
 
 
-def labels(figure: "Figure") -> list[tuple[str, str]]:
-    return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
-
-
 def annotations(axes: "Axes") -> list[str]:
     return [text.get_text() for text in axes.texts]
-
-
-def test_short_record_has_an_output_and_a_residual_panel():
-    record = sine(3)
-    figure = draw_free_run(record, 0.9 * record.y, "three periods")
-    assert labels(figure) == [("", "y (um)"), ("time (s)", "residual (um)")]
-    assert figure.get_suptitle() == "three periods"
-    for colour, axes, values in (
-        (MEASURED, figure.axes[0], record.y),
-        (SIMULATED, figure.axes[0], 0.9 * record.y),
-        (RESIDUAL, figure.axes[1], record.y - 0.9 * record.y),
-    ):
-        x, y = curve(axes, colour)
-        np.testing.assert_array_equal(x, record.time)
-        np.testing.assert_array_equal(y, values)
-
-
-def test_legend_names_both_lines():
-    record = sine(3)
-    legend = draw_free_run(record, record.y).axes[0].get_legend()
-    assert [text.get_text() for text in legend.get_texts()] == ["measured", "simulated"]
-
-
-def test_label_without_a_unit_is_the_column_name():
-    record = sine(3, input_units=("",), output_unit="")
-    assert labels(draw_free_run(record, record.y)) == [("", "y_um"), ("time (s)", "residual")]
-
-
-def test_residual_has_a_separate_scale():
-    record = sine(3)
-    above, below = draw_free_run(record, 0.99 * record.y).axes
-    assert np.ptp(above.get_ylim()) == pytest.approx(6.6, rel=0.01)
-    assert np.ptp(below.get_ylim()) == pytest.approx(0.066, rel=0.01)
-
-
-def test_title_of_the_residual_panel_has_the_errors():
-    record = sine(3)
-    below = draw_free_run(record, record.y + 0.06).axes[1]
-    assert below.get_title(loc="right") == "MAPE 1.00 % of the range, RMSE 0.0600 um"
-
-
-def test_record_of_many_loops_is_shown_completely_and_in_a_section():
-    record = sine(40, 4000)
-    figure = draw_free_run(record, 0.9 * record.y)
-    assert labels(figure) == 2 * [("", "y (um)"), ("time (s)", "residual (um)")]
-    whole, part = figure.axes[0].get_xlim(), figure.axes[2].get_xlim()
-    assert whole == pytest.approx((0.0, 39.99))
-    assert part[1] - part[0] == pytest.approx(4.99)
-    assert "median" in figure.axes[2].get_title(loc="left")
-    x, y = curve(figure.axes[2], MEASURED)
-    rows = np.round(x / record.dt).astype(int)
-    np.testing.assert_array_equal(y, record.y[rows])
 
 
 def test_segments_are_separated_and_not_joined():
@@ -128,24 +71,6 @@ def test_missing_output_is_a_gap_and_the_simulation_is_complete():
     assert np.isnan(curve(figure.axes[1], RESIDUAL)[1]).sum() == 20
 
 
-@pytest.mark.parametrize("spike", [0, 21_337, LONG - 1])
-def test_spike_of_a_single_sample_is_drawn_in_a_long_record(spike):
-    y = 0.1 * noise(0)
-    y[spike] = 9.0
-    record = Dataset(noise(1), y, 1e-3)
-    x, drawn = curve(draw_free_run(record, np.zeros(LONG)).axes[0], MEASURED)
-    assert len(x) <= 2000
-    assert x[np.argmax(drawn)] == pytest.approx(spike * 1e-3)
-    assert drawn.max() == 9.0
-
-
-def test_long_record_makes_a_small_file(tmp_path):
-    # White noise is the worst case, because no vertex is on the line between its neighbours.
-    record = Dataset(noise(1), noise(2), 1e-3, segments=(LONG // 2, LONG // 2))
-    save(draw_free_run(record, noise(3)), tmp_path / "noise.svg")
-    assert 50_000 < (tmp_path / "noise.svg").stat().st_size < 400_000
-
-
 def diverging(record: Dataset, at: int) -> np.ndarray:
     k = np.arange(record.samples)
     return np.where(k < at, np.exp(0.1 * np.minimum(k, at)) - 1.0, np.nan)
@@ -168,16 +93,6 @@ def test_divergence_is_annotated_and_does_not_flatten_other_lines(tmp_path):
     save(figure, tmp_path / "diverged.svg")
 
 
-@pytest.mark.ci
-def test_annotation_is_only_in_the_diverged_segment():
-    record = sine(3, segments=(200, 200))
-    simulated = np.where(np.arange(400) < 200, record.y, np.nan)
-    simulated[200:260] = 0.5
-    above = draw_free_run(record, simulated).axes[0]
-    assert annotations(above) == ["diverged"]
-    assert above.lines[-1].get_xdata()[0] == pytest.approx(2.59)
-
-
 def test_axes_follow_a_bounded_simulation_with_large_errors():
     record = sine(3)
     figure = draw_free_run(record, record.y + 60.0)
@@ -186,33 +101,11 @@ def test_axes_follow_a_bounded_simulation_with_large_errors():
     assert annotations(figure.axes[0]) == []
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize(("periods", "value"), [(3, np.nan), (3, np.inf), (3, 1e300), (40, np.nan)])
-def test_simulation_without_values_is_announced_in_the_title(periods, value, tmp_path):
-    record = sine(periods, 4000)
-    figure = draw_free_run(record, np.full(4000, value))
-    assert figure.axes[0].get_title(loc="left") == "no simulated value"
-    assert len(curve(figure.axes[0], MEASURED)[0]) > 1000
-    save(figure, tmp_path / "nothing.svg")
-
-
-def test_section_of_a_diverged_long_record_contains_the_divergence():
-    record = sine(40, 4000)
-    figure = draw_free_run(record, diverging(record, 120))
-    assert figure.axes[2].get_title(loc="left") == "shaded section"
-    assert figure.axes[2].get_xlim()[0] == 0.0
-    assert annotations(figure.axes[2]) == ["diverged"]
-
-
 @pytest.mark.parametrize("y", [np.full(50, np.nan), np.zeros(50)])
 def test_record_with_missing_or_constant_output_is_drawn(y, tmp_path):
     record = Dataset(np.arange(50.0), y, 1.0)
     save(draw_free_run(record, np.arange(50.0)), tmp_path / "odd.svg")
     save(draw_free_run(record, np.full(50, np.nan)), tmp_path / "odd.svg")
-
-
-def test_record_of_one_sample_is_drawn(tmp_path):
-    save(draw_free_run(Dataset(np.ones(1), np.ones(1), 1.0), np.ones(1)), tmp_path / "one.svg")
 
 
 def test_simulation_of_another_length_raises_settings_error():
@@ -242,19 +135,6 @@ def test_a_band_is_shaded_about_the_free_run_and_about_zero():
             assert sum(point in drawn for point in points) > 0.99 * record.samples
     assert [text.get_text() for text in above.get_legend().get_texts()][-1] == "90 % band"
     assert above.get_ylim() == without.axes[0].get_ylim()
-
-
-def test_a_band_without_limits_is_shaded_over_the_axes():
-    record = sine(3)
-    half = np.where(np.arange(record.samples) < 200, 0.1, np.inf)
-    half[:3] = np.nan
-    above = draw_free_run(record, record.y, band=band_of(record, half)).axes[0]
-    vertices = shaded(above)
-    low, high = above.get_ylim()
-    assert np.isfinite(vertices).all()
-    assert vertices[:, 0].min() == record.time[3]
-    assert vertices[:, 1].min() < low
-    assert vertices[:, 1].max() > high
 
 
 def test_the_band_of_a_long_record_is_its_envelope():

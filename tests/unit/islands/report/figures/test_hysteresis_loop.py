@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from islands.errors import SettingsError
 from islands.records.dataset import Dataset
 from islands.report.figures.hysteresis_loop import draw_loop
 from islands.report.figures.style import MEASURED, SIMULATED, save
@@ -35,13 +34,6 @@ def test_inputs_have_one_panel_each_with_name_and_unit(inputs):
         np.testing.assert_array_equal(simulated.get_ydata(), 0.9 * record.y)
 
 
-def test_panels_share_the_scale_of_the_output():
-    record = loops(3, 4)
-    figure = draw_loop(record, 2.0 * record.y)
-    for axes in figure.axes:
-        assert axes.get_ylim() == pytest.approx((-2.2, 2.2), abs=0.01)
-
-
 def test_last_five_of_many_loops_are_drawn():
     record = loops(40)
     (axes,) = draw_loop(record, record.y).axes
@@ -53,44 +45,6 @@ def test_last_five_of_many_loops_are_drawn():
     np.testing.assert_array_equal(u, record.u[first : first + 5 * 200 + 1, 0])
 
 
-def test_few_loops_are_drawn_completely():
-    record = loops(5)
-    (axes,) = draw_loop(record, record.y).axes
-    assert axes.get_title(loc="left") == ""
-    assert len(axes.lines[0].get_xdata()) == record.samples
-
-
-def test_segments_are_not_joined():
-    record = loops(3, segments=(250, 350))
-    (axes,) = draw_loop(record, record.y).axes
-    for line in axes.lines:
-        assert np.isnan(line.get_xdata()[250])
-        assert np.isnan(line.get_ydata()[250])
-
-
-def test_legend_names_both_lines():
-    (legend,) = draw_loop(loops(3), loops(3).y).legends
-    assert [text.get_text() for text in legend.get_texts()] == ["measured", "simulated"]
-
-
-def test_long_loop_makes_a_small_file_and_keeps_its_tips(tmp_path):
-    record = loops(4, length=25_000)
-    figure = draw_loop(record, record.y)
-    x, y = figure.axes[0].lines[0].get_data()
-    assert len(x) <= 2000
-    assert (x.max(), x.min()) == (record.u.max(), record.u.min())
-    assert (y.max(), y.min()) == (record.y.max(), record.y.min())
-    save(figure, tmp_path / "long.svg")
-    assert (tmp_path / "long.svg").stat().st_size < 400_000
-
-
-def test_long_noise_makes_a_small_file(tmp_path):
-    rng = np.random.default_rng(0)
-    record = Dataset(np.linspace(0, 1, 100_000), rng.standard_normal(100_000), 1e-3)
-    save(draw_loop(record, rng.standard_normal(100_000)), tmp_path / "noise.svg")
-    assert (tmp_path / "noise.svg").stat().st_size < 400_000
-
-
 @pytest.mark.parametrize(("periods", "part"), [(3, ""), (40, "the last 5 of 40 loops; ")])
 def test_divergence_is_in_the_title_and_does_not_flatten_the_loops(periods, part, tmp_path):
     record = loops(periods)
@@ -99,14 +53,3 @@ def test_divergence_is_in_the_title_and_does_not_flatten_the_loops(periods, part
     assert figure.axes[0].get_title(loc="left") == part + "the simulation diverged"
     assert np.abs(figure.axes[0].get_ylim()).max() < 4.0
     save(figure, tmp_path / "diverged.svg")
-
-
-def test_simulation_without_values_is_announced_in_the_title(tmp_path):
-    figure = draw_loop(loops(3), np.full(600, np.nan))
-    assert figure.axes[0].get_title(loc="left") == "no simulated value"
-    save(figure, tmp_path / "nothing.svg")
-
-
-def test_simulation_of_another_shape_raises_settings_error():
-    with pytest.raises(SettingsError, match=r"got shape \(3, 2\)"):
-        draw_loop(loops(3), np.zeros((3, 2)))

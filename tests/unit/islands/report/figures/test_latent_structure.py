@@ -52,27 +52,6 @@ def find_block(name: str) -> str:
     return name[0].upper() + (name.split("_")[1] if name[0] == "e" else name[1:].split("_", maxsplit=1)[0])
 
 
-def test_a_diagram_names_the_signals_the_units_and_the_modes():
-    texts = list_texts(make_model())
-    assert {"u_V", "y_mm", "h1\ncube"} <= set(texts)
-    assert texts[0].split("\n") == [
-        "linear system with 2 states",
-        "with the units, about rest at u_V = 0:",
-        "resonance at 5.189 Hz with a damping ratio of 0.162",
-    ]
-    with_errors = make_model(quantity_errors=(0.003, 0.001, 0.02))
-    assert list_texts(with_errors)[0].split("\n")[2:] == [
-        "resonance at 5.189 +- 0.003 Hz with a damping ratio of",
-        "0.162 +- 0.001",
-        "static gain of u_V 0.564 +- 0.02",
-        "(+- standard errors)",
-    ]
-
-
-def test_an_arrow_of_some_inputs_names_them():
-    assert {"u1, u2", "u3", "u1, u3"} <= set(list_texts(make_large_model()))
-
-
 def test_all_parts_are_inside_of_the_figure():
     for model in (make_model(), make_large_model()):
         figure = draw_structure(model)

@@ -45,13 +45,6 @@ def test_groups_without_a_stable_model_have_no_box_of_the_free_run():
     assert len(boxes(figure.axes[0])) == 3
 
 
-def test_notches_of_few_scattered_errors_stay_positive():
-    errors = [1.0, 2.0, 900.0, 1e4]
-    group = MonteCarloGroup("0", errors, errors, [3, 4, 5, 6], 0.0, (0.0, 0.5))
-    axes = draw_groups([("S2", [group])], "PRPB", "light").axes[0]
-    assert all((box.get_path().vertices[:, 1] > 0.0).all() for box in boxes(axes))
-
-
 def test_published_fractions_are_marked_where_there_are_any():
     panels = [
         ("S1", [make_group("0", diverged=4, published=0.4), make_group("1")]),

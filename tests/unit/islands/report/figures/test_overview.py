@@ -1,13 +1,9 @@
-import io
-
 import numpy as np
 import pytest
 
 from islands.records.dataset import Dataset
 from islands.records.inspection.record_facts import measure_facts
 from islands.report.figures.overview import draw_overview
-from islands.report.figures.style import save
-from islands.report.figures.themes import THEMES
 from support.known_records import delay, lag, measure, steps, white
 
 
@@ -21,31 +17,11 @@ def record():
     return measure(u, delay(lag(u, 4.0), 3), 0.02, dt=0.1)
 
 
-@pytest.mark.ci
-def test_themes_draw_the_same_lines(record):
-    light, dark = (draw(record, theme) for theme in THEMES)
-    assert len(light.axes) == len(dark.axes) == 6
-    for one, other in zip(light.axes, dark.axes, strict=True):
-        for line, same in zip(one.lines, other.lines, strict=True):
-            np.testing.assert_array_equal(line.get_xydata(), same.get_xydata())
-    assert light.get_facecolor() != dark.get_facecolor()
-
-
 def test_dead_time_is_marked_in_the_impulse_response(record):
     axes = draw(record).axes[-1]
     assert [text.get_text() for text in axes.texts] == ["dead time 4"]
     response = axes.lines[0].get_ydata()
     assert np.argmax(response > 0.5 * response.max()) == 4
-
-
-@pytest.mark.ci
-def test_equal_records_give_equal_files(record):
-    files = []
-    for _ in range(2):
-        stream = io.BytesIO()
-        save(draw(record), stream)
-        files.append(stream.getvalue())
-    assert files[0] == files[1]
 
 
 def test_input_that_does_not_excite_has_no_impulse_response():

@@ -44,10 +44,3 @@ def test_a_validation_has_output_over_time_and_input_and_both_holds(reproduced):
     assert [len(axes.lines) for axes in figure.axes] == [3, 2, 3, 3]
     assert np.array_equal(loop.lines[1].get_ydata(), over_time.lines[2].get_ydata())
     assert (loading.get_xlim()[0], unloading.get_xlim()[0]) == (1.0, 2.0)
-
-
-def test_every_switch_has_its_errors_and_their_median():
-    axes = FIGURES["errors"](None, "light").axes[0]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["all", "one"]
-    medians = [line.get_xdata()[0] for line in axes.lines[2::2]]
-    assert medians == [0.2, 0.2]

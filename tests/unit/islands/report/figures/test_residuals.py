@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from islands.report.figures.residuals import draw_residual_correlations
-from islands.report.figures.style import save
 from islands.validation.residual_tests import ResidualTests, residual_tests
 
 if TYPE_CHECKING:
@@ -65,44 +64,3 @@ def test_limits_and_tested_values_are_inside_the_panel():
         for axes, test in zip(draw(coloured=coloured).axes, tests.tests, strict=True):
             counted = test.values[1:] if test.input is None else test.values
             assert axes.get_ylim()[1] > max(test.limit, np.abs(counted).max())
-
-
-def test_lag_0_of_the_autocorrelation_does_not_affect_the_scale():
-    assert draw().axes[0].get_ylim()[1] < 0.2
-
-
-def test_title_announces_that_a_white_residual_passes():
-    figure = draw(title="model 12")
-    title, verdict = figure.get_suptitle().split("\n")
-    assert title == "model 12"
-    assert verdict.startswith("residual tests passed: 5 of 5 correlations passed, whiteness p = 0.")
-    assert [axes.get_title(loc="right") for axes in figure.axes] == 5 * ["passed"]
-
-
-def test_title_has_the_p_value_of_the_whiteness_test():
-    tests = run_tests()
-    assert f"whiteness p = {tests.whiteness_p:.2g}" in draw().get_suptitle()
-
-
-def test_title_announces_that_a_coloured_residual_fails():
-    figure = draw(coloured=True)
-    assert figure.get_suptitle() == ("residual tests failed: 4 of 5 correlations passed, whiteness p < 0.001")
-    assert [axes.get_title(loc="right") for axes in figure.axes] == ["FAILED", *4 * ["passed"]]
-
-
-def test_legend_explains_band_and_limit():
-    (legend,) = draw().legends
-    assert [text.get_text() for text in legend.get_texts()] == [
-        "95 % band of a single lag",
-        "limit of the test",
-        "correlation",
-    ]
-
-
-def test_constant_input_is_noted_in_its_panels(tmp_path):
-    residual = np.random.default_rng(0).standard_normal(300)
-    figure = draw_residual_correlations(residual_tests(residual, np.ones((300, 1))))
-    notes = [" ".join(text.get_text().split()) for axes in figure.axes for text in axes.texts]
-    assert len(notes) == 4
-    assert notes[0] == "input 1 is constant: there is nothing to correlate"
-    save(figure, tmp_path / "noted.svg")

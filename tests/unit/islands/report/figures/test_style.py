@@ -13,7 +13,7 @@ import pytest
 
 from islands.records.dataset import Dataset
 from islands.report.figures.free_run import draw_free_run
-from islands.report.figures.style import WIDTH, blank, house_style, label, save
+from islands.report.figures.style import house_style, label, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,34 +60,6 @@ def test_matplotlib_settings_are_restored_after_an_exception(matplotlib):
     with pytest.raises(ZeroDivisionError), house_style():
         raise ZeroDivisionError
     assert matplotlib.rcParams["svg.hashsalt"] is None
-
-
-def test_figure_has_the_width_of_an_article_column():
-    assert blank(3.0).get_size_inches().tolist() == [WIDTH, 3.0]
-
-
-def test_long_title_is_wrapped_and_line_breaks_are_kept():
-    assert blank(3.0, "word " * 40 + "\nend").get_suptitle().count("\n") == 3
-
-
-@pytest.mark.ci
-def test_equal_content_gives_equal_bytes(tmp_path):
-    figure = example()
-    save(figure, tmp_path / "first.svg")
-    figure.savefig(tmp_path / "between.png")
-    save(figure, tmp_path / "again.svg")
-    save(example(), tmp_path / "redrawn.svg")
-    first = (tmp_path / "first.svg").read_bytes()
-    assert (tmp_path / "again.svg").read_bytes() == first
-    assert (tmp_path / "redrawn.svg").read_bytes() == first
-
-
-def test_different_curves_give_different_bytes(tmp_path):
-    save(example(), tmp_path / "one.svg")
-    other = example()
-    other.axes[0].lines[0].set_ydata(np.zeros(300))
-    save(other, tmp_path / "other.svg")
-    assert (tmp_path / "one.svg").read_bytes() != (tmp_path / "other.svg").read_bytes()
 
 
 def test_matplotlib_settings_of_the_user_have_no_effect(tmp_path, matplotlib):

@@ -20,22 +20,6 @@ def test_a_figure_has_the_background_of_its_theme(name):
     assert dict(matplotlib.rcParams) == before
 
 
-@pytest.mark.parametrize("name", THEMES)
-def test_text_and_lines_are_readable_on_the_background(name):
-    from matplotlib.colors import to_rgb
-
-    def luminance(colour: str) -> float:
-        linear = [
-            part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in to_rgb(colour)
-        ]
-        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-    theme = THEMES[name]
-    for colour, least in ((theme.text, 7.0), (theme.output, 3.0), (theme.mark, 3.0), (theme.inputs[0], 3.0)):
-        low, high = sorted((luminance(colour), luminance(theme.background)))
-        assert (high + 0.05) / (low + 0.05) >= least, colour
-
-
 def test_an_unknown_theme_is_refused():
     with pytest.raises(SettingsError, match="theme"), themed_style("drak"):
         pass

@@ -13,15 +13,6 @@ from support.latent_systems import SPRING, make_model, spring_record
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("without_layout")]
 
 
-def test_labels_say_what_the_curve_is_with_units():
-    made = spring_record(400)
-    record = Dataset(made.u, made.y, 0.01, ("u_V",), "y_mm", ("V",), "mm")
-    (axes,) = draw_unit_curves(make_model(), record, 20).axes
-    assert axes.get_title(loc="left") == "h1: cube"
-    assert axes.get_xlabel() == "y (mm), which the argument follows"
-    assert axes.get_ylabel() == "effect on y (mm) at rest"
-
-
 def test_the_curve_beyond_the_estimation_data_is_dashed():
     record = spring_record(400)
     louder = Dataset(1.5 * record.u, record.y, 0.01, ("u_V",), "y_mm")

@@ -3,7 +3,6 @@
 import numpy as np
 
 from islands.records.dataset import Dataset
-from islands.records.loops import loop_starts
 from islands.report.figures.windows import LOOPS, last_loops, representative_window
 
 
@@ -23,17 +22,6 @@ def test_record_of_few_loops_is_shown_completely():
     assert last_loops(sine(LOOPS)) == slice(0, 100 * LOOPS)
 
 
-def test_section_is_needed_for_more_than_twenty_loops():
-    assert representative_window(sine(20), np.ones(2000)) is None
-    assert representative_window(sine(21), np.ones(2100)) is not None
-
-
-def test_short_record_is_shown_completely_for_any_number_of_loops():
-    record = sine(60, length=3)
-    assert len(loop_starts(record)) > 20
-    assert representative_window(record, np.ones(record.samples)) is None
-
-
 def test_section_has_the_median_residual():
     record = sine(25)
     residual = np.repeat([5.0, 1.0, 4.0, 3.0, 2.0], 500)
@@ -44,10 +32,6 @@ def test_section_with_missing_residuals_is_never_selected():
     record = sine(25)
     residual = np.repeat([5.0, np.nan, np.nan, np.nan, 2.0], 500)
     assert representative_window(record, residual) == slice(0, 500)
-
-
-def test_first_section_is_selected_if_all_residuals_are_missing():
-    assert representative_window(sine(25), np.full(2500, np.nan)) == slice(0, 500)
 
 
 def test_sections_do_not_cross_segments_that_are_long_enough():

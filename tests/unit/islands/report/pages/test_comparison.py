@@ -39,17 +39,6 @@ def headline(page):
     return re.search("<h1>(.*?)</h1>", page)[1]
 
 
-def test_headline_names_the_model_of_the_least_error(document):
-    worse = deepcopy(document)
-    worse["models"][0]["metrics"]["validation"]["free_run"]["mape"] = 40.0
-    page = write(compared(worse), compared(document, name="second"))
-    error = document["models"][0]["metrics"]["validation"]["free_run"]["mape"]
-    assert headline(page) == (
-        f"Of 2 models, second simulates y_um best, with a mean absolute error of {error:.3g} % of its range."
-    )
-    assert page.count("<img") == 1
-
-
 def test_models_of_different_data_have_separate_figures_and_no_best_one(document):
     other = {**RUN, "measured": [5.0, 6.0, 7.0]}
     page = write(compared(document), compared(document, name="second", run=other))

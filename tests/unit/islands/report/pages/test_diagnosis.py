@@ -76,22 +76,6 @@ def test_figures_are_drawn_by_the_map_and_keep_the_order_of_the_report(diagnosis
 
 
 @pytest.mark.ci
-def test_errors_have_the_unit_of_the_output_if_it_has_one(diagnosis: Diagnosis) -> None:
-    named = replace(diagnosis, record=replace(diagnosis.record, output_unit="um"))
-    assert re.search(r"to 0\.\d+, by", summarise(diagnosis))
-    assert re.search(
-        r"to 0\.\d+ um, by .* alone, is at most 0\.\d+ um \(", summarise(named).replace("\n", " ")
-    )
-
-
-@pytest.mark.ci
-def test_report_says_which_effects_are_not_claimed_as_causes(diagnosis: Diagnosis) -> None:
-    effects = (diagnosis.effects[0], replace(diagnosis.effects[0], name="jump", is_claimed=False))
-    lines = summarise(replace(diagnosis, effects=effects)).splitlines()
-    assert ["not claimed as a cause" in line for line in lines if line.startswith("  ")] == [False, True]
-
-
-@pytest.mark.ci
 def test_noise_alone_is_no_discrepancy_and_no_cause(diagnosis: Diagnosis) -> None:
     (cause,) = diagnosis.causes
     noise = replace(cause, name="coloured-noise", explained_fraction=None)

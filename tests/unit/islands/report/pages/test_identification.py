@@ -40,38 +40,10 @@ def test_terms_have_the_names_of_the_columns(found):
         assert f'<th scope="row">{term}</th>' in page
 
 
-def test_headline_with_the_error_and_the_free_run_precede_everything_else(found):
-    page = write(found)
-    error = found.best.metrics["validation"]["free_run"].mape
-    order = [
-        f"error of {error:.3g}\u00a0% of its range",
-        "Free run of",
-        "<math",
-        "95 % interval",
-        "Validation",
-    ]
-    order += ["Correlations of", "Appendix", "Error against size"]
-    places = [page.index(each) for each in order]
-    assert places == sorted(places)
-
-
 def test_figures_of_hysteresis_are_in_the_report_of_a_model_of_hysteresis_alone(found):
     assert "Output over input" not in write(found)
     settings = {**found.settings, "constraints": ["hysteresis"]}
     assert "Output over input" in write(found, settings=settings)
-
-
-def test_appendix_has_the_equations_of_the_other_models_and_all_settings(found):
-    page = unescape(write(found))
-    main, appendix = page.split('<section class="appendix">')
-    others = [each for each in found.models if each.rank != found.best.rank]
-    assert others
-    for each in others:
-        equation = each.model.equation().named
-        assert equation in appendix
-        assert equation not in main
-    for name in ("max_terms", "library", "SHA-256", "seed"):
-        assert f"<dt>{name}</dt>" in appendix
 
 
 def test_names_of_columns_are_text(found):

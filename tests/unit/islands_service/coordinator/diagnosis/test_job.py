@@ -77,24 +77,6 @@ def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs
     assert phases(store, job)[-1] == "writing the report"
 
 
-@pytest.mark.nightly
-def test_an_extended_difference_equation_is_in_the_summary(
-    store: Store, blobs: Blobs, tmp_path: Path
-) -> None:
-    time = 0.01 * np.arange(400)
-    u = np.sin(11 * time) + 0.3 * np.sin(50 * time)
-    noise = 0.02 * np.random.default_rng(1).standard_normal(time.size)
-    y = 2.0 * np.sign(u) * np.maximum(np.abs(u) - 0.3, 0.0) + noise
-    path = tmp_path / "record.csv"
-    rows = np.column_stack([time, u, y])
-    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header="t_s,u_V,y_um", comments="")
-    linear = {"kind": "linear", "order": 0, "numerator": [2.0], "reference_input": 0.0}
-    submit_diagnosis(store, blobs, path, simulation=linear)
-    summary = run_job(claim(store), store, blobs).summary or {}
-    assert summary["effects"] == ["dead-zone"]
-    assert "max(abs(u(k)) - 0.3" in summary["equation"]
-
-
 @pytest.mark.ci
 @pytest.mark.parametrize(
     ("phase", "verdict", "left_out"),
@@ -147,16 +129,6 @@ def test_job_that_is_cancelled_before_its_first_result_has_none(
         run_job(claim(store), store, blobs, cancel)
 
 
-@pytest.mark.ci
-def test_recordings_are_diagnosed_together(store: Store, blobs: Blobs, submit: Submit) -> None:
-    first = submit()
-    store.jobs.cancel(ALICE, first.id)
-    submit(rows="0:150", recordings=[{"dataset": first.spec["dataset"], "rows": "150:"}])
-    document = run_job(claim(store), store, blobs).document or {}
-    assert document["record"]["segments"] == [150, 250]
-    assert [effect["name"] for effect in document["effects"]] == ["offset"]
-
-
 @pytest.mark.parametrize(
     ("changes", "kind", "words"),
     [
@@ -190,14 +162,6 @@ class Away:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._store, name)
-
-
-@pytest.mark.ci
-def test_failed_reports_do_not_affect_the_result(store: Store, blobs: Blobs, submit: Submit) -> None:
-    job = submit()
-    outcome = run_job(claim(store), Away(store), blobs)
-    assert outcome.state == JobState.SUCCEEDED
-    assert phases(store, job) == []
 
 
 def test_finished_work_waits_for_an_object_store_that_is_away() -> None:

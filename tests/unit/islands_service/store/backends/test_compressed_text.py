@@ -39,15 +39,6 @@ def test_every_document_is_read_as_it_was_stored_and_takes_no_more_room(connecti
     assert len(raw) <= len(document)
 
 
-def test_a_document_of_many_similar_entries_takes_a_quarter(connection):
-    document = json.dumps(
-        [{"size": size, "rmse": 1.0 / size, "terms": ["y(k-1)", "u(k-1)"]} for size in range(1, 99)]
-    )
-    read, raw = stored(connection, document)
-    assert read == document
-    assert 4 * len(raw) < len(document)
-
-
 def test_a_document_of_an_earlier_version_is_read(connection):
     document = json.dumps({"a": "x" * 10_000})
     connection.execute(

@@ -3,15 +3,13 @@
 import json
 import shutil
 import signal
-from contextlib import contextmanager
 
 import pytest
 
-from islands.cli.runs import identify as command
 from islands.persistence.checkpoints import read_checkpoint, write_hall
 from islands.records.dataset import Dataset
 from islands.records.writer import write_record
-from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused
+from support.identify_runs import COLUMNS, DEEPEST, SMALL, TWO, models, record, refused
 
 # Files of a run.
 
@@ -43,21 +41,6 @@ def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     assert about["job"]["seed"] == archipelago.islands[0].seed == 4
     assert [about["history"][at][0] for at in (0, -1)] == [0, 3]
     assert search["ended_by"] == "generations"
-
-
-@pytest.mark.ci
-def test_stages_before_and_after_the_epochs_are_displayed(run, monkeypatch):
-    shown = []
-
-    @contextmanager
-    def bar(_title):
-        yield lambda message, *_fraction, **_lines: shown.append(message)
-
-    monkeypatch.setattr(command, "progress", bar)
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
-    stages = ("sampling rate", "swap search", "generation 3/3", "estimation of the final models", "figures")
-    first = [next(at for at, text in enumerate(shown) if text.startswith(stage)) for stage in stages]
-    assert first == sorted(first)
 
 
 @pytest.mark.ci
@@ -112,17 +95,6 @@ def test_values_of_the_test_data_do_not_change_the_models(run, tmp_path):
     assert good["outcome"] == bad["outcome"] == "ok"
     assert good["mape"] < 1.0 < bad["mape"]
     assert f"not used before: free run ok, MAPE {bad['mape']:.4f} %" in out
-
-
-@pytest.mark.ci
-def test_test_data_is_a_file_or_rows_of_the_record(run, tmp_path):
-    write_record(record(seed=3), "t.csv")
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "file", "--test", "t.csv")[0] == 0
-    code, _, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "rows", "--rows", "0:500", "--test", "500:700")
-    assert code == 0
-    found = [json.loads((tmp_path / name / "test.json").read_text()) for name in ("file", "rows")]
-    assert all(set(each) == {"outcome", "mape", "r2", "rmse", "fit_percent"} for each in found)
-    assert found[0] != found[1]
 
 
 @pytest.mark.parametrize(
@@ -192,26 +164,6 @@ def test_invalid_option_is_rejected_by_name_without_a_folder(run, tmp_path, opti
     assert not (tmp_path / "out").exists()
 
 
-def test_missing_arguments_are_named(run):
-    assert "give RECORD, --input, --output and --out, or --resume DIR" in refused(
-        run("r.csv", "--out", "out")
-    )
-    assert "there is no file nothing.csv" in refused(run("nothing.csv", *COLUMNS, "--out", "out")).replace(
-        str(command.Path.cwd()) + "/", ""
-    )
-
-
-def test_options_reach_the_settings(run, tmp_path):
-    text = "odd; [u(k-1)] >= 0"
-    own = ("--primitive", "mul", "--primitive", "phi1", "--constraints", text, "--preset", "hysteresis")
-    assert run("r.csv", *COLUMNS, *SMALL, *own, "--out", "out")[0] == 0
-    settings = json.loads((tmp_path / "out/result.json").read_text())["settings"]
-    assert settings["primitives"] == ["mul", "phi1"]
-    assert (settings["constraints"], settings["preset"]) == (text, "hysteresis")
-    assert (settings["population"], settings["generations"], settings["shooting"]) == (10, 3, 50)
-    assert (settings["max_terms"], settings["max_height"]) == (3, 3)
-
-
 @pytest.mark.ci
 def test_options_of_islands_reach_the_settings(run, tmp_path):
     own = (
@@ -240,25 +192,3 @@ def test_options_of_islands_reach_the_settings(run, tmp_path):
     # Schedules and profiles are read back from the checkpoint unchanged.
     assert run("--resume", "out", "--engine", "serial")[0] == 0
     assert json.loads((tmp_path / "out/result.json").read_text())["settings"] == document["settings"]
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    ("options", "ended_by", "generations"),
-    [
-        (("--max-evaluations", "20"), "evaluations", 1),
-        (("--max-evaluations", "21"), "evaluations", 2),
-        (("--target-error", "1e3"), "target error", 0),
-    ],
-)
-def test_budget_ends_a_run_and_is_named_in_the_result(run, tmp_path, options, ended_by, generations):
-    code, _, error = run("r.csv", *COLUMNS, *STEPWISE, *options, "--out", "out")
-    assert (code, error) == (0, "")
-    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
-    assert (search["ended_by"], search["generations"]) == (ended_by, generations)
-    # Resuming a run that has ended changes nothing.
-    before = models(tmp_path / "out")
-    assert run("--resume", "out")[0] == 0
-    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
-    assert (search["ended_by"], search["generations"]) == (ended_by, generations)
-    assert models(tmp_path / "out") == before

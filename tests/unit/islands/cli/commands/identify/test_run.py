@@ -2,7 +2,6 @@
 
 import json
 import signal
-import sys
 from contextlib import contextmanager
 from math import inf
 
@@ -13,7 +12,6 @@ from islands.cli.runs import timed_engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.history import HistoryPoint
-from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.persistence.checkpoints import read_checkpoint, state_document, write_checkpoint
 from islands.records.writer import write_record
@@ -161,26 +159,6 @@ def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tm
     assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
 
 
-def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_path):
-    """A checkpoint takes one second of the replaced clock and an epoch ten; the limit is a twentieth."""
-    clock, written = [0.0], []
-    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
-
-    def slow(archipelago, path, about):
-        clock[0] += 1.0
-        written.append(archipelago.generation)
-        write_checkpoint(archipelago, path, about)
-
-    monkeypatch.setattr(command, "write_checkpoint", slow)
-
-    def watch(state):
-        clock[0] += 10.0
-
-    watched(watch)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--generations", "6", "--out", "out")[0] == 0
-    assert written == [0, 3, 6, 6]
-
-
 def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
     for module in (command, timed_engine):
@@ -218,13 +196,6 @@ def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted,
     assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
 
 
-def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
-    before = models(tmp_path / "out")
-    assert run("--resume", "out")[0] == 0
-    assert models(tmp_path / "out") == before
-
-
 def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monkeypatch):
     write_record(record(seed=1), "v.csv")
     interrupted(1)
@@ -232,24 +203,6 @@ def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monk
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert run("--resume", "../out")[0] == 0
-
-
-@pytest.mark.parametrize(
-    "changed", ["r.csv", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("v.csv", "t.csv"))]
-)
-def test_changed_file_is_rejected_on_resuming(run, interrupted, tmp_path, changed):
-    for seed, name in enumerate(("v.csv", "t.csv"), start=1):
-        write_record(record(seed=seed), name)
-    interrupted(1)
-    files = "--validation", "v.csv", "--test", "t.csv"
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", *files)[0] == 130
-    before = models(tmp_path / "out")
-    with (tmp_path / changed).open("a") as stream:
-        stream.write("\n")
-    assert f"{changed} has changed since the run began" in refused(run("--resume", "out"))
-    (tmp_path / changed).unlink()
-    assert "there is no file" in refused(run("--resume", "out"))
-    assert models(tmp_path / "out") == before
 
 
 def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
@@ -305,32 +258,6 @@ def test_engine_is_chosen_by_the_options_and_the_number_of_islands(run, engines,
     # A resumed run has the same number of islands.
     assert run("--resume", "out", *words)[0] == 0
     assert requested == [expected] * 2
-
-
-def test_islands_of_a_preset_select_the_engine(run, engines, monkeypatch):
-    several = {"several": resolve_settings("hysteresis", {"islands": 2})}
-    monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
-    requested = engines(SerialEngine())
-    assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--out", "out")[0] == 0
-    assert run("--resume", "out")[0] == 0
-    assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--islands", "1", "--out", "one")[0] == 0
-    assert requested == [(None, None, 2), (None, None, 2), (None, None, 1)]
-
-
-@pytest.mark.parametrize("more", [(), ("--resume", "out")])
-def test_address_for_the_serial_engine_is_rejected(run, tmp_path, more):
-    new = () if more else ("r.csv", *COLUMNS, *SMALL, "--out", "out")
-    error = refused(run(*new, *more, "--engine", "serial", "--ray-address", "there:6379"))
-    assert "--ray-address requires --engine ray: the serial engine runs in this process" in error
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("more", [(), ("--resume", "out")])
-def test_unknown_engine_is_rejected(run, tmp_path, more):
-    new = () if more else ("r.csv", *COLUMNS, *SMALL, "--out", "out")
-    message = "unknown engine 'dask': take one of serial, ray"
-    assert message in refused(run(*new, *more, "--engine", "dask"))
-    assert not (tmp_path / "out").exists()
 
 
 def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):

@@ -260,25 +260,6 @@ def test_every_operator_of_maps_has_a_definition():
     assert set(C_OPERATORS) == set(MATLAB_OPERATORS) == set(OPERATORS) - inline
 
 
-def test_the_program_describes_itself():
-    effects = [effects_of("second-order")[each] for each in ("coulomb-friction", "sensor-lag")]
-    spec, _ = extend(simulator_of("second-order"), made()["second-order"].record, effects)
-    text = export_extended(spec, "c")
-    comment = text[: text.index("*/")]
-    assert "dv/dt = (u - c*v - k*x - coulomb_friction_F*tanh(v/" in comment
-    assert "Effect coulomb-friction: Dry friction: - F sign(x')." in comment
-    assert "double coulomb_friction_F; /* N */" in text
-    assert "double m; /* N s^2/m */" in text
-    assert text.isascii()
-    assert max(map(len, text.splitlines())) <= 120
-
-
-def test_the_program_of_an_axis_says_that_it_is_a_free_run():
-    case = made()["rigid-axis"]
-    spec, _ = extend(simulator_of("rigid-axis"), case.record)
-    assert "This is a free run." in export_extended(spec, "c")
-
-
 @needs_compiler
 @pytest.mark.parametrize("unit", ["*/ int broken = ;", "/* u", "\n#error", "\\\n", "µ°??/\n"])
 def test_a_name_or_unit_cannot_break_the_file(unit, folder):

@@ -32,7 +32,6 @@ def days(origin, step):
 
 
 EXCEL, MAC = datetime(1899, 12, 30), datetime(1904, 1, 1)
-MATLAB = datetime(1, 1, 1)
 
 
 @pytest.mark.parametrize("name", ["Date", "Time", "Timestamp", "Datum", "time_excel", "t"])
@@ -42,27 +41,6 @@ def test_days_of_excel_at_one_minute_are_not_seconds(tmp_path, name):
     (note,) = record.reading
     assert note.startswith(f"column {name} is read as days: 45987.5 is 2025-11-26 12:00:00 (Excel); ")
     assert "give it the time unit s" in note
-
-
-@pytest.mark.parametrize(
-    ("origin", "offset", "digits", "step"),
-    [
-        (EXCEL, 0.0, 5, 60.0),  # as cells that show five decimals
-        (EXCEL, 0.0, 5, 1.0),
-        (EXCEL, 0.0, 12, 0.1),
-        (EXCEL, 0.0, 12, 0.008),
-        (EXCEL, 0.0, 8, 3600.0),
-        (EXCEL, 0.0, 8, 450.0),
-        (MAC, 0.0, 9, 60.0),
-        (MATLAB, 367.0, 9, 60.0),
-        (MATLAB, 367.0, 8, 1.0),
-        (datetime(1858, 11, 17), 0.0, 9, 10.0),
-        (datetime(1858, 11, 17), 2_400_000.5, 8, 10.0),
-    ],
-)
-def test_days_of_other_tools_and_steps(tmp_path, origin, offset, digits, step):
-    stamps = np.array(days(origin, step)) + offset
-    assert read(tmp_path, "Timestamp", stamps, digits).dt == pytest.approx(step, rel=1e-9)
 
 
 def test_jitter_of_a_clock_in_days_is_reported_in_seconds(tmp_path):

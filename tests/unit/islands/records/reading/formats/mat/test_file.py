@@ -1,7 +1,5 @@
 """MAT-files of every version: columns are read back, and other variables do no harm."""
 
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -231,11 +229,6 @@ def test_an_empty_matrix_is_refused_with_its_shape(save, version):
     assert "column u has the shape (0, 0)" in message
 
 
-def test_advice_has_one_placeholder():
-    for advice in ADVICE.values():
-        assert "{" not in advice.format(x="run.u").replace("{1}", "")
-
-
 # Files of other programs
 
 
@@ -262,22 +255,3 @@ def test_samples_of_matlab_4_to_7_4_have_the_same_numbers_as_in_scipy():
     if not folder.exists():
         pytest.skip("SciPy was installed without its samples")
     assert compared > 30
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave: apt-get install octave")
-@pytest.mark.parametrize("option", ["-v4", "-v6", "-v7"])
-def test_files_of_octave_are_read(tmp_path, option):
-    program = "t = (0:59)' / 8; u = t .^ 2; y = int16(-u)'; data = [t u]; Ts = 0.125; s.q = u; s.w = 'text';"
-    names = "t u data Ts" if option == "-v4" else "t u y data Ts s"
-    subprocess.run(
-        ["octave-cli", "--no-gui", "--eval", f"{program} save {option} o.mat {names}"],
-        cwd=tmp_path,
-        check=True,
-    )
-    t = np.arange(60) / 8
-    record = read_record(tmp_path / "o.mat", ["u"], "data_2", rows=slice(0, 40))
-    assert record.dt == 0.125
-    assert record.y.tolist() == (t[:40] ** 2).tolist()
-    if option != "-v4":
-        assert read_record(tmp_path / "o.mat", ["s.q"], "y").y[8] == -1.0

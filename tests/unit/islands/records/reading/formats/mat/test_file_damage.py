@@ -63,13 +63,6 @@ def write(tmp_path):
     return write
 
 
-def test_the_valid_file_of_these_tests_is_read(write):
-    file = write(numbers("x", U), packed(numbers("z", Y)), packed(structure("s", a=numbers("", U))))
-    assert read_columns(file) == ("u", "y", "Ts", "x", "z", "s.a")
-    record = read_record(file, ["x", "z", "s.a"], "y")
-    assert record.u.tolist() == np.column_stack([U, Y, U]).tolist()
-
-
 @pytest.mark.parametrize("kind", ["timeseries", "timetable", "iddata", "mine"])
 @pytest.mark.parametrize("wrapped", [bytes, packed])
 def test_an_object_named_ts_is_refused_with_advice_only_when_read(write, kind, wrapped, refusal):

@@ -84,23 +84,11 @@ def test_days_without_a_proof_of_their_order_are_refused_unless_it_is_given(tmp_
     assert read(tmp_path, rows).dt == 86400.0  # the 13th of March proves the order
 
 
-def test_the_order_does_not_matter_within_one_day(tmp_path):
-    stamps = [moment.strftime("%d/%m/%Y %H:%M:%S.%f") for moment in moments(datetime(2026, 3, 4))]
-    assert read(tmp_path, table(stamps)).dt == pytest.approx(STEP)
-
-
 @pytest.mark.parametrize("form", ["%d/%m/%Y %H:%M", "%m/%d/%y %I:%M:00 %p"])
 def test_a_time_that_goes_on_at_midnight_proves_the_order(tmp_path, form):
     stamps = [moment.strftime(form) for moment in moments(datetime(2026, 1, 2), 3600.0, 120)]
     record = read(tmp_path, table(stamps))
     assert (record.dt, record.samples) == (3600.0, 120)
-
-
-def test_an_hour_of_several_days_does_not_prove_the_order(tmp_path):
-    """The days may be the first ones of some months."""
-    days = [moments(datetime(2026, 1, day), 60.0, 60) for day in (2, 3, 4)]
-    rows = table(moment.strftime("%m/%d/%Y %H:%M") for day in days for moment in day)
-    assert "01/02/2026 may be the day 01 of the month 02" in refusal(tmp_path, rows, ["u"], "y")
 
 
 def test_contradicting_orders_are_refused_with_both_lines(tmp_path):
