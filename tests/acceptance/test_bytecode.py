@@ -24,7 +24,7 @@ finally:
 """
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_commands_compile_almost_no_module_after_the_set_up(tmp_path):
     """A few modules of libraries are loaded by what the commands do, and not by what the sources import."""
     environment = os.environ | {

@@ -88,6 +88,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.nightly
 @pytest.mark.timeout(1200)
 def test_no_page_loads_anything_from_another_host(site: Path) -> None:
     pages = sorted(site.rglob("*.html"))
@@ -99,6 +100,7 @@ def test_no_page_loads_anything_from_another_host(site: Path) -> None:
         assert 'class="mermaid"' not in text, file
 
 
+@pytest.mark.nightly
 @pytest.mark.timeout(1200)
 def test_the_site_has_a_search_index_and_every_public_name(site: Path) -> None:
     assert (site / "search" / "search_index.json").stat().st_size > 100_000

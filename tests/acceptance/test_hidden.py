@@ -97,7 +97,7 @@ def test_parameter_beyond_its_tolerance_is_named(name: str, seconds: float) -> N
 
 @pytest.mark.ci
 @pytest.mark.parametrize("seconds", [6.0, pytest.param(SECONDS, marks=nightly)])
-@pytest.mark.parametrize("name", ["stiction", "backlash"])
+@pytest.mark.parametrize("name", [pytest.param("stiction", marks=nightly), "backlash"])
 def test_stick_slip_and_play_are_distinguished(name: str, seconds: float) -> None:
     found = run(name, band=(2.0, 4.0), seconds=seconds)
     assert found.named == (name,)
@@ -179,9 +179,8 @@ def test_two_effects_are_both_named_with_a_recorded_output() -> None:
     assert are_both_named(found), found
 
 
-@pytest.mark.parametrize(
-    "seconds", [pytest.param(14.0, marks=pytest.mark.ci), pytest.param(SECONDS, marks=nightly)]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("seconds", [14.0, SECONDS])
 def test_three_effects_are_all_named(seconds: float) -> None:
     injected = ("sensor-gain", "linear-drift", "thermal-drift")
     assert sorted(run(*injected, band=(1.0, 4.0), seconds=seconds).named) == sorted(injected)
@@ -221,7 +220,7 @@ def test_right_recorded_output_has_no_discrepancy() -> None:
         pytest.param("second-order", "cubic-stiffness", 8.0, marks=nightly),
         pytest.param("second-order", "coulomb-friction", 8.0, marks=nightly),
         pytest.param("cascaded-tanks", "state-clip", 4096.0, marks=nightly),
-        pytest.param("cascaded-tanks", "jump", 4096.0, marks=pytest.mark.ci),
+        pytest.param("cascaded-tanks", "jump", 4096.0, marks=nightly),
     ],
 )
 def test_effect_injected_into_another_system_is_named(core: str, name: str, seconds: float) -> None:

@@ -18,7 +18,7 @@ from support.repository import DOCS
 from support.service import csv, execute_identification, identification
 
 pytestmark = [
-    pytest.mark.ci,
+    pytest.mark.nightly,
     pytest.mark.skipif(
         find_spec("openapi_python_client") is None, reason="needs openapi-python-client: run make test"
     ),

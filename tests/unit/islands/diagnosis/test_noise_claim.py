@@ -10,6 +10,7 @@ import islands
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.noise_claim import validate_noise_level
 from islands.errors import SettingsError
+from support.levels import nightly_but
 from support.noise_records import (
     SENSOR,
     make_day_wave,
@@ -62,12 +63,7 @@ def test_rounding_is_nothing() -> None:
 @pytest.mark.ci
 @pytest.mark.parametrize(
     "noise",
-    [
-        "slow",
-        "pink",
-        pytest.param("in band", marks=pytest.mark.nightly),
-        pytest.param("steps", marks=pytest.mark.nightly),
-    ],
+    nightly_but(["slow"], ["slow", "pink", "in band", "steps"]),
 )
 def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
     found = islands.diagnose(make_noisy_record(noise, 7), "linear:2")
@@ -84,9 +80,8 @@ def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
     assert stated.verdict == Verdict.NOTHING
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
-)
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", nightly_but([0], range(3)))
 def test_an_error_over_the_input_without_a_name_is_no_noise(seed: int) -> None:
     found = islands.diagnose(make_quantised_actuator(seed), "linear:2", effects=WITHOUT_JUMPS)
     assert found.verdict == Verdict.UNKNOWN
@@ -99,9 +94,8 @@ def test_an_error_over_the_input_without_a_name_is_no_noise(seed: int) -> None:
     assert "above-noise-level" in [each.name for each in stated.record_findings]
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(3))
 def test_a_line_that_moves_is_a_disturbance_with_a_name_or_unknown(seed: int) -> None:
     record = make_swept_force(seed)
     assert islands.diagnose(record, "linear:2").claimed_names[0] == "swept-disturbance"
@@ -110,16 +104,15 @@ def test_a_line_that_moves_is_a_disturbance_with_a_name_or_unknown(seed: int) ->
     assert "moving frequency" in found.residual_structure
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_an_actuator_that_moves_in_steps_has_a_name() -> None:
     found = islands.diagnose(make_quantised_actuator(0), "linear:2")
     assert found.claimed_names[0] == "quantised-input"
     assert found.causes[0].parameters["step"].value == pytest.approx(0.6, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.nightly if seed else pytest.mark.ci) for seed in range(3)]
-)
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", nightly_but([0], range(3)))
 def test_day_wave_is_never_within_the_noise(seed: int) -> None:
     assert islands.diagnose(make_day_wave(seed), "linear:1").verdict not in (Verdict.NOTHING, Verdict.NAMED)
     stated = islands.diagnose(make_day_wave(seed), "linear:1", noise_level=0.1)

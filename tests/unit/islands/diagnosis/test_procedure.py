@@ -233,7 +233,10 @@ def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch:
             *(("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
             marks=pytest.mark.nightly,
         ),
-        (("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
+        pytest.param(
+            *(("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
+            marks=pytest.mark.nightly,
+        ),
         # A jump of many standard deviations is sharper than the step that is calibrated.
         (("ageing", "jump"), "cascaded-tanks", "white", 7750012),
         # The effects next to a discovered term lead to the third one.

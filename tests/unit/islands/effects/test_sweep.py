@@ -108,7 +108,7 @@ def test_a_sweep_is_named_by_the_place_where_it_acts(acts_at_input: bool) -> Non
     assert found.effects[0].depends_on_time
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_weak_force_is_found_though_the_response_spreads_its_sweep() -> None:
     """At half of the noise, its search began at 34 Hz, and an interference had a confidence of 1.00."""
     found = run_trial(Trial(("swept-disturbance",), 6999000, band=(0.2, 1.0), core="second-order"))

@@ -151,7 +151,7 @@ def test_slips_between_samples_need_differential_equations() -> None:
     assert found.fit.values[found.fit.simulation.get_slice(STICTION)] == pytest.approx(0.35, rel=1e-3)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_steps_are_found_behind_another_effect() -> None:
     """The steps of the plant alone are not those of the actuator, whose limit it lacks."""
     base, target = fit(make_smooth_record(0.2, 0.8))

@@ -398,7 +398,7 @@ def test_extension_by_a_term_and_an_effect_is_simulated_and_exported(tmp_path: P
     np.testing.assert_allclose(program, found.best.output, atol=1e-9)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_two_named_effects_are_not_replaced_by_terms() -> None:
     record = add_jump(simulate(lambda x, _v, _u: 300.0 * x**3), 0.05)
     own = [CATALOGUE[name] for name in ("cubic-stiffness", "coulomb-friction", "jump", "offset")]

@@ -103,7 +103,7 @@ def test_terms_of_the_time_are_left_out_by_their_coefficients() -> None:
     ("name", "first", "second"),
     [
         ("periodic-disturbance", 0.2 * np.sin(2.3 * TIME + 0.4), 0.2 * np.sin(2.3 * TIME + 2.9)),
-        ("linear-drift", 0.5 * TIME / TIME[-1], 0.0),
+        pytest.param("linear-drift", 0.5 * TIME / TIME[-1], 0.0, marks=pytest.mark.nightly),
     ],
 )
 def test_causes_with_another_time_in_validation_data_are_named(
