@@ -41,22 +41,6 @@ def example(tmp_path: Path) -> Path:
     return path
 
 
-def test_parser_separates_text_from_code(example: Path) -> None:
-    parsed = tutorials.parse(example)
-    assert (parsed.name, parsed.title) == ("11_test", "A title: with a colon")
-    assert parsed.introduction == "An introduction."
-    assert [cell.text for cell in parsed.cells] == ["## A heading\n\nText with `code`.", "", "Only text.", ""]
-    assert [cell.shown for cell in parsed.cells] == [True, True, True, False]
-    assert parsed.cells[1].code.strip() == 'print("only code")\n# an ordinary comment'
-
-
-def test_parser_knows_the_line_of_each_code(example: Path) -> None:
-    lines = example.read_text().splitlines()
-    for cell in tutorials.parse(example).cells:
-        if cell.code.strip():
-            assert lines[cell.line - 1] == cell.code.splitlines()[0]
-
-
 @pytest.mark.parametrize("source", ["# %%\nprint(1)\n", '"""A title."""\nprint(1)\n'])
 def test_parser_refuses_a_file_without_docstring_or_cells(source: str, tmp_path: Path) -> None:
     path = tmp_path / "12_test.py"
@@ -79,12 +63,6 @@ def test_page_shows_text_code_output_and_figures_but_no_checks(example: Path) ->
     assert "hidden" not in page
     assert "assert out" not in page
     assert "(11_test.py)" in page
-
-
-def test_build_writes_pages_below_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(tutorials, "make_pages", lambda: iter([("tutorials/a/b.svg", b"<svg/>")]))
-    assert tutorials.build(tmp_path) == [tmp_path / "tutorials" / "a" / "b.svg"]
-    assert (tmp_path / "tutorials" / "a" / "b.svg").read_bytes() == b"<svg/>"
 
 
 @pytest.mark.ci

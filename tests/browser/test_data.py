@@ -104,14 +104,6 @@ def test_the_visible_rows_are_those_of_the_job(looked: Any, desk: ServiceClient)
     desk.ask("POST", f"/v1/jobs/{submitted.json()['id']}/cancel")
 
 
-def test_a_broken_file_says_why(screens: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
-    page = screens(desk.url).go("#/data")
-    page.get_by_role("heading", name="Data", exact=True).wait_for()
-    drop(page, "empty.csv", "")
-    expect(page.locator(".banner.problem")).to_contain_text("empty.csv")
-    assert page.url.endswith("#/data")
-
-
 def test_a_remedy_changes_the_record_of_the_job(
     quiet: Callable[..., Screen], desk: ServiceClient, text: str, expect: Any
 ) -> None:

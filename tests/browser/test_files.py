@@ -1,4 +1,4 @@
-"""Files of the dashboard: all are served and small, without inline code or other origins."""
+"""Files of the dashboard: all are served, without inline code or other origins."""
 
 import posixpath
 import re
@@ -36,10 +36,10 @@ def test_every_module_of_the_lists_of_jobs_and_data_is_preloaded() -> None:
     assert preloaded == sorted(found - {"islands.js"})
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_a_module_imports_only_served_files(name: str) -> None:
-    loaded = re.findall(r'\bimport\("\./([^"]+)"\)', SCRIPTS[name])
-    assert list_imports(name) | set(loaded) <= set(FILES)
+def test_a_module_imports_only_served_files() -> None:
+    for name, text in SCRIPTS.items():
+        loaded = re.findall(r'\bimport\("\./([^"]+)"\)', text)
+        assert list_imports(name) | set(loaded) <= set(FILES), name
 
 
 @pytest.mark.parametrize("name", ["docs.html", "index.html"])
@@ -51,15 +51,14 @@ def test_the_page_has_no_inline_scripts_or_styles(name: str) -> None:
     assert "default-src 'self'" in SECURITY_HEADERS["Content-Security-Policy"]
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_a_module_never_turns_text_into_markup_or_code(name: str) -> None:
+def test_a_module_never_turns_text_into_markup_or_code() -> None:
     forbidden = (
         r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|srcdoc|text/html"
     )
-    assert not re.search(forbidden, SCRIPTS[name])
+    assert not [name for name, text in SCRIPTS.items() if re.search(forbidden, text)]
 
 
-@pytest.mark.parametrize("name", TEXTS)
-def test_a_file_refers_to_no_other_site(name: str) -> None:
-    addresses = re.findall(r"(?:https?:)?//[\w.-]+\.\w+[\w./-]*", TEXTS[name])
-    assert set(addresses) <= set(_NAMESPACES)
+def test_a_file_refers_to_no_other_site() -> None:
+    for name, text in TEXTS.items():
+        addresses = re.findall(r"(?:https?:)?//[\w.-]+\.\w+[\w./-]*", text)
+        assert set(addresses) <= set(_NAMESPACES), name

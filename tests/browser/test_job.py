@@ -123,34 +123,6 @@ def test_a_queued_job_is_cancelled_resumed_and_deleted_if_confirmed(
     assert desk.ask("GET", f"/v1/jobs/{job}").status_code == 404
 
 
-@pytest.mark.ci
-def test_a_running_job_is_cancelling_until_its_coordinator_stops(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = desk.submit(500)
-    page = quiet(desk.url).go(f"#/jobs/{job}")
-    with stored(desk) as store:
-        lease = taken(store, job)
-        advance(store, lease, 0, 10)
-        page.get_by_role("button", name="Cancel").click()
-        expect(page.locator(".title .state")).to_have_text("cancelling")
-        expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
-        store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
-    expect(page.locator(".title .state")).to_have_text("cancelled")
-    expect(page.locator(".status .progress-text")).to_have_text("10 / 500")
-
-
-@pytest.mark.ci
-def test_an_unknown_job_shows_a_message(
-    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    page = screens(desk.url).go("#/jobs/nope")
-    expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
-    expect(page.locator("main")).to_contain_text("there is no job 'nope'")
-    page.get_by_role("link", name="Show all jobs").click()
-    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
-
-
 STYLED = (
     '<math xmlns="http://www.w3.org/1998/Math/MathML" style="top: 0"><mi style="color: red">y</mi></math>'
 )

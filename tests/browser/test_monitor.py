@@ -142,31 +142,3 @@ def test_the_page_of_a_monitor_follows_its_records_and_marks_the_alarm(
     row = page.locator(f"tr[data-monitor='{monitor}']")
     expect(row.locator(".change")).to_contain_text(alarm["words"].split(",")[0])
     expect(row.locator("td.figure").first).to_have_text(str(COUNT))
-
-
-@pytest.mark.nightly
-def test_a_diagnosis_is_followed_by_a_monitor_that_links_to_it(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    spec = {
-        "dataset": desk.dataset,
-        "input": "u_V",
-        "output": "y_um",
-        "simulation": {"kind": "bouc-wen-piezo"},
-    }
-    job = desk.ask("POST", "/v1/discrepancies", json={**spec, "name": NAME}).json()["id"]
-    summary = {"verdict": "nothing", "effects": [], "reduction_percent": None, "words": "nothing is missing"}
-    with stored(desk) as store:
-        store.leases.finish(taken(store, job), JobOutcome(JobState.SUCCEEDED, {}, summary=summary))
-    page = quiet(desk.url, 360, 800).go(f"#/jobs/{job}")
-    page.get_by_text("Monitor later records with this diagnosis").click()
-    assert unreadable(page) == []
-    page.get_by_label("Seconds between records").fill("3600")
-    page.get_by_label("False alarms").fill("1 per 720 records")
-    page.get_by_role("button", name="Create the monitor").click()
-    expect(page.get_by_role("heading", level=1)).to_have_text(NAME)
-    facts = page.locator("section", has_text="Settings").locator(".facts")
-    expect(facts).to_contain_text("1 per 720 records")
-    expect(facts).to_contain_text("1 h")
-    page.get_by_role("link", name=f"job {job[:8]}").click()
-    expect(page.get_by_role("heading", name="Findings")).to_be_visible()

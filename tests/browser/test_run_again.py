@@ -100,28 +100,3 @@ def test_a_diagnosis_is_run_again_with_all_of_its_settings(
     page = open_again(quiet(desk.url), job)
     again = submit(page, desk, "Diagnose")
     assert (again["spec"], again["name"]) == (job["spec"], "first")
-
-
-def test_a_preset_shows_its_settings_only_and_latent_models_have_a_structure(
-    quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any
-) -> None:
-    order = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "preset": "latent"}
-    job = start(desk, "/v1/jobs", {**order, "settings": {"generations": 3, "structure": "wiener"}})
-    page = open_again(quiet(desk.url), job)
-    structure, setting = (
-        page.get_by_label("Structure", exact=True),
-        page.get_by_label("structure", exact=True),
-    )
-    expect(structure).to_have_value("wiener")
-    expect(page.get_by_label("max_terms", exact=True)).to_be_hidden()
-    expect(page.get_by_label("crossover", exact=True)).to_be_visible()
-    page.locator("#preset").select_option("narx")
-    expect(structure).to_be_hidden()
-    expect(setting).to_have_value("")
-    page.get_by_label("max_terms", exact=True).fill("4")
-    page.locator("#preset").select_option("latent")
-    # The number of terms belongs to the other preset, and is not sent.
-    assert submit(page, desk, "Identify")["spec"] == job["spec"]
-    page.get_by_role("link", name="Run again with changes").click()
-    page.get_by_label("Structure", exact=True).select_option("auto")
-    assert submit(page, desk, "Identify")["spec"] == {**job["spec"], "settings": {"generations": 3}}

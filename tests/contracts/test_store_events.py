@@ -80,17 +80,6 @@ def test_a_search_that_is_being_cancelled_is_not_stopped(store):
         store.jobs.stop(ALICE, job.id)
 
 
-def test_a_queued_search_is_stopped_once_it_has_a_checkpoint(store):
-    job = submitted(store)
-    with pytest.raises(JobStateError, match="is queued: it has no models yet"):
-        store.jobs.stop(ALICE, job.id)
-    lease = claimed(store)
-    store.leases.report(lease, brought_on(1))
-    store.leases.release(lease)
-    assert store.jobs.stop(ALICE, job.id).state == JobState.QUEUED
-    assert claimed(store).job.stop_requested
-
-
 def test_events_are_read_after_a_number(store):
     job = job_in(store, JobState.SUCCEEDED)
     other = submitted(store)

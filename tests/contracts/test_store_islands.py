@@ -5,7 +5,6 @@ from uuid import uuid4
 
 import pytest
 
-from islands.errors import SettingsError
 from support.stores import (
     ALICE,
     BOB,
@@ -15,7 +14,6 @@ from support.stores import (
     MANY,
     asked,
     at_once,
-    contents,
     open_stores,
     submitted,
 )
@@ -89,20 +87,6 @@ def test_waiting_for_islands_costs_no_turn(store, claim):
     assert size(claim()) == 4
 
 
-@pytest.mark.parametrize("own", [None, 4])
-def test_job_with_more_islands_than_the_quota_is_refused(store, own):
-    most = 4 if own is None else 100
-    submitted(store)
-    store.owners.change(ALICE, {"max_islands": own})
-    before = contents(store)
-    with pytest.raises(
-        SettingsError, match="the job has 5 islands, and your running jobs may have 4 islands"
-    ):
-        store.jobs.submit(asked(islands=5), most_islands=most)
-    assert contents(store) == before
-    assert store.jobs.submit(asked(islands=4), most_islands=most)[1]
-
-
 def test_accepted_job_runs_alone_after_the_quota_was_lowered(store, claim):
     job, _ = store.jobs.submit(asked(islands=8, spec={"islands": 8}, idempotency_key="k"), most_islands=8)
     queue(store, ALICE, 1)
@@ -138,14 +122,6 @@ def test_lost_job_is_taken_over_whatever_the_quota(store, claim):
     queue(store, ALICE, 3)
     claim(seconds=EXPIRED)
     assert size(claim(1)) == 3
-
-
-def test_released_job_does_not_count(store, claim):
-    queue(store, ALICE, 4)
-    store.leases.release(claim())
-    submitted(store, priority=1, islands=4, spec={"islands": 4})
-    store.leases.finish(claim(), CANCELLED)
-    assert size(claim()) == 4
 
 
 @pytest.mark.ci

@@ -105,14 +105,3 @@ def test_jobs_with_a_model_are_listed_by_its_error(store):
     assert seen == [jobs[1], *sorted([jobs[0], jobs[3]]), jobs[4]]
     filtered = store.jobs.page(ALICE, tag="a", words=["y"], by_error=True)
     assert [job.id for job in filtered.jobs] == seen
-
-
-def test_pages_of_a_search_hold_each_job_once(store):
-    wanted = [submitted(store, tags=("a",) if number % 3 else ()).id for number in range(20)]
-    seen, after = [], None
-    while True:
-        page = store.jobs.page(ALICE, after=after, limit=4, tag="a")
-        seen += [job.id for job in page.jobs]
-        if (after := page.after) is None:
-            break
-    assert sorted(seen) == sorted(each for number, each in enumerate(wanted) if number % 3)

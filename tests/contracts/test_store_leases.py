@@ -54,17 +54,6 @@ def test_claim_without_a_queued_job_changes_nothing(store):
     assert contents(store) == before
 
 
-def test_claimed_job_is_running(store):
-    job = submitted(store)
-    lease = store.leases.claim("first", LONG)
-    assert lease.job == store.jobs.get(ALICE, job.id)
-    assert (lease.epoch, lease.job.attempt, lease.job.version) == (1, 1, 2)
-    assert lease.job.state == JobState.RUNNING
-    assert job.created <= lease.job.started <= lease.job.updated + 0.01
-    assert kinds(store, job.id) == ["queued", "running"]
-    assert store.jobs.events(job.id)[-1].data == {"attempt": 1}
-
-
 def test_claims_of_an_owner_follow_priority_and_age(store):
     priorities = random.Random(4).choices([-100, -1, 0, 0, 3, 100], k=12)
     jobs = [submitted(store, priority=each) for each in priorities]
@@ -78,16 +67,6 @@ def test_priority_of_an_owner_does_not_delay_others(store):
     normal = in_turn(submitted(store, BOB, priority=-100) for _ in range(3))
     order = [claimed(store).job.id for _ in range(6)]
     assert order == [job.id for pair in zip(urgent, normal, strict=True) for job in pair]
-
-
-def test_lost_job_continues_first_and_is_not_counted_again(store):
-    """Its owner has had the turn already."""
-    lost = submitted(store, priority=1)
-    first, second = in_turn(submitted(store) for _ in range(2))
-    other = submitted(store, BOB)
-    claimed(store, EXPIRED, "gone")
-    assert claimed(store).job.id == lost.id
-    assert [claimed(store).job.id for _ in range(3)] == [other.id, first.id, second.id]
 
 
 @pytest.mark.parametrize("own", [None, 2])
@@ -200,13 +179,6 @@ def test_job_leased_under_the_same_name_is_taken_over_at_once(store):
     assert (again.job.id, again.epoch) == (job.id, 2)
 
 
-def test_renewal_keeps_a_job(store):
-    submitted(store)
-    lease = claimed(store, EXPIRED, "first")
-    assert not store.leases.renew(lease, LONG).cancel_requested
-    assert store.leases.claim("second", LONG) is None
-
-
 def test_renewal_is_not_an_event(store):
     job = submitted(store)
     lease = claimed(store)
@@ -281,28 +253,6 @@ def test_report_without_a_checkpoint_is_not_progress(store):
     for _ in range(ATTEMPTS):
         store.leases.report(claimed(store, EXPIRED), ProgressReport({"phase": "starting"}))
     assert store.leases.claim("another", LONG) is None
-
-
-def test_resumed_job_has_all_attempts_again(store):
-    job = submitted(store)
-    for _ in range(ATTEMPTS):
-        claimed(store, EXPIRED)
-    assert store.leases.claim("another", LONG) is None
-    store.jobs.resume(ALICE, job.id)
-    for _ in range(ATTEMPTS):
-        claimed(store, EXPIRED)
-    assert store.leases.claim("another", LONG) is None
-
-
-def test_release_does_not_count_as_an_attempt(store):
-    job = submitted(store)
-    for _ in range(3 * ATTEMPTS):
-        lease = claimed(store)
-        assert lease.job.attempt == 1
-        store.leases.release(lease)
-    assert store.jobs.get(ALICE, job.id).attempt == 0
-    for attempt in range(1, ATTEMPTS + 1):
-        assert claimed(store, EXPIRED).job.attempt == attempt
 
 
 def test_release_after_a_failure_counts_as_an_attempt(store):

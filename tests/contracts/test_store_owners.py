@@ -1,11 +1,9 @@
 """Contract of the store with owners: allowed operations by state, complete lists, separation of owners."""
 
 import pytest
-from sqlalchemy import update
 
 from islands_service.domain.job import JobNotFoundError, JobState, JobStateError
 from islands_service.store.datasets import DatasetNotFoundError
-from islands_service.store.tables import jobs as jobs_table
 from support.stores import (
     ALICE,
     BOB,
@@ -169,13 +167,6 @@ def test_pages_are_newest_first_and_hold_every_job_once(store):
         assert [len(page) for page in found[:-1]] == [limit] * (len(found) - 1)
         assert 0 < len(found[-1]) <= limit
     assert store.jobs.page(ALICE, limit=3).jobs == tuple(expected[:3])
-
-
-def test_jobs_created_at_the_same_time_are_all_listed_once(store):
-    jobs = {submitted(store).id for _ in range(9)}
-    store.database.write(lambda connection: connection.execute(update(jobs_table).values(created=1.5)))
-    found = [each for page in pages(store, ALICE, 2) for each in page]
-    assert found == sorted(jobs, reverse=True)
 
 
 def test_list_read_during_changes_contains_every_other_job_once(store):

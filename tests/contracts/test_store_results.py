@@ -3,7 +3,6 @@
 import threading
 
 import pytest
-from sqlalchemy import event
 
 from islands_service.domain.job import JobNotFoundError, JobOutcome, JobState, LeaseLostError, ProgressReport
 from islands_service.store import leases as leases_module
@@ -255,27 +254,3 @@ def test_artefacts_of_a_deleted_job_are_refused(store, lease):
     with pytest.raises(LeaseLostError):
         store.leases.report(lease, brought_on(1))
     assert {table for table, rows in contents(store).items() if rows} == {"owners"}
-
-
-def test_concurrent_artefacts_of_the_same_name_are_both_accepted(database):
-    with open_stores(database, 2) as (first, second):
-        job = submitted(first).id
-        writing, late = (
-            threading.Event(),
-            threading.Thread(
-                target=lambda: kept.append(second.results.keep(job, {"a": "2" * 64, "c": "3" * 64}))
-            ),
-        )
-        kept = []
-
-        def slowly(_connection):
-            if not writing.is_set():
-                writing.set()
-                late.start()
-                late.join(0.3)  # must wait for the lock of this transaction
-
-        event.listen(first.database.engine, "commit", slowly)
-        first.results.keep(job, {"a": "1" * 64, "b": "1" * 64})
-        late.join()
-        assert kept == [None]
-        assert [first.results.artefact(job, name) for name in "abc"] == ["2" * 64, "1" * 64, "3" * 64]

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from islands.errors import SettingsError
-from islands_service.domain.job import JobState, QuotaError
+from islands_service.domain.job import JobState
 from islands_service.domain.webhook import MAX_ATTEMPTS, WebhookNotFoundError, retry_delay
 from islands_service.store import Store
 from support.stores import (
@@ -166,28 +166,6 @@ def test_deliveries_are_sent_after_the_clock_has_gone_back(store):
     found = store.deliveries.claim(60.0, 10)
     assert {(each.id, each.attempt) for each in found} == {(failed.id, 2), (interrupted.id, 2)}
     assert store.deliveries.claim(60.0, 10) == ()
-
-
-def test_only_old_finished_deliveries_are_deleted(store):
-    webhook = created(store)
-    job_in(store, JobState.FAILED)
-    job_in(store, JobState.CANCELLED)
-    (due,) = store.deliveries.claim(LONG, 10)
-    store.deliveries.record(due, 200, None)
-    store.deliveries.sweep(3600.0)
-    assert len(sent(store, webhook)) == 2
-    store.deliveries.sweep(-1.0)
-    assert [state for _, state in sent(store, webhook)] == ["pending"]
-
-
-def test_the_number_of_webhooks_of_an_owner_is_limited(store):
-    first = created(store, most=2)
-    created(store, most=2)
-    with pytest.raises(QuotaError, match="2 webhooks exist, and 2 is the most"):
-        created(store, most=2)
-    created(store, BOB, most=2)
-    store.webhooks.delete(ALICE, first.id)
-    created(store, most=2)
 
 
 @pytest.mark.parametrize("events", [(), ("job.started",)])

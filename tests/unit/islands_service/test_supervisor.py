@@ -242,16 +242,6 @@ def test_role_that_always_fails_at_its_start_ends_the_supervisor(supervised: Sta
     assert running.order("signalled", "end") == ["api signalled", "api end"]
 
 
-@pytest.mark.parametrize("end", ["sys.exit(75)", "sys.exit(7 + count % 2)", "os.kill(os.getpid(), 9)"])
-def test_role_that_waits_or_was_killed_is_restarted(supervised: Start, end: str) -> None:
-    """Or that ends with several errors. 75 is `os.EX_TEMPFAIL`: the database does not answer yet."""
-    script = f"count = open(os.environ['JOURNAL']).read().count('start')\nnote('start'); {end}"
-    running = supervised(role("api", script), _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
-    running.started(8)
-    running.end()
-    assert running.process.returncode == 0
-
-
 def test_role_that_has_run_for_a_while_is_always_restarted(supervised: Start) -> None:
     script = (
         "count = open(os.environ['JOURNAL']).read().count('start')\n"
@@ -317,16 +307,6 @@ def test_descendants_of_a_role_are_killed_with_it(supervised: Start) -> None:
         running.started(2)
     running.end()
     assert not alive({pid for *_, pid in running.entries()})
-
-
-def test_address_file_of_a_role_is_deleted_with_it(supervised: Start, tmp_path: Path) -> None:
-    address = tmp_path / "address"
-    script = "note('start'); heartbeat()\nwhile True: time.sleep(0.05)"
-    running = supervised(role("ray", script, address=str(address)))
-    pid = running.started()[0][3]
-    address.write_text("the address")
-    os.kill(pid, signal.SIGKILL)
-    eventually(lambda: not address.exists())
 
 
 def test_roles_share_one_ray_token_that_differs_between_services(

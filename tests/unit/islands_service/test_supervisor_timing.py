@@ -35,16 +35,6 @@ while os.path.exists(sys.argv[1]):
         place = (place + 1_000_000) % 8_000_000
 signal.pause()
 """
-#: Sends a heartbeat, and starts its program again when a file exists.
-AGAIN = """
-import os, signal, sys, time
-lifeline = int(os.environ["ISLANDS_LIFELINE"])
-os.write(lifeline, b".")
-while not os.path.exists(sys.argv[1]):
-    time.sleep(0.005)
-os.write(lifeline, b"s")
-signal.pause()
-"""
 ONE_HEARTBEAT = f"import os; os.write(int(os.environ['ISLANDS_LIFELINE']), b'.'); {SILENT}"
 
 
@@ -123,34 +113,6 @@ def test_backoff_doubles_with_every_exit_up_to_a_limit(
         assert role.waits(expected), expected
 
 
-def test_stable_role_is_restarted_at_once_and_resets_the_backoff(
-    start_role: StartRole,
-) -> None:
-    role = start_role(ENDS)
-    for expected in (0.2, 0.4):
-        role.ended(0.1)
-        assert role.waits(expected)
-    role.ended(supervisor._STABLE_AFTER + 0.1)
-    role.check()
-    assert role.runs
-    role.ended(0.1)
-    assert role.waits(0.2)
-
-
-def test_role_that_starts_its_program_again_has_the_time_of_a_start(
-    start_role: StartRole, tmp_path: Path
-) -> None:
-    role = start_role(AGAIN, 5.0, str(tmp_path / "again"))
-    role.wait_for_heartbeat()
-    (tmp_path / "again").touch()
-    eventually(lambda: role.check() or role.role.last_heartbeat is None)
-    assert role.role.has_run
-    role.check(supervisor._STARTUP_TIMEOUT - 0.1)
-    assert "no heartbeat" not in role.log.getvalue()
-    role.check(0.2)
-    assert "api has sent no heartbeat for 120.1 s" in role.log.getvalue()
-
-
 @pytest.mark.parametrize("stopped", [False, True], ids=["silent", "stopped"])
 def test_role_without_heartbeats_is_killed_after_its_timeout(start_role: StartRole, stopped: bool) -> None:
     role = start_role(LIVE if stopped else ONE_HEARTBEAT, patience=5.0)
@@ -196,13 +158,6 @@ def test_silent_role_that_reads_pages_from_a_disk_is_killed_after_they_are_read(
     role.check(5.1)
     role.ended(0.1)
     assert "api has sent no heartbeat for 25.5 s: it is started again" in role.log.getvalue()
-
-
-def test_role_that_reads_pages_for_minutes_is_killed(start_role: StartRole, tmp_path: Path) -> None:
-    role = start_reader(start_role, tmp_path)
-    role.check(supervisor._STARTUP_TIMEOUT + 0.1)
-    role.ended(0.1)
-    assert "api has sent no heartbeat for 120.1 s" in role.log.getvalue()
 
 
 def start_reader(start_role: StartRole, folder: Path) -> ControlledRole:

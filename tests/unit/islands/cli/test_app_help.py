@@ -34,10 +34,3 @@ def test_every_package_of_an_extra_is_known():
         for requirement in extras[extra]:
             name = requirement.partition(">=")[0].lower()
             assert modules[name] & set(EXTRAS), requirement
-
-
-def test_all_names_every_extra_of_users():
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    (text,) = extras["all"]
-    assert text == f"islands-sysid[{','.join(sorted(set(extras) - {'all', 'server'}))}]"
-    assert set(extras["ray"]) < set(extras["service"])

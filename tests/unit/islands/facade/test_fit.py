@@ -185,22 +185,6 @@ def test_validation_data_need_the_same_inputs_and_sampling_time():
 # Records of every kind.
 
 
-def test_two_inputs_are_fitted_by_every_library():
-    u = walk(600, 0, inputs=2)
-    y = np.zeros(600)
-    for k in range(2, 600):
-        y[k] = y[k - 1] + 0.5 * (u[k - 1, 0] - u[k - 2, 0]) - 0.3 * (u[k - 1, 1] - u[k - 2, 1])
-    record = Dataset(u, y, 0.1, ("left_V", "right_V"))
-    by_size = {m.model.size: m for m in islands.fit(record, library="phi-polynomial", max_terms=3).models}
-    assert by_size[3].equation == "y(k) = 1*y(k-1) + 0.5*(u1(k-1) - u1(k-2)) - 0.3*(u2(k-1) - u2(k-2))"
-    assert by_size[3].model.input_names == ("left_V", "right_V")
-    assert by_size[3].physics.property_1 is True
-    smooth = islands.fit(record, library="polynomial", degree=1, max_terms=5)
-    # Candidates are three lags of y and of both inputs, and the constant.
-    assert smooth.search_result.search.full_set == {"candidates": 10, "bytes": 8 * 10 * 447}
-    assert smooth.best.metrics["validation"]["free_run"].rmse < 1e-9
-
-
 def test_model_of_one_term_is_fitted():
     made = islands.fit(piezo(), library="phi-polynomial", max_terms=1)
     assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
@@ -252,29 +236,6 @@ def test_structures_without_estimates_are_counted_by_outcome():
 
 
 # Progress.
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("samples", [9, 400])
-def test_progress_fractions_are_monotonic(samples):
-    reports = []
-    parts = {"record": tank(samples), "validation": tank(100, seed=1)}
-    islands.fit(**parts, library="polynomial", progress=lambda *news: reports.append(news))
-    texts, shares = zip(*reports, strict=True)
-    stages = (
-        "sampling rate",
-        "inner products",
-        "best subsets",
-        "swap search",
-        "estimation of",
-        "prediction bands",
-    )
-    assert list(dict.fromkeys(stage for text in texts for stage in stages if stage in text)) == list(stages)
-    shares = [share for share in shares if share is not None]
-    assert shares[0] == 0.0
-    assert shares == sorted(shares)
-    assert shares[-1] <= 1.0
-    assert samples == 9 or shares[-1] == 1.0
 
 
 # Errors.

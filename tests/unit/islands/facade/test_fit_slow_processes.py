@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.simulation.predictors import free_run
-from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, TANK_NOISE, make_battery, make_tank
+from support.slow_processes import BATTERY_POLE, TANK_NOISE, make_battery, make_tank
 
 
 def error(result):
@@ -31,17 +30,3 @@ def test_free_run_of_a_battery_has_the_error_of_the_noise(seed):
     assert np.sort(np.roots([1.0, *(-value for value in model.theta[:2])])) == pytest.approx(
         [BATTERY_POLE, 1.0], abs=1e-3
     )
-
-
-@pytest.mark.ci
-def test_simulation_of_a_battery_has_the_error_that_the_result_states():
-    result = islands.fit(make_battery(1, 2000), library="polynomial", degree=1, feedthrough="yes")
-    validation = result.search_result.split.validation
-    run = result.best.simulate(validation)
-    assert run.mean_squared_error**0.5 == pytest.approx(error(result), rel=1e-9)
-    assert error(result) < 1.2 * BATTERY_NOISE
-    measured = free_run(result.best.model, validation, result.best.warm_up)
-    assert measured.mean_squared_error**0.5 > 5.0 * BATTERY_NOISE
-    assert "and initial outputs estimated from its first samples, RMSE" in " ".join(str(result).split())
-    band = result.best.bands(validation)
-    assert np.nanmax(band.upper - band.y) < 10.0 * BATTERY_NOISE

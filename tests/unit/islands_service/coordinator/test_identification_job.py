@@ -290,33 +290,6 @@ def test_request_to_stop_is_not_lost_with_the_coordinator(
 
 
 @pytest.mark.ci
-def test_progress_has_the_front_and_the_last_migration(
-    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # The front of every report is computed, however long that takes in so short a job.
-    monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e9)
-    run_job(claim(store), store, blobs)
-    progress = store.jobs.get(ALICE, job.id).progress
-    assert progress is not None
-    front = progress["front"]
-    assert [each["size"] for each in front] == sorted({each["size"] for each in front})
-    errors = [each["error"] for each in front]
-    assert errors == sorted(errors, reverse=True)
-    assert errors[-1] == progress["best_error"]
-    assert all(each["equation"].startswith("y_um(k) = ") for each in front)
-    # The last of 30 generations is a stop, since islands exchange models in each of them.
-    assert progress["migration"] == {"generation": 30, "emigrants": 1, "sources": [[1], [0]]}
-
-
-def test_search_without_models_fails_at_its_limit_of_run_time(store: Store, blobs: Blobs, job: Job) -> None:
-    def check() -> None:
-        raise RunTimeLimitError(10)
-
-    with pytest.raises(RunTimeLimitError, match="ran for 10 s"):
-        run_job(claim(store), store, blobs, check)
-
-
-@pytest.mark.ci
 def test_wall_time_includes_all_attempts(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,5 @@
 """`Coordinator`: every job ends or is released, whatever error occurs."""
 
-import errno
 import os
 import signal
 import time
@@ -11,7 +10,6 @@ from typing import Any, ClassVar
 import pytest
 import structlog
 
-from islands_service.coordinator import identification_job
 from islands_service.coordinator import main_loop as coordinator_module
 from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.coordinator.job_run import JobRun
@@ -40,7 +38,7 @@ from support.coordinators import (
     wait_until_finished,
 )
 from support.processes import eventually
-from support.stores import ALICE, BOB, child
+from support.stores import ALICE, child
 
 Found = tuple[list[Any], list[Any]]
 
@@ -174,38 +172,6 @@ def test_lost_cluster_ends_the_coordinator_and_is_an_attempt(
 
 
 @pytest.mark.ci
-def test_jobs_of_two_owners_take_turns_and_each_has_the_result_of_one_process(
-    store: Store,
-    job: Job,
-    settings: ServiceSettings,
-    undisturbed: Found,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """One coordinator is enough, whatever the duration of the job that came first."""
-    mine = store.datasets.get(ALICE, job.datasets[0])
-    content = mine.name, mine.suffix, mine.blob, mine.bytes, mine.preview
-    dataset, _ = store.datasets.add(BOB, *content)
-    other = store.jobs.submit(Submission(BOB, {**job.spec, "dataset": dataset.id}))[0]
-    monkeypatch.setattr(identification_job, "CHECKPOINT_SHARE", 1e9)  # a checkpoint each epoch
-    monkeypatch.setattr(identification_job, "REPORT_EVERY", 0.0)
-    shared = settings.model_copy(update={"turn": 1e-9, "checkpoint_every": 1e-9})
-    stopping = StopRequest()
-    thread = Thread(target=SerialCoordinator(shared, "me", stopping).run)
-    with structlog.testing.capture_logs() as logs:
-        thread.start()
-        try:
-            eventually(lambda: store.jobs.get(BOB, other.id).finished is not None, seconds=120.0)
-            wait_until_finished(store, job)
-        finally:
-            stopping.request()
-            thread.join(30.0)
-    for done in (store.jobs.get(ALICE, job.id), store.jobs.get(BOB, other.id)):
-        assert (done.state, done.attempt) == (JobState.SUCCEEDED, 1)
-        assert [model.document for model in store.results.models(done.id)] == undisturbed[0]
-    assert [each["event"] for each in logs].count("job lets others pass") > 1
-
-
-@pytest.mark.ci
 def test_unreferenced_blobs_are_swept_after_an_hour(
     store: Store, blobs: Blobs, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
@@ -251,39 +217,6 @@ def test_replaced_checkpoints_are_swept_while_the_job_runs(
     now = store.jobs.get(ALICE, job.id)
     assert (now.state, now.checkpoint) == (JobState.RUNNING, left[1])
     assert set(left[1:]) <= set(dict(blobs.all()))
-
-
-@pytest.mark.parametrize(
-    "error",
-    [StoreUnavailableError("the database does not answer"), OSError(errno.ESTALE, "Stale file handle")],
-)
-def test_failed_sweep_does_not_affect_the_job(
-    store: Store,
-    job: Job,
-    coordinator: Callable[..., Thread],
-    monkeypatch: pytest.MonkeyPatch,
-    error: Exception,
-) -> None:
-    tries = []
-
-    def fail(sweeper: Any) -> None:
-        if sweeper._store.jobs.queue_statistics().leases:
-            tries.append(1)
-            raise error
-
-    def works(run: JobRun) -> JobOutcome:
-        while len(tries) < 3:
-            run.check()
-        return DONE
-
-    replace_runner(monkeypatch, works)
-    monkeypatch.setattr(sweeper_module, "SWEEP_INTERVAL", 0.0)
-    monkeypatch.setattr(sweeper_module.Sweeper, "_sweep", fail)
-    coordinator()
-    assert wait_until_finished(store, job).state == JobState.SUCCEEDED
-    # The process has reported that it loads the library.
-    kinds = [event.kind for event in store.jobs.events(job.id)]
-    assert kinds == ["queued", "running", "progress", "succeeded"]
 
 
 def test_blob_referenced_during_a_sweep_is_kept(

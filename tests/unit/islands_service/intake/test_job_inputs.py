@@ -60,22 +60,6 @@ def test_a_recorded_simulation_is_read_at_the_samples_of_a_slow_output(tmp_path:
 
 
 @pytest.mark.ci
-def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
-    blobs = Blobs(tmp_path)
-    datasets = store_datasets(blobs)
-    recordings = [{"dataset": "b"}, {"dataset": "b", "rows": "10:70"}]
-    order = Identification.model_validate(spec("a", rows="0:100", recordings=recordings, validation=0.5))
-    record, validation = read_record_and_validation(order, datasets, blobs)
-    assert record.rows_by_recording == {
-        "a.csv": slice(0, 100),
-        "b.csv": slice(100, 190),
-        "b.csv (3)": slice(190, 250),
-    }
-    assert validation == 0.5
-    assert order.datasets == ("a", "b", "b")
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("rows", "most", "expected"),
     [
@@ -100,16 +84,3 @@ def test_the_beginning_of_a_job_has_inputs_as_measured(
         assert found.input_names == ("u_V",)
         assert np.array_equal(found.u, whole.u[expected])
         assert np.array_equal(found.y, whole.y[expected])
-
-
-@pytest.mark.ci
-def test_the_beginning_of_a_record_has_the_samples_of_a_slow_output(tmp_path: Path) -> None:
-    blobs = Blobs(tmp_path)
-    rows = [f"{0.01 * k:.2f},{k % 7},{k if k % 10 == 0 else ''}" for k in range(600)]
-    stored = blobs.write("\n".join(["t_s,u_V,y_um", *rows]).encode())
-    datasets = {"a": StoredDataset("me", "a", "a.csv", ".csv", stored, 7, {"samples": 600}, 0.0)}
-    order = Identification.model_validate(spec("a"))
-    whole, _ = read_record_and_validation(order, datasets, blobs)
-    found = read_beginning(order, datasets, blobs, 50_000)
-    assert found.samples == whole.samples
-    assert np.array_equal(found.u, whole.u)

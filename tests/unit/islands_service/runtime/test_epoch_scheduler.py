@@ -149,15 +149,6 @@ def test_islands_independent_of_the_slowest_are_not_delayed(search, choose, data
         assert ends.index(max(known)) == min(reachable, complete + ahead, len(ends) - 1)
 
 
-def test_default_limit_is_one_running_and_two_queued_epochs():
-    scheduler = make_scheduler(islands=2)
-    assert list(scheduler.ready_tasks()) == [
-        EpochTask(island, *stage) for stage in ((-1, 0), (0, 4), (4, 8)) for island in (0, 1)
-    ]
-    assert list(scheduler.ready_tasks()) == []
-    assert (scheduler.completed_generation, scheduler.finished) == (-1, False)
-
-
 @given(searches(), orders)
 def test_ready_tasks_of_earlier_epochs_come_first(search, choose):
     problem_, ends, ahead = search
@@ -168,15 +159,6 @@ def test_ready_tasks_of_earlier_epochs_come_first(search, choose):
         task = choose.choice(run.ready())
         run.carry(task)
         run.report(task)
-
-
-def test_remaining_ready_tasks_are_yielded_by_a_later_call():
-    all_of_them, scheduler = list(make_scheduler().ready_tasks()), make_scheduler()
-    one_by_one = []
-    while len(one_by_one) < len(all_of_them):
-        one_by_one.append(next(scheduler.ready_tasks()))
-    assert one_by_one == all_of_them
-    assert list(scheduler.ready_tasks()) == []
 
 
 def test_epochs_completed_out_of_order_are_yielded_in_order():

@@ -94,12 +94,6 @@ def test_island_is_unpacked_once_at_its_first_access(monkeypatch, islands):
     assert len(opened) == 1
 
 
-def test_iteration_keeps_no_island(packed):
-    kept = packed[2]
-    assert all(one is not other for one, other in zip(packed, packed, strict=True) if one is not kept)
-    assert [*packed][2] is kept
-
-
 def test_front_of_packed_islands_is_that_of_the_islands_and_unpacks_few(islands, packed, monkeypatch):
     expected = Archipelago(tuple(islands)).find_front()
     assert exactly(Archipelago(packed).find_front()) == exactly(expected)

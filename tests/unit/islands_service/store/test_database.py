@@ -122,13 +122,6 @@ def test_connection_lost_during_the_commit_means_unknown_outcome(postgresql):
     postgresql.write(executing("SELECT 1"))
 
 
-def test_invalid_statement_is_not_an_unavailable_database(sqlite):
-    with pytest.raises(DBAPIError, match="nowhere"):
-        sqlite.write(executing("SELECT * FROM nowhere"))
-    with pytest.raises(DBAPIError, match="nowhere"), sqlite.read() as connection:
-        connection.execute(text("SELECT * FROM nowhere"))
-
-
 def test_locked_file_raises_an_error_after_the_timeout(sqlite, tmp_path, monkeypatch):
     sqlite.write(executing("SELECT 1"))
     monkeypatch.setattr(connections, "PRAGMAS", ("busy_timeout=200",))
@@ -185,25 +178,6 @@ def test_sqlite_connections_are_durable_and_enforce_foreign_keys(sqlite):
     names = ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
     found = at_once([lambda: [asked(name) for name in names]] * 8)
     assert found == [["wal", 2, 1, 1000 * connections.BUSY_TIMEOUT]] * 8
-
-
-def test_postgresql_connections_have_keepalives_and_an_idle_timeout(postgresql):
-    with postgresql.read() as connection:
-        info = connection.connection.dbapi_connection.info
-        assert (
-            info.get_parameters().items()
-            >= {name: str(value) for name, value in connections.LIBPQ_OPTIONS.items()}.items()
-        )
-        timeout = connection.execute(text("SHOW idle_in_transaction_session_timeout")).scalar()
-        level = connection.execute(text("SHOW transaction_isolation")).scalar()
-    assert (timeout, level) == ("10s", "read committed")
-
-
-def test_options_of_the_url_take_precedence(postgresql):
-    patient = Database(f"{postgresql.url}&connect_timeout=77")
-    with patient.read() as connection:
-        assert connection.connection.dbapi_connection.info.get_parameters()["connect_timeout"] == "77"
-    patient.close()
 
 
 @pytest.mark.ci

@@ -43,13 +43,6 @@ def choose(data, delays=None):
     return choice_from_document(result.settings["choice"]), result
 
 
-@pytest.fixture(scope="module")
-def chosen():
-    """A short record of a linear system, the choice of `fit` and its result."""
-    data = record("first order", 300)
-    return data, *choose(data)
-
-
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -91,15 +84,6 @@ def test_models_without_a_dead_time_compete_with_those_that_have_one(monkeypatch
 def test_damaged_choice_is_refused():
     with pytest.raises(SettingsError, match="start a new run"):
         choice_from_document({"kind": "smooth"})
-
-
-@pytest.mark.ci
-def test_promising_kinds_are_compared_by_their_recommended_models(chosen):
-    data, choice, result = chosen
-    least = min(choice.trials.values())
-    assert set(choice.errors) == {kind for kind, error in choice.trials.items() if error <= 3.0 * least}
-    error = result.recommended.metrics["validation"]["free_run"].rmse
-    assert choice.errors[choice.kind] == pytest.approx(error / split(data).estimation.output_range)
 
 
 @pytest.mark.ci
@@ -147,19 +131,6 @@ def test_held_out_error_of_the_true_library_is_the_noise():
     library = take_library("polynomial", 1, 2, None)
     assert max(measure_library(hold_out(clean), library)) < 1e-9
     assert all(0.008 < error < 0.015 for error in measure_library(hold_out(noisy), library))
-
-
-@pytest.mark.ci
-def test_result_of_identify_contains_the_choice():
-    data = record("first order", 300)
-    result = islands.identify(data, **SMALL, library_degree=1)
-    settings = result.search_result.settings
-    choice = choose_preset(data, 0.25, SMALL | {"library_degree": 1})
-    assert (settings["preset"], settings["choice"]) == ("auto", choice.to_document())
-    assert " ".join(choice.reasons) in " ".join(str(result).split())
-    again = islands.identify(data, preset=choice, **SMALL, library_degree=1)
-    assert [each.model for each in again.models] == [each.model for each in result.models]
-    assert again.search_result.settings == settings
 
 
 @pytest.mark.ci

@@ -6,39 +6,11 @@ from math import inf, nextafter
 import pytest
 
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.history import HistoryPoint
-from islands.evolution.island import StepInfo
 from islands.evolution.presets import resolve_settings
-from islands.evolution.search_state import SearchState, advance, stop_reason
+from islands.evolution.search_state import SearchState, stop_reason
 from islands.progress import StoppedError
 from support.identifications import BUDGET, RecordingEngine, identify, record_states
-
-
-def make_info(*best, evaluations=10):
-    return StepInfo(3, evaluations, 4, {"ok": evaluations - 1, "diverged": 1}, dict(best))
-
-
-def test_statistics_of_islands_are_combined_per_generation():
-    before = SearchState(
-        empty_archipelago(2, 0), 100, 7, {"ok": 100}, (HistoryPoint(2, 100, {1: 9.0}, (9.0, inf)),)
-    )
-    steps = (
-        (make_info((2, 0.5), (1, 4.0)), make_info((1, 2.0), (2, 0.5))),
-        (make_info(), make_info((3, 1.0), (2, 0.25))),
-    )
-    state = advance(before, ArchipelagoEpoch(empty_archipelago(2, 1), steps, {"pairs": (1, 2)}))
-    assert state.archipelago == empty_archipelago(2, 1)
-    assert (state.evaluations, state.duplicates) == (140, 23)
-    assert state.outcomes == {"ok": 136, "diverged": 4}
-    assert state.history == (
-        *before.history,
-        HistoryPoint(3, 120, {1: 4.0, 2: 0.5}, (0.5, inf)),
-        HistoryPoint(3, 140, {1: 2.0, 2: 0.25, 3: 1.0}, (0.5, 0.25)),
-    )
-    assert [list(point.best) for point in state.history] == [[1], [1, 2], [1, 2, 3]]
-    assert state.caches == {"pairs": (1, 2)}
-    assert before.outcomes == {"ok": 100}
 
 
 @pytest.mark.parametrize(

@@ -134,35 +134,6 @@ def islands_budget(**changes):
     return {**BUDGET, "population": 12, "generations": 3, "migrants": 3, "emigrants": "random", **changes}
 
 
-@pytest.mark.ci
-def test_islands_evolve_independently_between_migrations(data):
-    one, three, isolated = [], [], []
-    for states, changes in (
-        (one, {}),
-        (three, {"islands": 3}),
-        (isolated, {"islands": 3, "topology": "isolated"}),
-    ):
-        budget = islands_budget(**changes)
-        result = identify(
-            data[:1000], **budget, seed=5, on_epoch=lambda state, _settings, to=states: to.append(state)
-        )
-        assert result.search_result.settings["islands"] == len(states[0].archipelago.islands)
-        assert result.search_result.search.evaluations == 4 * 12 * result.search_result.settings["islands"]
-        for state in states:
-            for place, island in enumerate(state.archipelago.islands):
-                best = min(entry.fitness for entry in island.hall_of_fame.entries)
-                assert state.history[-1].islands[place] == best
-            assert min(state.history[-1].islands) == min(state.history[-1].best.values())
-    # An isolated island evolves as if it were alone. No migration happens before the end of the first epoch.
-    assert [state.archipelago.islands[0] for state in isolated] == [
-        state.archipelago.islands[0] for state in one
-    ]
-    assert [state.archipelago for state in isolated[:2]] == [state.archipelago for state in three[:2]]
-    assert isolated[-1].archipelago != three[-1].archipelago
-    resumed = identify(data[:1000], **islands_budget(islands=3), seed=5, start=three[1])
-    assert resumed.search_result.search.history == three[-1].history
-
-
 def test_epochs_end_at_stops_and_report_all_generations(data):
     states, longer = [], []
     for to, every in ((states, 3), (longer, "2,3:1")):

@@ -9,7 +9,6 @@ from islands.errors import RecordError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.records.dataset import Dataset
 from islands.records.split import split
-from islands.systems import appendix
 from support.identifications import BUDGET, identify, parameters, record, two_inputs
 
 
@@ -147,33 +146,3 @@ def test_initial_sizes_are_limited_by_the_maximum_sizes(changes, expected):
     made = asdict(resolve_settings("paper-case1", changes))
     assert {name: made[name] for name in expected} == expected
     assert {name: made[name] for name in changes} == changes
-
-
-@pytest.mark.ci
-def test_select_fitness_recommends_the_model_of_least_training_error():
-    """The choice of Appendix A of the paper: validation data have no influence, also if a model diverges."""
-    estimation = appendix.soft_record(appendix.S2, seed=1)
-    states = []
-    found = {
-        select: identify(
-            estimation,
-            validation=appendix.white_record(appendix.S2, seed=1),
-            preset="paper-appendix-s2",
-            population=40,
-            generations=4,
-            prune=0.0,
-            select=select,
-            on_epoch=lambda state, _settings: states.append(state),
-        )
-        for select in ("fitness", "validation")
-    }
-    fittest = min(states[-1].archipelago.hall_of_fame.entries, key=lambda entry: entry.fitness)
-    chosen = found["fitness"].best
-    assert chosen.model.size == fittest.size
-    assert set(chosen.model.regressors) == set(fittest.regressors)
-    error = chosen.metrics["estimation"]["one_step_ahead"].rmse
-    assert error**2 == pytest.approx(fittest.fitness, rel=1e-9)
-    assert not chosen.assessment.outcomes["validation"]["free_run"]
-    assert found["fitness"].search_result.settings["select"] == "fitness"
-    assert found["validation"].best.assessment.outcomes["validation"]["free_run"]
-    assert found["validation"].best.metrics["estimation"]["one_step_ahead"].rmse > error

@@ -42,13 +42,6 @@ def test_fraction_and_time_left_follow_the_reports_of_a_step(store, clock):
     assert [each["seconds_left"] for each in seen[1:]] == pytest.approx(expected)
 
 
-def test_the_time_left_is_unknown_before_the_phases_that_follow_are_known(store, clock):
-    job = submitted(store)
-    report = DiagnosisProgress(make_run(claimed(store), store, None), None, DiagnosisState(spent=30.0))
-    report("screening", 0.2)
-    assert store.jobs.get(ALICE, job.id).progress["seconds_left"] is None
-
-
 class Checkpoints:
     """Checkpoints whose writing takes some time or fails; they record what happens to them."""
 

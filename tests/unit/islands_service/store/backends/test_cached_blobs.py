@@ -102,15 +102,6 @@ def test_the_cache_drops_what_was_not_used_for_longest(machine, objects):
     assert [blobs.read(blob) for blob in written] == [bytes([index]) * 200 for index in range(7)]
 
 
-def test_a_blob_larger_than_the_cache_can_be_read(machine):
-    blob = machine().write(b"x" * (2 * LIMIT))
-    blobs = machine("other")
-    with blobs.hold(blob) as path:
-        assert not cached(blobs)
-        assert path.stat().st_size == 2 * LIMIT
-    assert not list(path.parent.glob("*.part"))
-
-
 def test_a_held_blob_outlives_its_removal_from_the_cache(machine):
     blobs = machine()
     blob = blobs.write(b"record")
@@ -157,14 +148,6 @@ def test_a_sweep_leaves_objects_that_are_no_blobs(machine, objects):
     objects.objects["other/file"], objects.times["other/file"] = b"1", 0.0
     machine().sweep(frozenset(), time())
     assert len(objects.objects) == 2
-
-
-def test_each_process_lists_the_objects_once_an_hour(machine, objects, monkeypatch):
-    monkeypatch.setattr(cached_blobs, "SWEEP_SECONDS", 3600.0)
-    blobs = machine()
-    for _ in range(3):
-        blobs.sweep(frozenset(), time())
-    assert objects.calls.count("list") == 1
 
 
 def test_discarding_needs_no_answer_of_the_store(machine, objects):

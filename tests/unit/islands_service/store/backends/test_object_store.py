@@ -178,22 +178,3 @@ def test_wrong_credentials_are_refused_without_another_attempt(endpoint, file):
     assert ACCESS["AWS_SECRET_ACCESS_KEY"] not in str(caught.value)
     assert seen == [("put", "refused")]
     objects.put("a", file)
-
-
-def test_missing_credentials_are_named(endpoint, file, monkeypatch):
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
-    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", "/dev/null")
-    with pytest.raises(ObjectStoreRefusedError, match="set AWS_ACCESS_KEY_ID"):
-        ObjectStore(URL).put("a", file)
-
-
-def test_credentials_in_a_file_are_read(endpoint, file, monkeypatch, tmp_path):
-    """As a mounted secret of a container."""
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-        monkeypatch.delenv(name)
-    secret = tmp_path / "secret"
-    secret.write_text("[default]\naws_access_key_id = a\naws_secret_access_key = b\n")
-    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(secret))
-    ObjectStore(URL).put("a", file)
