@@ -64,7 +64,7 @@ def test_a_file_truncated_at_any_position_is_refused_without_other_output(tmp_pa
         with pytest.raises(RecordError) as caught:
             read_record(path, ["u"], "y")
         assert len(str(caught.value)) < 300
-        gc.collect()
+    gc.collect()
     assert capfd.readouterr() == ("", "")
 
 
