@@ -26,14 +26,25 @@ def list_imports(name: str) -> set[str]:
     return {posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) for path in imported}
 
 
+def list_required(names: set[str]) -> set[str]:
+    """Return all modules that some modules import, directly and through others."""
+    found: set[str] = set()
+    added = names
+    while added := {each for name in added for each in list_imports(name)} - found:
+        found |= added
+    return found
+
+
 def test_every_module_of_the_lists_of_jobs_and_data_is_preloaded() -> None:
     """Those of other pages are loaded when a page is first shown."""
-    found, added = set(), {"islands.js", "pages/jobs.js", "pages/data.js"}
-    while added:
-        found |= added
-        added = {each for name in added for each in list_imports(name)} - found
+    lists = {"pages/jobs.js", "pages/data.js"}
     preloaded = re.findall(r'rel="modulepreload" href="dashboard/([\w./]+)"', TEXTS["index.html"])
-    assert preloaded == sorted(found - {"islands.js"})
+    assert preloaded == sorted(lists | list_required(lists | {"islands.js"}))
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_modules_import_each_other_in_one_direction(name: str) -> None:
+    assert name not in list_required({name})
 
 
 def test_a_module_imports_only_served_files() -> None:

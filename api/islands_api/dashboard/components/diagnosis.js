@@ -6,19 +6,10 @@ import { showProblem } from "./banner.js";
 import { makeCauses } from "./diagnosing/causes.js";
 import { makeNextExperiment } from "./diagnosing/next_experiment.js";
 import { makeOutputsPlot } from "./diagnosing/outputs_plot.js";
+import { isDiagnosis } from "./job_words.js";
 import { makeEquation, makeExportRow } from "./models.js";
 import { makeMonitorForm } from "./monitoring/monitor_form.js";
 import { makeReportButtons, makeSaveButton } from "./report.js";
-
-/** Return whether a job is a discrepancy diagnosis. */
-export const isDiagnosis = (job) => job.kind === "discrepancy";
-
-/** Return whether a job identifies models. */
-export const isSearch = (job) => job.kind === "identification";
-
-/** Format the verdict of a job, `named: thermal-drift`, or the status of its monitor. */
-export const formatVerdict = ({ verdict: word, effects = [], status }) =>
-  effects.length ? `${word}: ${effects.join(", ")}` : (word ?? status);
 
 /** Return the lines of the headline, and those of the other sentences. */
 function splitWords({ headline, words }) {

@@ -3,7 +3,7 @@
 import { announce, el, setText } from "../lib/dom.js";
 import { formatCount } from "../lib/numbers.js";
 import { getIsolatedName, getModelClass, isEnded } from "./job_state.js";
-import { isDiagnosis, isSearch } from "./diagnosis.js";
+import { isDiagnosis, isSearch } from "./job_words.js";
 
 /** Stages of a search, each with the beginnings of its phases. */
 const SEARCH = [

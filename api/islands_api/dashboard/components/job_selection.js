@@ -4,8 +4,8 @@ import { getJobPath, sendRequest } from "../lib/api.js";
 import { announce, el, runOnceAtATime, setText } from "../lib/dom.js";
 import { clearBanner, showProblem } from "./banner.js";
 import { askConfirmation } from "./confirm.js";
-import { isSearch } from "./diagnosis.js";
 import { getIsolatedName, isEnded } from "./job_state.js";
+import { isSearch } from "./job_words.js";
 
 const count = (jobs) => `${jobs.length} ${jobs.length === 1 ? "job" : "jobs"}`;
 const isComparable = (job) => isSearch(job) && job.state === "succeeded";

@@ -2,7 +2,7 @@
 
 import { el, setText } from "../lib/dom.js";
 import { formatCount, formatDuration } from "../lib/numbers.js";
-import { formatVerdict, isSearch } from "./diagnosis.js";
+import { formatVerdict, isSearch } from "./job_words.js";
 
 export const STATES = ["queued", "running", "succeeded", "failed", "cancelled"];
 

@@ -1,6 +1,4 @@
-/** Words about a job for lists: its kind, its verdict, and what distinguishes it from similar jobs. */
-
-import { formatVerdict, isSearch } from "./diagnosis.js";
+/** Words about a job: its kind, its verdict, and what distinguishes it from similar jobs. */
 
 /** Kinds of jobs in words. */
 export const KINDS = {
@@ -8,6 +6,16 @@ export const KINDS = {
   discrepancy: "Diagnosis",
   monitoring: "Record of a monitor",
 };
+
+/** Return whether a job is a discrepancy diagnosis. */
+export const isDiagnosis = (job) => job.kind === "discrepancy";
+
+/** Return whether a job identifies models. */
+export const isSearch = (job) => job.kind === "identification";
+
+/** Format the verdict of a job, `named: thermal-drift`, or the status of its monitor. */
+export const formatVerdict = ({ verdict: word, effects = [], status }) =>
+  effects.length ? `${word}: ${effects.join(", ")}` : (word ?? status);
 
 /** Largest number of settings that a row lists. */
 const MAX_SETTINGS = 4;

@@ -6,7 +6,7 @@ import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
 import { makeCoupledPanel } from "../components/coupled_model.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
-import { isDiagnosis, isSearch, makeFindingsPanels } from "../components/diagnosis.js";
+import { makeFindingsPanels } from "../components/diagnosis.js";
 import { canResume, makeFailureCard } from "../components/job_failure.js";
 import { makeRenameButton, makeTagEditor } from "../components/job_labels.js";
 import {
@@ -18,6 +18,7 @@ import {
   makeProgressBar,
 } from "../components/job_state.js";
 import { makePhasePanel } from "../components/job_phase.js";
+import { isDiagnosis, isSearch } from "../components/job_words.js";
 import { makeModelsPanel } from "../components/models.js";
 import { makeResultCard } from "../components/result_card.js";
 import { makeLivePanel } from "../components/size_front.js";
