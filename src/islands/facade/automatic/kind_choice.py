@@ -202,14 +202,7 @@ def _compare_delays(
     }
     best, reason = kind, "no model has a finite error without it"
     if bounded:
-        models, errors, _ = _measure_alike(record, bounded)
-        best = list(models)[
-            recommend([each.model.size for each in models.values()], list(models.values()), False).rank - 1
-        ]
-        reason = (
-            "the free-run RMSE of the recommended model on the validation data is "
-            f"{percent(errors[best])} of the output range of the estimation data{list_others(errors, best)}"
-        )
+        best, reason = _recommend_kind(*_measure_alike(record, bounded))
     if best in tried:
         fits[kind] = tried[best]
     verb = "is added to the lags" if best == kind else "is not used"
@@ -305,31 +298,40 @@ def _select_kind(
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
     least = min(errors.values())
-    means = f", in means of {count} samples of the record," if count > 1 else ""
     close = [each for each in constrained if errors[each] <= _CLOSE * least]
     if close and check_rest(record).value:
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
-            f"model on the validation data{means} is {percent(errors[close[0]])} of the output range of the "
-            "estimation data"
-            f"{list_others(errors, close[0])}"
+            f"model on the validation data{_name_means(count)} is {percent(errors[close[0]])} of the output "
+            f"range of the estimation data{list_others(errors, close[0])}"
         )
+    kind, reason = _recommend_kind(compared, errors, count)
+    return kind, f"because {reason}"
+
+
+def _recommend_kind(
+    compared: Mapping[str, Assessment], errors: Mapping[str, float], count: int
+) -> tuple[str, str]:
+    """Return which of some models is recommended, and why; the errors are those of means of samples."""
     kinds, models = list(compared), list(compared.values())
     sizes = [measure_size(each.model) for each in models]
     best = recommend(sizes, models, False)
     kind = kinds[best.rank - 1]
-    is_least = errors[kind] == least or best.rank == best.reference
+    is_least = errors[kind] == min(errors.values()) or best.rank == best.reference
     smallest = "" if is_least else ", the smallest without a significantly larger error,"
     left_out = [
         f"{' and '.join(kinds[rank - 1] for rank in each.ranks)} {describe_exclusion(each, models)}"
         for each in list_rivals(best, sizes, models)
     ]
     return kind, (
-        f"because the free-run RMSE of its recommended model{smallest} on the validation data"
-        f"{means} is "
+        f"the free-run RMSE of its recommended model{smallest} on the validation data{_name_means(count)} is "
         f"{percent(errors[kind])} of the output range of the estimation data{list_others(errors, kind)}"
         f"{'; left out: ' + ' and '.join(left_out) if left_out else ''}"
     )
+
+
+def _name_means(count: int) -> str:
+    return f", in means of {count} samples of the record," if count > 1 else ""
 
 
 def list_others(errors: Mapping[str, float], kind: str) -> str:
