@@ -27,5 +27,5 @@ def find_quantisation(channel: Channel) -> Fact:
     elif is_held(channel.values, step):
         text, step = f"{name} is held at {count} levels from {ends[0]} to {ends[1]}.", None
     else:
-        text = f"{name} is quantised in steps of {describe_amount(step, channel.unit)}: {count} levels."
+        text = f"{name} has {count} levels in steps of {describe_amount(step, channel.unit)}."
     return Fact("quantisation", name, step, channel.unit, None, None, text)

@@ -55,6 +55,11 @@ def test_a_held_excitation_has_one_count_of_levels_and_no_converter():
     assert levels.sentence == "force_N has 3 levels."
 
 
+def test_a_staircase_and_a_converter_have_one_description():
+    """Nothing tells 1, 2, 3, 4, each held for a while, from a slow ramp in a coarse lattice."""
+    assert find(np.repeat([1.0, 2.0, 3.0, 4.0], 50)).sentence == "y_V has 4 levels in steps of 1 V."
+
+
 def test_missing_values_are_left_out():
     y = np.round(white(1000, 0), 2)
     y[::7] = np.nan
