@@ -9,8 +9,8 @@ the text explains, if only one of the two records is refused, or if the call rai
 error of `islands.errors`. ``--seed S --first N --cases 1`` repeats a case. The exit status is 1 if there is a
 defect.
 
-Units differ by powers of ten: the operating point of a signal far away from zero is a number with few digits,
-which is another one in inches.
+Offsets move the signals of both records to places where they do not reach zero: the zero of a signal that
+does is a fact about the system, which has another law about another point (decision 0043).
 """
 
 import argparse
@@ -165,8 +165,11 @@ def _factor(rng: Generator) -> float:
 
 
 def _shift(rng: Generator, table: Table) -> Table:
-    offsets = rng.choice((-300.0, -20.0, 3.0, 50.0, 1e3), table.u.shape[1] + 1)
-    return replace(table, u=table.u + offsets[1:], y=table.y + offsets[0])
+    """Move the middle of each signal to 3 to 3000 ranges on either side of zero."""
+    signals = np.column_stack([table.y, table.u])
+    places = rng.choice((-1.0, 1.0), signals.shape[1]) * 10 ** rng.uniform(0.5, 3.5, signals.shape[1])
+    signals = signals - signals.mean(axis=0) + places * np.ptp(signals, axis=0)
+    return replace(table, u=signals[:, 1:], y=signals[:, 0])
 
 
 def _reorder(rng: Generator, table: Table) -> Table:
@@ -237,6 +240,8 @@ def draw_case(seed: int, number: int) -> Case:
     y = y + noise * np.ptp(y) * rng.standard_normal(samples)
     dt = float(rng.choice((1e-3, 0.05, 1.0, 60.0)))
     table = Table(dt * np.arange(samples), u, y, order=tuple(range(inputs)))
+    if change == "offset":
+        table = _shift(rng, table)
     function = partial(islands.identify, population=20, generations=10) if is_identified else islands.fit
     described = (
         f"{plant}, {kind}, {inputs} inputs, {samples} samples of {dt:g} s, noise {noise:g}: {change}"

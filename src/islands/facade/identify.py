@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from numpy.typing import ArrayLike
 
 from islands.errors import RecordError, SettingsError, check_seed
-from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import (
-    LARGE_OFFSET,
     SHIFTABLE,
     Offsets,
     find_offsets,
@@ -296,8 +294,8 @@ def _check_validation_length(validation: Dataset, settings: Settings) -> None:
 
 def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     # A function such as a square root of a deviation differs from that of the signal.
-    shiftable = SHIFTABLE.issuperset(settings.primitives) and constraint(settings.constraints).allows_offsets
-    return find_offsets(record, LARGE_OFFSET) if shiftable else no_offsets(record)
+    is_shiftable = SHIFTABLE.issuperset(settings.primitives)
+    return find_offsets(record, settings.constraints) if is_shiftable else no_offsets(record)
 
 
 def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Problem) -> SearchStatistics:

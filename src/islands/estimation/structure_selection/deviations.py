@@ -1,32 +1,27 @@
-"""Deviations of signals from large offsets, in which structures are selected.
+"""Deviations of signals from their operating point, in which structures are selected.
 
-A signal with a large mean and a small range, such as a pressure of 101300 Pa that varies by 100 Pa, makes all
-its powers proportional to each other in floating point: their inner products have no digits left that
-distinguish them. The selection therefore subtracts a constant, the offset, from such signals. A structure in
-deviations is then written in the units of the record: a linear term requires a constant, and a
-product contains differences such as ``u(k-1) - 101300``. Differences between lags do not change.
+The zero of a unit is no fact about a system whose signals do not reach it: 20 degC is 293.15 K. Structures
+are therefore selected in deviations from a value of the record, which is the same one in every unit. In the
+units of the record, the powers of a pressure of 101300 Pa that varies by 100 Pa are proportional to each
+other in floating point: their inner products have no digits left that distinguish them. A structure in
+deviations is written in these units: a linear term requires a constant, and a product contains differences
+such as ``u(k-1) - 101300``. Differences between lags do not change. Decision 0043 compares other choices.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, log10
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.estimate import FittedStructure, estimate
+from islands.estimation.parameter_constraints import constraint
 from islands.expressions.primitives import SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
-
-#: Mean in standard deviations from which a signal may be meant as a deviation from an operating point.
-OPERATING_POINT = 3.0
-
-#: Mean in standard deviations from which the powers of a signal are too similar for inner products.
-LARGE_OFFSET = 30.0
 
 #: Functions whose expressions keep their form in deviations: polynomials and differences of lags.
 SHIFTABLE = frozenset({"mul", "add", "sub", "phi1", "phi2", "square", "cube"})
@@ -42,25 +37,26 @@ def no_offsets(record: Dataset) -> Offsets:
     return (0.0,) * (1 + record.inputs)
 
 
-def find_offsets(record: Dataset, limit: float) -> Offsets:
-    """Return the offsets of the signals whose mean exceeds ``limit`` standard deviations.
+def find_offsets(record: Dataset, constraints: str = "none") -> Offsets:
+    """Return the medians of the signals that do not reach zero, and 0 for the others.
 
-    An offset is the number with the fewest digits within one standard deviation of the signal's mean.
+    All offsets are 0 under constraints that state something about the signals themselves.
     """
-    return tuple(_find_offset(signal, limit) for signal in (record.y[~np.isnan(record.y)], *record.u.T))
+    if not constraint(constraints).allows_offsets:
+        return no_offsets(record)
+    return tuple(map(_find_offset, (record.y[~np.isnan(record.y)], *record.u.T)))
 
 
-def _find_offset(signal: NDArray[np.float64], limit: float) -> float:
-    if not signal.size:
+def _find_offset(signal: NDArray[np.float64]) -> float:
+    if signal.size < 2:
         return 0.0
-    middle = float(signal[0]) + float(np.mean(signal - signal[0]))
-    deviation = float(np.std(signal - middle))
-    if not abs(middle) > limit * deviation > 0.0:
+    low, high = signal.min(), signal.max()
+    # The limits of a uniform distribution are farther apart than the extremes of its samples (Lloyd, "Least
+    # squares estimation of location and scale parameters using order statistics", Biometrika 39, 1952).
+    beyond = (high - low) / (signal.size - 1)
+    if low == high or low - beyond <= 0.0 <= high + beyond:
         return 0.0
-    decimals = -ceil(log10(abs(middle)))
-    while abs(round(middle, decimals) - middle) > deviation:
-        decimals += 1
-    return round(middle, decimals)
+    return float(np.partition(signal, signal.size // 2)[signal.size // 2])
 
 
 def subtract_offsets(record: Dataset, offsets: Offsets) -> Dataset:

@@ -12,13 +12,7 @@ from islands.estimation.forward_selection import (
     select_forward,
     select_pool,
 )
-from islands.estimation.parameter_constraints import constraint
-from islands.estimation.structure_selection.deviations import (
-    OPERATING_POINT,
-    find_offsets,
-    no_offsets,
-    subtract_offsets,
-)
+from islands.estimation.structure_selection.deviations import find_offsets, subtract_offsets
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.swap_search import swap_search
 from islands.facade.trials.library import TrialLibrary
@@ -109,8 +103,7 @@ def _find_least_error(split: Split, library: TrialLibrary, steps: Steps) -> floa
     least = inf
     try:
         steps.check(_STEP)
-        free = constraint(library.constraints).allows_offsets
-        offsets = find_offsets(split.estimation, OPERATING_POINT) if free else no_offsets(split.estimation)
+        offsets = find_offsets(split.estimation, library.constraints)
         estimation, held = (subtract_offsets(part, offsets) for part in (split.estimation, split.validation))
         pool = library.screen(estimation)
         warm_up = max(item.maximum_lag for item in pool)

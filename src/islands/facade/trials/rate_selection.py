@@ -13,14 +13,8 @@ from numpy.typing import NDArray
 
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
-from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import RefinedModel, refine
-from islands.estimation.structure_selection.deviations import (
-    OPERATING_POINT,
-    find_offsets,
-    no_offsets,
-    subtract_offsets,
-)
+from islands.estimation.structure_selection.deviations import find_offsets, subtract_offsets
 from islands.facade.trials.library import TrialLibrary
 from islands.models.narx import Model
 from islands.progress import Steps
@@ -145,8 +139,7 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
 
     NaN in the warm-up; infinite if no model can be estimated and simulated.
     """
-    free = constraint(library.constraints).allows_offsets
-    offsets = find_offsets(split.estimation, OPERATING_POINT) if free else no_offsets(split.estimation)
+    offsets = find_offsets(split.estimation, library.constraints)
     estimation, validation = (
         subtract_offsets(part, offsets) for part in (split.estimation, split.validation)
     )
