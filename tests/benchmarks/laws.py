@@ -23,10 +23,11 @@ import islands
 from islands.evolution.search_result import SearchResult
 from islands.facade.results.fitted_model import FittedModel
 from islands.records.dataset import Dataset
+from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import metrics
-from islands.validation.recommendation import ROUNDING, compare_blocks, is_sound
+from islands.validation.recommendation import compare_blocks, is_sound
 from support.laws import LAWS, Law
 
 #: Noise as a fraction of the standard deviation of the output.
@@ -92,7 +93,7 @@ def one_standard_error(found: SearchResult) -> int:
     """Choose the smallest model within one standard error of the least error (Breiman)."""
     squared = found.models[least_error(found)].squared_errors
     blocks = compare_blocks(squared, squared)[0]
-    limit = max(ROUNDING**2, blocks.mean() + blocks.std(ddof=1) / sqrt(len(blocks)))
+    limit = max(RESOLUTION**2, blocks.mean() + blocks.std(ddof=1) / sqrt(len(blocks)))
     return min(
         (at for at in sound(found) if error(found.models[at]) ** 2 <= limit),
         key=lambda at: found.models[at].model.size,
@@ -110,7 +111,7 @@ def paired(standard_errors: float) -> Rule:
             blocks = compare_blocks(found.models[at].squared_errors, least)
             excess = blocks[0] - blocks[1]
             limit = standard_errors * excess.std(ddof=1) / sqrt(len(excess))
-            if excess.mean() <= max(limit, 0.0) or error(found.models[at]) <= ROUNDING:
+            if excess.mean() <= max(limit, 0.0) or error(found.models[at]) <= RESOLUTION:
                 equal.append(at)
         return min(equal, key=lambda at: found.models[at].model.size)
 
@@ -137,7 +138,7 @@ def description_length(effective: bool) -> Rule:
         count = effective_samples(residual) if known else len(residual)
 
         def length(at: int) -> float:
-            squared = error(found.models[at]) ** 2 + ROUNDING**2
+            squared = error(found.models[at]) ** 2 + RESOLUTION**2
             return count * log(squared) + found.models[at].model.size * log(count)
 
         return min(sound(found), key=length)
@@ -169,7 +170,7 @@ def run(name: str, law: Law, level: float, seed: int, samples: int) -> Case:
         [law.has_terms_of(model.model, record) for model in result.models],
         [test_error(model, test) for model in result.models],
         {rule: choose(result.search_result) for rule, choose in RULES.items()},
-        ROUNDING * record.output_range,
+        RESOLUTION * record.output_range,
     )
 
 

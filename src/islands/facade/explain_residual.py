@@ -11,6 +11,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.progress import ProgressCallback, Stop, ignore_progress, never_stop
 from islands.records.dataset import Dataset
+from islands.rounding import ROUNDING
 from islands.simulation.predictors import free_run
 
 if TYPE_CHECKING:
@@ -46,9 +47,6 @@ MIN_EXPLAINED_FRACTION = 0.1
 
 #: Increase of that fraction for which a model replaces one with a smaller validation error.
 MIN_IMPROVEMENT = 0.02
-
-#: RMS of a residual that is rounding error, as a fraction of the output range.
-ROUNDING = 1e-9
 
 #: Name of the residual in a formula.
 RESIDUAL = "residual"

@@ -21,9 +21,9 @@ from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
 from islands.progress import Steps
+from islands.rounding import RESOLUTION
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess
-from islands.validation.recommendation import ROUNDING
 
 _FREE_RUN = refinement_criterion(None)
 
@@ -85,7 +85,7 @@ def refine_models(
                 yield entry
 
     least = min(each.validation_error for each in found.models)
-    if least <= ROUNDING * found.split.validation.output_range:
+    if least <= RESOLUTION * found.split.validation.output_range:
         return found, []
     steps.report(REFINEMENT, None)
     limit = _CLOSE * least

@@ -20,9 +20,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Lagged, Primit
 from islands.models.equations import expressions_of_record, named_term, signal_names
 from islands.models.narx import Model, measured_model, require_narx
 from islands.models.protocol import DynamicModel
-
-#: Sums of parameters below this fraction of their absolute sum are zero except for rounding.
-_ROUNDING = 1e-9
+from islands.rounding import ROUNDING
 
 #: Magnitudes of outputs between which equilibria are searched if they are not the roots of a polynomial.
 _MAGNITUDES = np.concatenate([[0.0], np.logspace(-9, 9, 1081)])
@@ -214,7 +212,7 @@ def _find_roots(model: Model, u: Sequence[float], where: str) -> list[float]:
         assert each is not None
         excess, size = excess + each * parameter, size + Polynomial(np.abs(each.coef)) * abs(parameter)
     # Sums drop leading zeros.
-    smallest = _ROUNDING * np.asarray(size.coef[: len(excess.coef)], dtype=np.float64)
+    smallest = ROUNDING * np.asarray(size.coef[: len(excess.coef)], dtype=np.float64)
     excess = Polynomial(np.where(np.abs(excess.coef) <= smallest, 0.0, excess.coef)).trim()
     if not excess.coef.any():
         raise ModelError(
@@ -226,7 +224,7 @@ def _find_roots(model: Model, u: Sequence[float], where: str) -> list[float]:
             roots = excess.roots()
     except np.linalg.LinAlgError:
         raise ModelError(f"the model overflows at {where}: give smaller inputs") from None
-    scale = _ROUNDING * np.maximum(1.0, np.abs(roots)) ** 0.5
+    scale = ROUNDING * np.maximum(1.0, np.abs(roots)) ** 0.5
     return sorted({float(root.real) for root in roots[np.abs(roots.imag) <= scale]})
 
 

@@ -21,6 +21,7 @@ from islands.models.narx import Model
 from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset, join
 from islands.records.signal_map import match_rate
+from islands.rounding import NORMAL_MEDIAN
 from islands.simulation.predictors import Simulation, free_run
 
 #: Samples of a segment from which its initial outputs are estimated: at least this number, and this part.
@@ -31,10 +32,6 @@ LEAST_SHARE = 0.2
 
 #: Largest change of an initial output in standard deviations of the noise; a larger one has other reasons.
 _LARGEST_CHANGE = 4.0
-
-#: Standard deviation of noise relative to the median of its absolute third differences, whose variance is
-#: 20 times that of the noise.
-_MEDIAN_TO_DEVIATION = 1.4826 / 20.0**0.5
 
 #: Step of a difference of initial outputs as a fraction of the output range.
 STEP = 1e-4
@@ -181,7 +178,8 @@ def _bound_noise(record: Dataset) -> float:
     differences = [np.diff(record.y[begin:end], 3) for begin, end in record.bounds]
     known = np.concatenate(differences)
     known = np.abs(known[~np.isnan(known)])
-    return float(np.median(known)) * _MEDIAN_TO_DEVIATION if known.size else 0.0
+    # The variance of a third difference is 20 times that of the noise.
+    return float(np.median(known) / (NORMAL_MEDIAN * 20.0**0.5)) if known.size else 0.0
 
 
 def count_segments(record: Dataset, first: int) -> int:

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError
+from islands.rounding import ROUNDING
 
 Signal = NDArray[np.float64]
 #: Seed of a NumPy generator. A sequence with a spawn key gives independent streams for the same seed.
 Seed = int | np.random.SeedSequence
-
-#: Part of a step by which rounding may move its beginning.
-_ROUNDING = 1e-9
 
 
 def filtered_noise(
@@ -161,7 +159,7 @@ def triangle(dt: float, duration: float, amplitude: float, frequency: float) -> 
 
 def steps(dt: float, duration: float, amplitude: float, frequency: float) -> Signal:
     """Return a staircase 0, amplitude, 0, -amplitude, each for a quarter of a period; frequency in Hz."""
-    quarters = np.floor(4.0 * frequency * _make_time(dt, duration) + _ROUNDING).astype(np.int64)
+    quarters = np.floor(4.0 * frequency * _make_time(dt, duration) + ROUNDING).astype(np.int64)
     return amplitude * np.array([0.0, 1.0, 0.0, -1.0])[quarters % 4]
 
 

@@ -32,9 +32,10 @@ from islands.records.coupled import AnyRecord, CoupledSplit
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
 from islands.records.split import Split
+from islands.rounding import ROUNDING
 from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run, free_runs
-from islands.validation.equal_laws import ROUNDING, find_laws
+from islands.validation.equal_laws import find_laws
 
 M = TypeVar("M", bound=AnyModel)
 

@@ -16,15 +16,13 @@ from islands.estimation.shooting_residual import make_residual
 from islands.models.coupled_narx import AnyModel
 from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset
+from islands.rounding import ROUNDING
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 
 #: Two free runs are equal if the mean square of their difference is at most this fraction of that of the
 #: residual, and of the effect of other terms: the limit below which the predictable part of a residual is
 #: negligible.
 _EQUAL_SHARE = 0.1
-
-#: Errors below this fraction of the output range are rounding errors and are equal.
-ROUNDING = 1e-9
 
 
 def find_laws(

@@ -21,15 +21,9 @@ from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.records.compatibility import match_record
 from islands.records.dataset import Dataset, join
+from islands.rounding import RESOLUTION, ROUNDING
 from islands.simulation.predictors import find_divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
-
-#: Tolerance of the sum of a cluster.
-SUM_TOLERANCE = 1e-9
-
-#: Largest variation of the output over the second half of a constant hold, as a fraction of the record's
-#: output range.
-CONSTANT_TOLERANCE = 1e-6
 
 #: Levels of the holds relative to the midpoint of the input, as fractions of its amplitude.
 LEVELS = (-0.8, -0.4, 0.0, 0.4, 0.8)
@@ -66,7 +60,7 @@ class ClusterSum:
     @property
     def met(self) -> bool:
         """Whether the sum meets its target to 1e-9."""
-        return abs(self.sum - self.target) <= SUM_TOLERANCE
+        return abs(self.sum - self.target) <= ROUNDING
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,7 +356,7 @@ def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_rang
     bounded = not np.isnan(y).any()
     drift = percent_of_range(y[-1] - y[0], output_range) if bounded else np.inf
     moves = np.ptp(y[len(y) // 2 :]) if bounded else np.inf
-    return HoldTest(level, loading, bounded, bool(moves <= CONSTANT_TOLERANCE * output_range), drift)
+    return HoldTest(level, loading, bounded, bool(moves <= RESOLUTION * output_range), drift)
 
 
 def _evaluate_extreme(level: float, y: NDArray[np.float64], record: Dataset) -> ExtremeTest:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.least_squares import least_squares
+from islands.rounding import RESOLUTION
 
 #: Verdicts: the residual is unpredictable, predictable but small, predictable and large.
 ADEQUATE, MINOR, INADEQUATE = VERDICTS = ("adequate", "minor", "inadequate")
@@ -23,9 +24,6 @@ LARGEST_SHARE = 0.1
 
 #: Largest predictable part of a free-run residual that is minor, in per cent of the output range (RMS).
 LARGEST_MINOR_PERCENT = 1.0
-
-#: RMS of a residual that is rounding error, in per cent of the output range.
-_ROUNDING_PERCENT = 1e-4
 
 #: Largest number of lags and of columns of the prediction of a residual.
 _MAX_LAGS, _MAX_COLUMNS = 10, 60
@@ -106,7 +104,7 @@ def measure_structure(
         rms = math.sqrt(float(np.mean(free_run**2)))
         rms_percent = 100.0 * rms / output_range if output_range > 0.0 else 0.0 if rms == 0.0 else math.inf
         percent = rms_percent * math.sqrt(shares[1])
-    if rms_percent <= _ROUNDING_PERCENT or shares[1] <= LARGEST_SHARE:
+    if rms_percent <= 100.0 * RESOLUTION or shares[1] <= LARGEST_SHARE:
         verdict = ADEQUATE
     else:
         verdict = MINOR if percent <= LARGEST_MINOR_PERCENT else INADEQUATE

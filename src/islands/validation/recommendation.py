@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from islands.expressions.tree import Constant
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import LARGEST_ESTIMATION_RATIO
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
@@ -45,9 +46,6 @@ _EXCESS_BY_CHANCE = 0.5
 #: Largest error on the validation data, and then on the estimation data, relative to the least, of a model
 #: that is compared.
 _LARGEST_RATIO = 2.0
-
-#: RMSE as a fraction of the output range below which errors count as equal.
-ROUNDING = 1e-6
 
 #: Distance of the output at held inputs from its recorded range, in ranges, that is not stated.
 _NEAR = 1.0
@@ -284,7 +282,7 @@ def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
     # The square of a large error may be infinite.
     with np.errstate(invalid="ignore", over="ignore"):
         error, smallest = np.sqrt(blocks.mean(axis=1))
-        if error <= max(ROUNDING, (1.0 + NEGLIGIBLE_EXCESS) * smallest):
+        if error <= max(RESOLUTION, (1.0 + NEGLIGIBLE_EXCESS) * smallest):
             return True
         excess = blocks[0] - blocks[1]
         uncertainty = STANDARD_ERRORS * excess.std(ddof=1) / sqrt(len(excess)) if len(excess) > 1 else 0.0
@@ -322,13 +320,13 @@ def _measure_estimation(entry: Assessment) -> float:
     found = entry.metrics["estimation"]["free_run"]
     if isnan(found.rmse):
         return inf
-    return ROUNDING if isnan(found.fit_percent) else max(ROUNDING, 1.0 - found.fit_percent / 100.0)
+    return RESOLUTION if isnan(found.fit_percent) else max(RESOLUTION, 1.0 - found.fit_percent / 100.0)
 
 
 def _measure_validation(entry: Assessment) -> float:
     """Return the free-run error on the predicted validation data relative to the output range."""
     with np.errstate(invalid="ignore", over="ignore"):
-        return max(ROUNDING, float(np.sqrt(np.nanmean(entry.squared_errors))))
+        return max(RESOLUTION, float(np.sqrt(np.nanmean(entry.squared_errors))))
 
 
 def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -25,12 +25,10 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError
+from islands.rounding import ROUNDING
 
 #: Nominal probability that the set of tests rejects a true model. `residual_tests` gives measured rates.
 FALSE_ALARM = 0.05
-
-#: A signal whose ratio of rms to peak is not larger is constant up to rounding.
-_CONSTANT = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +197,7 @@ def _normalise(values: NDArray[np.float64], name: str) -> _Signal:
         scaled = values / peak
         scaled -= scaled.mean()
         size = math.sqrt(np.add.reduce(scaled * scaled))
-        if size > _CONSTANT * math.sqrt(len(values)):
+        if size > ROUNDING * math.sqrt(len(values)):
             return _Signal(scaled / size, name)
     return _Signal(np.zeros_like(values), name)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from islands.models.latent import LatentModel
 from islands.models.unit_functions import evaluate_curve
 from islands.records.dataset import Dataset
+from islands.rounding import ROUNDING
 from islands.simulation.unit_arguments import UnitRun, simulate_units
 from islands.validation.ensemble import Ensemble
 
@@ -29,9 +30,6 @@ _FOLLOWS = 0.99
 
 #: Effect of units through the states, relative to the variation of the output, below which they have none.
 _NEGLIGIBLE = 1e-3
-
-#: A sum below this fraction of its parts is zero but for rounding.
-_ROUNDING = 1e-9
 
 
 class Abscissa(Enum):
@@ -230,7 +228,7 @@ def _choose_state(model: LatentModel, unit: int) -> int:
         return -1
     if inverse is not None:
         parts = np.append(of["C"] * (inverse @ of["E"][:, unit]), of["F"][unit])
-        if abs(parts.sum()) > _ROUNDING * np.abs(parts).sum():
+        if abs(parts.sum()) > ROUNDING * np.abs(parts).sum():
             return -1
     return int(np.abs(of["E"][:, unit]).argmax())
 
@@ -248,6 +246,6 @@ def _find_gain(model: LatentModel, unit: int, state: int) -> float:
 def _invert(model: LatentModel) -> NDArray[np.float64] | None:
     """Return the inverse of I - A; None if A has no rest that it approaches."""
     a = model.matrices["A"]
-    if not np.abs(np.linalg.eigvals(a)).max() < 1.0 - _ROUNDING:
+    if not np.abs(np.linalg.eigvals(a)).max() < 1.0 - ROUNDING:
         return None
     return np.linalg.inv(np.eye(len(a)) - a).astype(np.float64)

@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.effects.interface.effect import Signal
-
-#: Median absolute deviation of normal noise in standard deviations.
-MAD = 0.6745
+from islands.rounding import NORMAL_MEDIAN
 
 #: Candidate strengths k, times the largest absolute output.
 STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
@@ -63,7 +61,7 @@ def fit_variance_model(innovations: Signal, output: Signal) -> VarianceModel:
 
 def _fit_strength(innovations: Signal, size: Signal) -> tuple[float, float]:
     n = innovations.size
-    robust = float(np.median(np.abs(innovations))) / MAD
+    robust = float(np.median(np.abs(innovations))) / NORMAL_MEDIAN
     if robust == 0.0:  # most of the residual is exactly zero
         return 0.0, 0.0
     squares = np.minimum(innovations**2, (CLIP * robust * (1.0 + size)) ** 2)
@@ -82,7 +80,7 @@ def _fit_levels(innovations: Signal, part: NDArray[np.int64]) -> tuple[Signal, f
     squares = np.empty(innovations.size)
     for index in range(PARTS):
         own = np.abs(innovations[part == index])
-        robust = float(np.median(own)) / MAD if own.size else 0.0
+        robust = float(np.median(own)) / NORMAL_MEDIAN if own.size else 0.0
         if robust == 0.0:
             return constant, 0.0
         squares[part == index] = np.minimum(own, CLIP * robust) ** 2

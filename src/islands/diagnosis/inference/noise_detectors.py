@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.diagnosis.calibration.variance_model import MAD, fit_variance_model
+from islands.diagnosis.calibration.variance_model import fit_variance_model
 from islands.effects.interface.effect import Signal, SimulationContext
 from islands.records.channel_names import simplify_unit
 from islands.records.noise_model import fit_noise
 from islands.records.segments import find_bounds
+from islands.rounding import NORMAL_MEDIAN
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +157,7 @@ def _detect_outliers(y: Signal, residual: Signal, context: SimulationContext) ->
     # Noise that is large at times is no series of outliers.
     scale = fit_variance_model(whitened, output).scale
     standardised = whitened / scale
-    robust = float(np.median(np.abs(standardised - np.median(standardised)))) / MAD
+    robust = float(np.median(np.abs(standardised - np.median(standardised)))) / NORMAL_MEDIAN
     if robust == 0.0:
         return None
     is_outlier = np.abs(standardised) > _OUTLIER_DISTANCE * robust

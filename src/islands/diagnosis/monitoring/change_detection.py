@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.effects.interface.context import Signal
+from islands.rounding import NORMAL_MEDIAN
 
 #: Limit of a value, in robust standard deviations of the training about its median. One record with an
 #: outlier is no change.
@@ -27,9 +28,6 @@ MAX_AUTOCORRELATION = 0.9
 
 #: Number of latest records at which a change may have begun.
 WINDOW = 1000
-
-#: Median absolute deviation of normal values in standard deviations.
-_MAD = 0.6745
 
 #: Decay of the overshoot factor of a random walk, nu(x) = exp(-0.583 x) (Siegmund, Sequential Analysis, 1985,
 #: equation 4.38), and the integral of x nu(x)^2.
@@ -76,7 +74,7 @@ def limit_values(values: Signal, errors: Signal, training: int, clip: float = CL
     """
     first = values[:training]
     centre = np.median(first, axis=0)
-    deviation = np.median(np.abs(first - centre), axis=0) / _MAD
+    deviation = np.median(np.abs(first - centre), axis=0) / NORMAL_MEDIAN
     # A value at a bound in most records has a median deviation of zero.
     deviation = np.where(deviation > 0.0, deviation, np.std(first, axis=0))
     is_constant = deviation <= 1e-9 * np.max(np.abs(first), axis=0)

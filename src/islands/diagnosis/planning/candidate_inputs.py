@@ -15,6 +15,7 @@ from islands.diagnosis.planning.planned_input import (
     find_rate,
 )
 from islands.effects.interface.context import Signal
+from islands.rounding import ROUNDING
 
 #: Factor of the range of a smaller input.
 SMALLER = 0.5
@@ -24,10 +25,6 @@ FASTER, LARGER = (2, 4, 8, 16), (1.5, 2.0)
 
 #: Places of frequencies between the lowest and the highest one of an input, on a logarithmic scale.
 _PLACES = (0.3, 0.7)
-
-
-#: Factor up to which an excess is rounding.
-_ROUNDING = 1.0 + 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,4 +98,4 @@ def find_excess(u: Signal, dt: float, limits: InputLimits) -> tuple[float, float
     """Return by which factors the range and the rate of an input exceed limits; 1 within them."""
     reach = max(float(np.max(u)) - limits.middle, limits.middle - float(np.min(u))) / limits.amplitude
     rate = find_rate(u, dt) / limits.rate
-    return (reach if reach > _ROUNDING else 1.0), (rate if rate > _ROUNDING else 1.0)
+    return (reach if reach > 1.0 + ROUNDING else 1.0), (rate if rate > 1.0 + ROUNDING else 1.0)

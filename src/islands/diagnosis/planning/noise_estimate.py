@@ -9,10 +9,8 @@ from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
 from islands.records.noise_model import fit_noise
+from islands.rounding import ROUNDING
 from islands.simulators.extended import ExtendedSimulator
-
-#: Largest noise relative to the output that is rounding.
-_ROUNDING = 1e-9
 
 
 def estimate_noise(record: Dataset, simulation: ExtendedSimulator, target: Target) -> ChannelNoise:
@@ -39,7 +37,7 @@ def estimate_noise(record: Dataset, simulation: ExtendedSimulator, target: Targe
         output = base.output[:fitted]
         left = explain_residual(y - output, u, output, np.random.default_rng(0))[1]
         parts, origin = left[None], NoiseOrigin.RESIDUAL
-    if np.max(np.abs(parts)) <= _ROUNDING * np.max(np.abs(y)):
+    if np.max(np.abs(parts)) <= ROUNDING * np.max(np.abs(y)):
         raise RecordError("the output has no noise: give the standard deviation of that in the experiment")
     # A difference of fractional order would have no stationary variance.
     model = fit_noise(parts.ravel(), segments=(parts.shape[1],) * len(parts), difference_orders=())

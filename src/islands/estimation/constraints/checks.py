@@ -22,9 +22,7 @@ from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.models.unit_functions import parse_unit
-
-#: Tolerance of an equality, relative to its largest term and to its target.
-TOLERANCE = 1e-9
+from islands.rounding import ROUNDING
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +114,7 @@ def _check_static(part: Part, model: LatentModel) -> ConstraintCheck:
         slope, largest = rest.measure_slope(part.channel)
         # An output at a limit of the sensor does not follow the input.
         value = slope if lower < total < upper else 0.0
-    met = abs(value - part.target) <= TOLERANCE * max(largest, abs(part.target))
+    met = abs(value - part.target) <= ROUNDING * max(largest, abs(part.target))
     return ConstraintCheck(part.text, part.target, value, met)
 
 
@@ -125,13 +123,13 @@ def _check_sums(part: ClusterSums, model: Model) -> ConstraintCheck:
     complete = part.sums.keys() <= {group.steady_state for group in groups}
     deviations = [group.total(model.parameters) - part.sums.get(group.steady_state, 0.0) for group in groups]
     largest = max(map(abs, deviations), default=0.0)
-    return ConstraintCheck(part.text, 0.0, largest if complete else nan, complete and largest <= TOLERANCE)
+    return ConstraintCheck(part.text, 0.0, largest if complete else nan, complete and largest <= ROUNDING)
 
 
 def _check_equality(part: Equality, model: Model) -> ConstraintCheck:
     terms = [part.weigh(item) * theta for item, theta in zip(model.regressors, model.parameters, strict=True)]
     total = fsum(terms)
-    met = abs(total - part.target) <= TOLERANCE * max(map(abs, (part.target, *terms)))
+    met = abs(total - part.target) <= ROUNDING * max(map(abs, (part.target, *terms)))
     if not isinstance(part, StaticGain):
         return ConstraintCheck(part.text, part.target, total, met)
     numerator, feedback = (
@@ -143,6 +141,6 @@ def _check_equality(part: Equality, model: Model) -> ConstraintCheck:
     )
     remainder = 1.0 - fsum(feedback)
     # An integrator, y(k) = y(k-1), satisfies the equality without having a gain.
-    defined = abs(remainder) > TOLERANCE * max(map(abs, (1.0, *feedback)))
+    defined = abs(remainder) > ROUNDING * max(map(abs, (1.0, *feedback)))
     gain = fsum(numerator) / remainder if defined else nan
     return ConstraintCheck(part.text, part.target, gain, met and defined)

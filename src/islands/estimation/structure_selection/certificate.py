@@ -20,12 +20,10 @@ from islands.available_cpus import count_cpus
 from islands.estimation.forward_selection import SelectionProblem, Structure
 from islands.estimation.structure_selection.froe import froe
 from islands.kernels.subset_search import Tree, exchange, search
+from islands.rounding import RESOLUTION
 
 #: Largest number of candidates; the time of a node grows with its cube.
 MOST_CANDIDATES = 300
-
-#: Relative difference of errors that is rounding.
-ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,7 @@ class Certificate:
 
     def proves(self, error: float) -> bool:
         """Return whether no model of the size is better than one with an error."""
-        return self.gap(error) <= ROUNDING
+        return self.gap(error) <= RESOLUTION
 
 
 class SubsetSearch:

@@ -13,12 +13,13 @@ from typing import Any
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import BANDS, SearchResult
-from islands.facade.automatic.kind_trials import DEAD_TIMES, ROUNDING, KindTrials, percent, try_kinds
+from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
 from islands.facade.library_fit import CERTIFICATES, LibraryFit
 from islands.facade.trials.library import TrialLibrary
 from islands.progress import Steps, StoppedError
 from islands.records.dataset import Dataset
 from islands.records.inspection.rest import check_rest
+from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment, average_errors
 from islands.validation.recommendation import describe_exclusion, list_rivals, measure_size, recommend
 
@@ -66,7 +67,7 @@ class Choice:
         What was chosen and why, in two sentences.
     errors : mapping
         Free-run RMSE on the validation data of the recommended model of each kind that was compared there,
-        as a fraction of the output range of the estimation data, at least `ROUNDING`. If a model describes
+        as a fraction of the output range of the estimation data, at least `RESOLUTION`. If a model describes
         means of samples, the errors of all are those of means of the same length. A kind is missing if it has
         no model with a finite error.
     trials : mapping
@@ -273,9 +274,9 @@ def _is_bounded(model: Assessment) -> bool:
 def measure_share(model: Assessment, record: Dataset) -> float:
     """Return the free-run RMSE on the validation data as a fraction of the output range of a record.
 
-    It is at least `ROUNDING`.
+    It is at least `RESOLUTION`.
     """
-    return max(model.validation_error / record.output_range, ROUNDING)
+    return max(model.validation_error / record.output_range, RESOLUTION)
 
 
 def _select_kind(

@@ -15,15 +15,13 @@ from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
 from islands.records.inspection.dead_time import estimate_dead_times
+from islands.rounding import RESOLUTION
 
 #: Kinds up to this factor of the least error are compared with larger models.
 PROMISING = 3.0
 
 #: Name of the step that estimates dead times.
 DEAD_TIMES = "preset auto: dead times"
-
-#: Error as a fraction of the output range that is a rounding error.
-ROUNDING = 1e-6
 
 #: Smallest dead time in samples that is tried. Lags of the library cover shorter ones.
 _LEAST_DELAY = 2
@@ -74,7 +72,7 @@ def try_kinds(
 
     def summarise(parts: Sequence[float]) -> float:
         error = (sum(part**2 for part in parts) / len(parts)) ** 0.5 / record.output_range
-        return float(max(error, ROUNDING)) if isfinite(error) else inf
+        return float(max(error, RESOLUTION)) if isfinite(error) else inf
 
     def measure(kind: str, delays: Sequence[int]) -> float:
         steps(f"preset auto: trial of {kind}", None)
@@ -109,6 +107,6 @@ def _estimate_delays(record: Dataset) -> tuple[int, ...]:
 
 def percent(error: float) -> str:
     """Return an error as a percentage, for a sentence. Rounding errors are not distinguished."""
-    if error <= ROUNDING:
-        return f"less than {100.0 * ROUNDING:g} %"
+    if error <= RESOLUTION:
+        return f"less than {100.0 * RESOLUTION:g} %"
     return f"{100.0 * error:.3g} %" if isfinite(error) else "no finite error"

@@ -7,13 +7,11 @@ from math import inf, sqrt
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.records.coupled import CoupledRecord
+from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run
 
 #: Excess of the error over the least, as a fraction, that never justifies another term.
 NEGLIGIBLE_EXCESS = 0.03
-
-#: Error relative to the ranges of the outputs below which errors count as equal.
-ROUNDING = 1e-6
 
 #: Passes over the outputs. Most searches end after two.
 _PASSES = 5
@@ -70,7 +68,7 @@ def choose_equations(
 
     def prefer(candidates: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
         least = min(map(measure, candidates))
-        limit = max(ROUNDING, (1.0 + NEGLIGIBLE_EXCESS) * least)
+        limit = max(RESOLUTION, (1.0 + NEGLIGIBLE_EXCESS) * least)
         equal = [each for each in candidates if measure(each) <= limit]
         return min(equal, key=lambda each: (count_terms(each), measure(each), each))
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.records.segments import fill_gaps
+from islands.rounding import ROUNDING
 
 Signal = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -55,9 +56,6 @@ _DRAWN, _LEAST_DRAWN = 2000, 20
 #: Samples before an excursion in which an input may cause it, and the probability that an input is as active
 #: there by chance, at most.
 _CAUSES, _BY_CHANCE = (2, 8, 32), 0.05
-
-#: Errors relative to the standard deviation of the output that count as none.
-_ROUNDING = 1e-9
 
 #: Rows that a description lists, at most.
 _LISTED = 6
@@ -208,7 +206,7 @@ class _Prediction:
         width = 2 * _LAGS + 1
         neighbours = np.lib.stride_tricks.sliding_window_view(np.pad(filled, _LAGS, mode="reflect"), width)
         distance = np.abs(filled - np.median(neighbours, axis=1))
-        if not distance.max() > _ROUNDING * np.abs(filled).max():
+        if not distance.max() > ROUNDING * np.abs(filled).max():
             return None
         usual = known & (distance <= np.quantile(distance[known], 1.0 - _FARTHEST))
         # Squares of the largest numbers have no value.
@@ -272,11 +270,11 @@ def _find_excursions(prediction: _Prediction) -> list[tuple[int, int]]:
     """Return first sample and length of the runs that the samples around them contradict."""
     errors = np.abs(prediction.errors)
     known = np.isfinite(errors)
-    usual = max(float(np.quantile(errors[known], 1.0 - _LARGE)), _ROUNDING)
+    usual = max(float(np.quantile(errors[known], 1.0 - _LARGE)), ROUNDING)
     firsts = np.flatnonzero(known & (errors > usual))
     tried = np.array([prediction.leave_out(firsts, length) for length in range(1, _LONGEST + 1)])
     # An excursion ends where the samples after it go on as those before it.
-    best = np.argmin(tried[:, 1] / np.maximum(tried[:, 0], _ROUNDING), axis=0)
+    best = np.argmin(tried[:, 1] / np.maximum(tried[:, 0], ROUNDING), axis=0)
     lengths, (sizes, displacements) = best + 1, tried[best, :, np.arange(firsts.size)].T
     undone = sizes - displacements
     isolated, free = [], known.copy()

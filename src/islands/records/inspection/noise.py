@@ -15,6 +15,7 @@ from islands.records.dataset import Dataset
 from islands.records.inspection.channel import Channel, channels, describe_amount
 from islands.records.inspection.fact import Fact
 from islands.records.inspection.quantisation import find_quantisation
+from islands.rounding import NORMAL_MEDIAN
 
 #: Order of the differences that separate the noise from the signal.
 _ORDER = 4
@@ -27,9 +28,6 @@ _ROUGH = 0.1
 
 #: Level, relative to the range, that is no more than rounding.
 _INVISIBLE = 1e-7
-
-#: Median of the absolute value of a normal variable, in standard deviations.
-_MEDIAN = 0.6745
 
 #: Blocks that give the interval of a noise level.
 _BLOCKS = 16
@@ -107,7 +105,7 @@ def estimate_noise(signal: NDArray[np.float64], record: Dataset, order: int = _O
     """
     differences = np.concatenate([np.diff(signal[first:last], order) for first, last in record.bounds])
     size = np.abs(differences[np.isfinite(differences)])
-    return float(np.median(size) / (_MEDIAN * comb(2 * order, order) ** 0.5)) if size.size else 0.0
+    return float(np.median(size) / (NORMAL_MEDIAN * comb(2 * order, order) ** 0.5)) if size.size else 0.0
 
 
 def measure_increments(signal: NDArray[np.float64], record: Dataset) -> float:

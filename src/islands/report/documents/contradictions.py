@@ -10,15 +10,13 @@ from islands.effects.catalogue import get_title
 from islands.effects.interface.effect import Effect, Site
 from islands.expressions.evaluation import evaluate
 from islands.expressions.tree import FMU, SIGNAL_FUNCTIONS, Apply, Expression, Symbol, substitute, walk
+from islands.rounding import RESOLUTION
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import ResampledSimulator
 from islands.simulators.ode.effects import list_terms
 from islands.simulators.ode.equation_parser import FORCE, TIME
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system import OdeSystem, sort_variables
-
-#: Part of the range of the output beyond a limit that is a rounding error.
-_ROUNDING = 1e-6
 
 
 def list_contradictions(fit: CalibrationResult) -> tuple[str, ...]:
@@ -105,7 +103,7 @@ def _check_output(fit: CalibrationResult, system: OdeSystem) -> Iterator[str]:
     if state is None or not any(each.site == Site.OUTPUT for each in fit.simulation.effects):
         return
     low, high = float(np.min(fit.output)), float(np.max(fit.output))
-    rounding = _ROUNDING * (high - low)
+    rounding = RESOLUTION * (high - low)
     for limit, is_beyond, end in (
         (state.lower, low < state.lower - rounding, low),
         (state.upper, high > state.upper + rounding, high),

@@ -21,6 +21,7 @@ from islands.report.text.statements import (
     write_amount,
     write_statements,
 )
+from islands.rounding import RESOLUTION
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
 _WHOLE, _MOST = 0.9, 0.5
@@ -39,9 +40,6 @@ _FAR_RATIO = 3.0
 
 #: Error as a fraction of the standard deviation of the output above which white and coloured noise are large.
 _LARGE_NOISE, _LARGE_COLOURED_NOISE = 0.3, 0.1
-
-#: Error as a fraction of the standard deviation of the output that is a rounding error.
-_ROUNDING = 1e-6
 
 #: Correlation time of the residual in samples from which on it is stated.
 _CORRELATED = 10
@@ -259,7 +257,7 @@ class DiagnosisFacts:
     @property
     def is_exact(self) -> bool:
         """Whether the error of the held-out data is a rounding error."""
-        return self.relative_error is not None and self.relative_error < _ROUNDING
+        return self.relative_error is not None and self.relative_error < RESOLUTION
 
     @property
     def free_forms(self) -> list[str]:

@@ -17,6 +17,7 @@ from islands.progress import Failure, attempt
 from islands.records.preprocessing_steps import Preprocessing
 from islands.records.split import compare_input_ranges
 from islands.report.text.dry_friction import DryFriction, find_dry_friction
+from islands.rounding import RESOLUTION
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, NOT_COMPUTED
 from islands.validation.prediction_bands import LEVEL
 
@@ -40,9 +41,6 @@ _BETTER = 0.95
 
 #: Ratio of the errors on estimation data and validation data above which the latter is too favourable.
 _LARGE_INVERSE_RATIO = 3.0
-
-#: RMSE as a fraction of the output range that is a rounding error: its ratio to another one says nothing.
-_ROUNDING = 1e-6
 
 #: Least fraction of the validation samples inside a band of 90 %: two standard errors of 20 independent ones.
 _LEAST_COVERAGE = 0.75
@@ -234,7 +232,7 @@ class RunFacts:
 
     def is_rounding(self, rmse: float) -> bool:
         """Return whether an error is that of rounding: its ratio to another one says nothing."""
-        return bool(rmse <= _ROUNDING * self.data.get("output_range", 0.0))
+        return bool(rmse <= RESOLUTION * self.data.get("output_range", 0.0))
 
     @property
     def least_error(self) -> float | None:

@@ -17,6 +17,7 @@ from islands.records.reading.options import MEAN, SAMPLE
 from islands.records.reading.sampling.column_clocks import SAME_STEP, ColumnClock
 from islands.records.reading.sampling.recording import Recording, count_text
 from islands.records.reading.sampling.uniform_grid import AGREEMENT, GAP
+from islands.rounding import ROUNDING
 
 _HOW = {MEAN: "the mean from each to the next", SAMPLE: "the value at each"}
 
@@ -26,9 +27,6 @@ _DIFFERENT = "columns have samples at different times"
 #: Deviation of a gap from a whole number of steps, in steps, up to which samples are missing in it.
 #: Also the part of equal samples by which two clocks may differ and be the same.
 _WHOLE = 0.25
-
-#: Deviation of a mean from a sample, relative to the range, up to which the signal is at rest.
-_REST = 1e-9
 
 
 #: Mean square of the deviations from the neighbours, relative to that of the steps, of a smooth signal, at
@@ -286,7 +284,7 @@ def _average(
     means = (integrate(ends) - integrate(begins)) / width + samples[0]
     # A command at rest has its value exactly, and so the same levels as before.
     held = samples[np.clip(np.searchsorted(own.stamps, begins, "right") - 1, 0, len(samples) - 1)]
-    means = np.where(np.abs(means - held) <= _REST * np.ptp(samples), held, means)
+    means = np.where(np.abs(means - held) <= ROUNDING * np.ptp(samples), held, means)
     known &= np.interp(ends, edges, missing) - np.interp(begins, edges, missing) <= AGREEMENT * own.step
     return np.where(known, means, np.nan)
 
