@@ -60,17 +60,17 @@ nightly: .venv/ready-test .venv/ready-lint .venv/ready-docs .venv/ready-packages
 # 500 random kills and suspensions of a service on each database: no job may be lost or duplicated, and results must
 # be identical.
 soak: .venv/ready-test
-	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY)
-	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY) --database postgresql
+	$(BIN)/python -m lab.service.soak --kills 500 --seed $(DAY)
+	$(BIN)/python -m lab.service.soak --kills 500 --seed $(DAY) --database postgresql
 
 # Five minutes of mutated files for all readers of uploads, and five of short and extreme records for the searches.
 fuzz: .venv/ready-test
-	$(BIN)/python benchmarks/fuzz_readers.py --seconds 300 --seed $(DAY)
-	$(BIN)/python benchmarks/fuzz_searches.py --seconds 300 --seed $(DAY)
+	$(BIN)/python -m lab.fuzzing.readers --seconds 300 --seed $(DAY)
+	$(BIN)/python -m lab.fuzzing.searches --seconds 300 --seed $(DAY)
 
 # Figures of a service under load, on a machine that should be otherwise idle.
 load: .venv/ready-test
-	$(BIN)/python benchmarks/service_load.py --repeat 5
+	$(BIN)/python -m lab.service.load --repeat 5
 
 lint: .venv/ready-lint
 	$(BIN)/ruff format --check .

@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from py_compile import PycInvalidationMode
 
-PACKAGES = ("islands", "islands_service", "islands_measurements", "islands_api")
+PACKAGES = ("islands", "islands_service", "islands_api")
 
 #: Modules that libraries load while they work, and no source names.
 WHILE_WORKING = (

@@ -16,7 +16,7 @@ from islands.records.writer import write_record
 from islands_api.client import Client
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from benchmarks.monitor import SIMULATION, make_record
+from lab.diagnosis.monitor import SIMULATION, make_record
 
 #: Records, the first one with play at the input, and its size in N.
 COUNT, ONSET, PLAY = 22, 17, 0.5

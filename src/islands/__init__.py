@@ -18,7 +18,6 @@ _PUBLIC = {
     "records.dataset": ("Dataset", "join"),
     "records.preprocessing": ("preprocess",),
     "records.split": ("Split", "split"),
-    "diagnosis.detectability": ("self_test",),
     "diagnosis.planning.experiment_plan": ("ExperimentPlan",),
     "effects.catalogue": ("EFFECTS",),
     "effects.interface.context": ("Parameter",),

@@ -1,5 +1,4 @@
 # Made by islands._make_stub().
-from islands.diagnosis.detectability import self_test as self_test
 from islands.diagnosis.planning.experiment_plan import ExperimentPlan as ExperimentPlan
 from islands.effects.catalogue import EFFECTS as EFFECTS
 from islands.effects.interface.context import Parameter as Parameter

@@ -100,7 +100,6 @@ def test_a_simulation_is_diagnosed(folder):
     [
         (("serve",), "islands serve needs the extra 'service'"),
         (("keys", "list"), "islands keys needs the extra 'service'"),
-        (("trials", "--ray-address", "127.0.0.1:1"), "the engine ray needs the extra 'ray'"),
         (
             ("identify", "record.csv", *COLUMNS, *SEARCH, "--engine", "ray", "--out", "never"),
             "the engine ray needs the extra 'ray'",

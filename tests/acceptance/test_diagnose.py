@@ -2,22 +2,14 @@
 
 import json
 import re
-from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.diagnosis.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
-from islands.diagnosis.result import Diagnosis
-from islands.diagnosis.surrogates import SurrogateCase
-from islands.parallel import ParallelMap
 from islands.records.writer import write_record
-from islands.simulators.interface import Simulator
-from islands_measurements.detection.injection.measurement import inject
+from lab.diagnosis.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
 from support.noise_records import SENSOR, make_noisy_record
 from support.undrawn import undrawn_figures
@@ -149,71 +141,6 @@ def test_residual_far_above_the_stated_noise_is_unknown(tmp_path: Path) -> None:
     assert "times the stated noise of" in " ".join(said.split())
     planned = fail("diagnose", *options, "--plan", "--noise-level", "0.1", "--out", tmp_path / "plan")
     assert "--noise-level is for a diagnosis" in planned
-
-
-def run_self_test(base: Path, out: str, *options: object) -> tuple[str, dict]:
-    """Diagnose with a self-test; return the printed text and the document."""
-    with undrawn_figures():
-        text = succeed(
-            *("diagnose", base / "record.csv", "--input", "u_V", "--output", "y_um"),
-            *("--simulation", "column:theirs_um", "--self-test", *options, "--out", base / out),
-        )
-    return text, json.loads((base / out / "discrepancy.json").read_text())
-
-
-def stub_map(_function: object, cases: Sequence[SurrogateCase]) -> Iterator[SurrogateOutcome]:
-    """Return outcomes without diagnoses: misfits above a third of the noise are recognised."""
-    for case in cases:
-        named = case.injection is not None and case.injection.misfit > 0.33
-        yield SurrogateOutcome("offset" if named else NOTHING, named, 1.0)
-
-
-def quick_self_test(
-    found: Diagnosis, simulator: Simulator, tolerance: dict, seed: int, _map: ParallelMap, **options: Any
-) -> SelfTest:
-    return self_test(found, simulator, tolerance, seed, stub_map, **options)
-
-
-@pytest.mark.parametrize(
-    ("clean", "effects", "quick"),
-    [
-        pytest.param(40, None, True, id="stub", marks=pytest.mark.ci),
-        pytest.param(4, ("offset",), False, id="small", marks=pytest.mark.ci),
-        pytest.param(40, None, False, id="whole", marks=pytest.mark.nightly),
-    ],
-)
-def test_self_test_reports_detection_limits_and_false_alarms(
-    offset_record: Path,
-    clean: int,
-    effects: tuple[str, ...] | None,
-    quick: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    tested = partial(quick_self_test if quick else self_test, effects=effects, clean_surrogates=clean)
-    monkeypatch.setattr("islands.cli.commands.diagnose.self_test", tested)
-    out = f"self-test-{clean}-{quick}"
-    printed, document = run_self_test(offset_record, out, "--workers", 1)
-    assert [effect["name"] for effect in document["effects"]] == ["offset"]
-    limits = document["detection_limits"]
-    assert set(effects or ("offset", "viscous", "jump", "sensor-lag")) <= set(limits)
-    assert set(limits["offset"]) == {"strength", "unit", "misfit_sigma"}
-    assert limits["offset"]["unit"] == "um"
-    # An offset's misfit is the offset itself.
-    assert limits["offset"]["strength"] == pytest.approx(0.1 * limits["offset"]["misfit_sigma"], rel=0.2)
-    assert limits["offset"]["strength"] < document["effects"][0]["parameters"]["c"]["value"]
-    alarms = document["false_alarm_rate"]
-    assert alarms["of"] == clean
-    assert alarms["ci95"][0] <= alarms["value"] <= alarms["ci95"][1]
-    assert alarms["value"] < 0.2
-    assert document["p_value"] == pytest.approx(1 / (clean + 1))
-    assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == clean
-    assert f"Of {clean} surrogate records without an effect" in printed
-    text = (offset_record / out / "report.html").read_text()
-    assert "smallest detected strength" in text
-    row = (
-        r"offset of the output \(<code>offset</code>\)</th><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>"
-    )
-    assert re.search(row, text)
 
 
 def test_existing_result_is_not_overwritten_without_force(folder: Path) -> None:

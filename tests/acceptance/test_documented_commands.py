@@ -85,10 +85,12 @@ def script_commands(page: Path) -> Iterator[ScriptCommand]:
     """Yield the commands of a page that run a script or tests of the repository."""
     code = [code for _, code in pages.blocks(page)] + re.findall(r"`([^`\n]+)`", pages.prose(page))
     for line in "\n".join(code).splitlines():
-        if re.match(r"(python|pytest) .*\b(benchmarks|deploy|tests)/\S+\.py", line.strip()):
-            words = shlex.split(line.split(" #")[0])
+        if re.match(r"python -m lab\.|(python|pytest) .*\b(deploy|tests)/\S+\.py", line.strip()):
+            program, *words = shlex.split(line.split(" #")[0])
+            if words[0] == "-m" and program == "python":
+                words = [f"{words[1].replace('.', '/')}.py", *words[2:]]
             path = next(word for word in words if word.endswith(".py"))
-            yield ScriptCommand(words[0], ROOT / path, [word for word in words[1:] if word != path])
+            yield ScriptCommand(program, ROOT / path, [word for word in words if word != path])
 
 
 def check_script_command(command: ScriptCommand) -> None:
@@ -98,8 +100,8 @@ def check_script_command(command: ScriptCommand) -> None:
         marks = set(command.words) - {"-m"}
         assert all(f"pytest.mark.{mark}" in source for mark in marks), command
         return
-    for module in re.findall(r"^from (\w+) import", source, re.MULTILINE):
-        own = command.path.with_name(f"{module}.py")
+    for module in re.findall(r"^from (lab[\w.]+) import", source, re.MULTILINE):
+        own = ROOT / f"{module.replace('.', '/')}.py"
         source += own.read_text("utf-8") if own.exists() else ""
     for number, word in enumerate(command.words):
         name = word.partition("=")[0]

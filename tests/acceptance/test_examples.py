@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from docs._scripts import tutorials
 
 import islands
+from docs._scripts import tutorials
 
 EXAMPLES = tutorials.list_examples()
 IDS = [path.stem for path in EXAMPLES]

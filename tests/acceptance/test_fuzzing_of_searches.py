@@ -3,12 +3,12 @@
 import warnings
 from functools import partial
 
-import fuzz_searches
 import numpy as np
 import pytest
-from fuzz_searches import Case, draw_case, main, run_case
 
 from islands.errors import RecordError
+from lab.fuzzing import searches as fuzz_searches
+from lab.fuzzing.searches import Case, draw_case, main, run_case
 
 #: The cases are the same at every run; `make fuzz` takes others every day.
 SEED = 1

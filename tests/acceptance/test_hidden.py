@@ -5,8 +5,8 @@ The records are simulated by code that is independent of the diagnosis.
 
 import pytest
 
-from islands_measurements.detection.injection.piezo import PIEZO
-from islands_measurements.detection.trial import Trial, TrialOutcome, run_trial
+from lab.diagnosis.injection.piezo import PIEZO
+from lab.diagnosis.trial import Trial, TrialOutcome, run_trial
 
 #: Duration of a record at the levels ci and nightly, in seconds.
 SECONDS = 30.0

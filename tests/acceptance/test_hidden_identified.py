@@ -5,7 +5,7 @@ The model is identified on the record with the injected effect.
 
 import pytest
 
-from islands_measurements.detection.trial import Trial, TrialOutcome, run_trial
+from lab.diagnosis.trial import Trial, TrialOutcome, run_trial
 
 #: Duration of a record at the nightly level, in seconds.
 SECONDS = 15.0

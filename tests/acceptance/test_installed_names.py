@@ -35,11 +35,10 @@ EXEMPT = {"requirements.lock", "test_installed_names.py"}
 FOLDERS = (
     ".ci",
     "api",
-    "benchmarks",
     "deploy",
     "docs",
     "examples",
-    "measurements",
+    "lab",
     "services",
     "src",
     "tests",

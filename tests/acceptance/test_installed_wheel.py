@@ -19,7 +19,6 @@ DATA = {
     "islands": ("py.typed", "report/pages/templates/report.html", "report/pages/templates/diagnosis.html"),
     "islands_api": ("py.typed", "dashboard/index.html", "dashboard/islands.css", "dashboard/islands.js"),
     "islands_service": ("py.typed",),
-    "islands_measurements": ("py.typed",),
 }
 
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz_invariance import TRANSFORMATIONS, Answer, compare, draw_case, run_case
 
 import islands
 from islands.records.dataset import Dataset
 from islands.systems.bouc_wen import authors_estimation, authors_validation
+from lab.fuzzing.invariance import TRANSFORMATIONS, Answer, compare, draw_case, run_case
 
-#: Cases of the seed 0 that take a few seconds each; `benchmarks/fuzz_invariance.py` has others.
+#: Cases of the seed 0 that take a few seconds each; `lab/fuzzing/invariance.py` has others.
 CASES = (3, 8, 9, 10, 11, 12, 13, 14, 17, 20, 24, 85)
 
 

@@ -21,7 +21,6 @@ finally:
 #: Largest number of modules of a command, a few more than measured, and the large packages it loads.
 LIMITS = {
     "--version": (280, ""),
-    "benchmark list": (470, ""),
     "fit --help": (715, ""),
     "inspect {record}": (550, ""),
     "jobs --help": (900, ""),

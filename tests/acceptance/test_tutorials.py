@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from docs._scripts import tutorials
 
 SOURCE = '''"""A title: with a colon.

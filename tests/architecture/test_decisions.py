@@ -80,7 +80,7 @@ def test_numbers_of_decisions_are_unique() -> None:
 def test_every_cited_decision_exists() -> None:
     """Comments and pages cite a decision by its number."""
     numbers = {path.name[:4] for path in DECISIONS}
-    folders = ("src", "services", "measurements", "api", "tests", "benchmarks", "docs", "deploy")
+    folders = ("src", "services", "api", "lab", "tests", "docs", "deploy")
     files = [path for folder in folders for path in (ROOT / folder).rglob("*.*")]
     for path in [*files, *ROOT.glob("*.md")]:
         if path.suffix not in {".py", ".md"}:

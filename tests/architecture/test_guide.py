@@ -40,9 +40,7 @@ PLACES = re.findall(
 def test_a_place_of_the_guide_to_additions_exists_and_has_its_table(place: str) -> None:
     """``NAME`` in a path is that of the addition."""
     spans = re.findall(r"`([^`]+)`", place)
-    paths = [
-        ROOT / each for each in spans if re.match(r"(src|services|measurements|api|tests|docs|deploy)/", each)
-    ]
+    paths = [ROOT / each for each in spans if re.match(r"(src|services|api|lab|tests|docs|deploy)/", each)]
     found = [path for path in paths if not re.search(r"NAME|FAMILY", path.name)]
     assert all(path.exists() for path in found), place
     # Further files of a place are next to the first one.

@@ -13,7 +13,7 @@ import pytest
 
 from support.repository import ROOT
 
-FOLDERS = ("src", "services", "measurements", "api")
+FOLDERS = ("src", "services", "api")
 SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 
 #: Class names that two modules use: the client and the OpenAPI document name them like the core does.
@@ -87,9 +87,7 @@ def test_no_module_has_a_catch_all_name() -> None:
         assert not {"utils", "helpers", "common", "misc"} & {path.stem, *path.parts}, path
 
 
-@pytest.mark.parametrize(
-    "package", ["api.islands_api", "services.islands_service", "measurements.islands_measurements"]
-)
+@pytest.mark.parametrize("package", ["api.islands_api", "services.islands_service"])
 def test_a_source_folder_is_not_importable_as_a_package(package: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", f"import {package}"], cwd=ROOT / "src", capture_output=True, check=False

@@ -16,7 +16,6 @@ UNIT = TESTS / "unit"
 SOURCES = {
     "islands": ROOT / "src" / "islands",
     "islands_service": ROOT / "services" / "islands_service",
-    "islands_measurements": ROOT / "measurements" / "islands_measurements",
     "islands_api": ROOT / "api" / "islands_api",
 }
 

@@ -7,11 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from support.repository import BENCHMARKS
+from support.repository import ROOT
 
 pytestmark = pytest.mark.nightly
-
-SOAK = BENCHMARKS / "service_soak.py"
 
 KILLS = 15
 
@@ -22,9 +20,10 @@ def test_soak_with_kills_loses_duplicates_or_changes_no_job(tmp_path: Path, data
     report = tmp_path / "found.json"
     done = subprocess.run(
         [
-            *(sys.executable, SOAK, "--kills", str(KILLS), "--json", report),
+            *(sys.executable, "-m", "lab.service.soak", "--kills", str(KILLS), "--json", report),
             *("--folder", tmp_path, "--database", database),
         ],
+        cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,

@@ -281,7 +281,7 @@ CASES = make_cases()
 
 PORTFOLIO = [name for name in CASES if name.startswith("portfolio")]
 
-#: Cases of every kind; `tests/benchmarks/contradictions.py` has all of them.
+#: Cases of every kind; `lab/searches/contradictions.py` has all of them.
 SAMPLE = (
     *PORTFOLIO[::4],
     *[name for name in CASES if name.startswith("law")][::12],

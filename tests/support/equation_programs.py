@@ -24,7 +24,7 @@ from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.table import LocalExtendedSpec
-from islands_measurements.speed.compiled_c import compile_model
+from lab.speed.compiled_c import compile_model
 
 Array = NDArray[np.float64]
 

@@ -234,7 +234,7 @@ def run_cases(
 
 
 def main() -> None:
-    """Run the cases that standard input names, as a child process of `benchmarks/fuzz_readers.py`."""
+    """Run the cases that standard input names, as a child process of `lab/fuzzing/readers.py`."""
     from islands.records.reading import preview
 
     asked = json.load(sys.stdin)

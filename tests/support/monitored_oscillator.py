@@ -3,11 +3,11 @@
 from functools import cache
 
 import numpy as np
-from benchmarks.monitor import SIMULATION, make_record
 
 from islands.facade.record_monitor import create_monitor, monitor_record
 from islands.records.dataset import Dataset
 from islands.report.documents.monitor_state import SavedMonitor
+from lab.diagnosis.monitor import SIMULATION, make_record
 
 __all__ = ["ONSET", "SIMULATION", "TRAINING", "follow", "make_records", "undisturbed_monitor"]
 

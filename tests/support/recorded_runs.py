@@ -1,4 +1,4 @@
-"""Recorded runs of `benchmarks/phase_shares.py`, replayed through the estimate of the time left."""
+"""Recorded runs of `lab/searches/phase_shares.py`, replayed through the estimate of the time left."""
 
 import json
 from collections.abc import Iterator

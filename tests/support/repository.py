@@ -7,7 +7,6 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-BENCHMARKS = ROOT / "benchmarks"
 
 #: Folder of the measured records.
 RECORDS = Path(os.environ.get("ISLANDS_MEASURED_DIR", ROOT.parent / "shared" / "data"))

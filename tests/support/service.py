@@ -219,7 +219,7 @@ KNOWN = {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 0.01}
 
 def hidden(folder: Path, seconds: float = 4.0) -> bytes:
     """Make a record of a piezo actuator with thermal drift, which its simulation does not model."""
-    from islands_measurements.detection.injection.measurement import inject
+    from lab.diagnosis.injection.measurement import inject
 
     found = inject([HIDDEN], np.random.default_rng(4), seconds=seconds, band=(1.0, 4.0))
     write_record(found.record, folder / "hidden.csv")

@@ -1,9 +1,8 @@
-"""Command line ``islands``: the commands of the core, of the measurements and of the service."""
+"""Command line ``islands``: the commands of the core, of the service and of a checkout."""
 
 from types import MappingProxyType
 
 from islands.cli import app as core
-from islands_measurements.commands import COMMANDS as MEASUREMENTS
 
 #: Commands of a service; see `islands.cli.app.Command`.
 SERVICE_COMMANDS = core.make_commands(
@@ -21,11 +20,8 @@ SERVICE_COMMANDS = core.make_commands(
     },
 )
 
-_core = dict(core.COMMANDS)
-_systems = {"systems": _core.pop("systems")}
-
-#: All commands, in the order of the help, in which the measurements precede the systems.
-COMMANDS = MappingProxyType({**_core, **MEASUREMENTS, **_systems, **SERVICE_COMMANDS})
+#: All commands, in the order of the help.
+COMMANDS = MappingProxyType({**core.COMMANDS, **SERVICE_COMMANDS, **core.MEASUREMENTS})
 
 
 class AllCommands(core.Commands):

@@ -12,6 +12,7 @@ from rich.markup import escape
 from typer.core import TyperCommand, TyperGroup
 
 from islands.cli.console import errors, exit_with_closed_output
+from islands.cli.laboratory import import_laboratory
 from islands.cli.options_file import DEFAULT_FILE, match_options, read_option_tables
 from islands.cli.stop_requests import exit_code, ignore_signals, raise_on_signals
 from islands.distribution import describe_missing_extra, read_version
@@ -62,10 +63,21 @@ COMMANDS = make_commands(
         "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
         "examples": "Records to try the commands on: list them, copy them.",
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
+        "systems": "Simulated systems: list them, make records of them.",
+    },
+)
+
+#: Commands of a checkout, which measure the project; ``lab`` has them.
+MEASUREMENTS = make_commands(
+    "lab.commands",
+    {
         "reproduce": "Compute the tables and figures of the paper, and write them next to the published "
         "numbers.",
         "benchmark": "Published sets of measurements: list them, run the searches or other packages on them.",
-        "systems": "Simulated systems: list them, make records of them.",
+        "bench": "Measure evaluations, kernels and whole searches on this machine, which should be otherwise "
+        "idle.",
+        "trials": "Inject effects into simulated records, diagnose them, and count how often they are found "
+        "and named.",
     },
 )
 
@@ -85,7 +97,7 @@ class Commands(TyperGroup):
     """Group that imports a command on demand, so that ``islands jobs`` does not load the kernels."""
 
     #: Commands by name, in the order of the help.
-    table: Mapping[str, Command] = COMMANDS
+    table: Mapping[str, Command] = MappingProxyType({**COMMANDS, **MEASUREMENTS})
     _is_listing = False
 
     def invoke(self, ctx: Any) -> Any:
@@ -121,15 +133,20 @@ class Commands(TyperGroup):
         Raises
         ------
         SettingsError
-            The packages of the command are not installed.
+            The packages of the command are not installed, or there is no checkout.
         """
         if cmd_name not in self.table:
             return None
         package, description = self.table[cmd_name]
         if self._is_listing:
-            return TyperCommand(cmd_name, help=description)
+            panel = "Measurements of the project, in a checkout" if cmd_name in MEASUREMENTS else None
+            return TyperCommand(cmd_name, help=description, rich_help_panel=panel)
+        name = f"{package}.{cmd_name}"
         try:
-            module = import_module(f"{package}.{cmd_name}")
+            if cmd_name in MEASUREMENTS:
+                module = import_laboratory(name, f"islands {cmd_name}")
+            else:
+                module = import_module(name)
         except ModuleNotFoundError as error:
             raise explain_missing_package(error, cmd_name) from error
         group = getattr(module, cmd_name)

@@ -1,24 +1,17 @@
-"""Engines of a search on the command line: serial, or Ray, whose factories are entry points."""
+"""Engines of a search on the command line: serial, or Ray."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 
-from islands.cli.console import print_message
 from islands.distribution import describe_missing_extra
 from islands.errors import EngineError, SettingsError
 from islands.evolution.engine import Engine, SerialEngine
 from islands.facade.engine_choice import Ray, open_engine
-from islands.parallel import ParallelMap
-from islands.processes.pool import process_pool
 from islands.progress import ProgressCallback
 
 #: Names of the engines.
 ENGINES = ("serial", "ray")
-
-#: Entry point group of functions ``open(workers, address, check)`` that open a parallel map on a cluster.
-PARALLEL_MAPS = "islands.parallel_maps"
 
 
 @contextmanager
@@ -59,39 +52,6 @@ def start_engine(
                     raise
                 progress(f"engine: serial, on one core, with the same result; {error}")
         yield engine
-
-
-@contextmanager
-def open_pool(workers: int | None, address: str | None, check: Callable[[], object]) -> Iterator[ParallelMap]:
-    """Open a parallel map for a ``with`` block: on Ray, or on processes where it is absent or does not start.
-
-    Parameters
-    ----------
-    workers : int or None
-        Concurrent calls; None for one per core.
-    address : str or None
-        ``HOST:PORT`` of a Ray cluster; None for this machine.
-    check : callable
-        Called many times a second. If it raises an error, all calls are ended.
-
-    Raises
-    ------
-    EngineError
-        No cluster answers at the address.
-    """
-    with ExitStack() as stack:
-        parallel_map: ParallelMap | None = None
-        if address is not None or has_ray():
-            (entry,) = entry_points(group=PARALLEL_MAPS, name="ray")
-            try:
-                parallel_map = stack.enter_context(entry.load()(workers, address, check))
-            except EngineError as error:
-                if address is not None:
-                    raise
-                print_message(f"processes in place of Ray, with the same result; {error}")
-        if parallel_map is None:
-            parallel_map = stack.enter_context(process_pool(workers, start_after=0.0, check=check))
-        yield parallel_map
 
 
 def has_ray() -> bool:

@@ -78,7 +78,7 @@ MAX_SEARCHES = 3
 _MODEL_ERROR = "the residual is model error"
 
 #: Phases of a diagnosis. The shares and steps are those with which the times left are least wrong in six
-#: diagnoses that `benchmarks/phase_shares.py` records: a process with a squared input (3000 samples), one
+#: diagnoses that `lab/searches/phase_shares.py` records: a process with a squared input (3000 samples), one
 #: with a saturating input as ``linear:2`` and as ``second-order`` (1500), one with a limit of a state (1500),
 #: a short record (500), and a stiff spring (3000). Missing terms are searched for with effects as well,
 #: unless the residual is model error. That is known after the search inside of a linear simulation, which

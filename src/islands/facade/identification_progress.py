@@ -67,7 +67,7 @@ def identification_phases(
     """Return the phases of an identification, with times in seconds of one core.
 
     The times are those of searches with the preset ``auto`` and 500, 2000 and 20 000 samples, and of one with
-    ``narx`` and 3000 samples. ``benchmarks/phase_shares.py`` measures them.
+    ``narx`` and 3000 samples. ``lab/searches/phase_shares.py`` measures them.
 
     Parameters
     ----------

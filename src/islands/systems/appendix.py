@@ -10,7 +10,7 @@ The paper leaves some details open. This module makes the following choices:
   (quoted: 28.05).
 * The scaling of the soft input is not stated. Without scaling, its variance is near 115 over 500 samples and
   S1 diverges. ``rescaled`` has the variance 0.025: of nine between 0.003 and 0.2 it makes the counts of
-  unstable models and the sizes of the paper most likely (``islands.reproduction.appendix_a`` scans it). No
+  unstable models and the sizes of the paper most likely (``lab.reproduction.appendix_a`` scans it). No
   variance meets everything: sizes need one near 0.025, the count of S1 without pruning one near 0.04, and
   the prediction errors of S2 one of at least 0.2. At 0.025, S1 has a median SNR of 35.2. ``unit-gain``, a
   filter that passes a constant unchanged, has a variance of 0.003 and an SNR of 15.4.

@@ -12,6 +12,7 @@ import typer
 
 from islands.cli import options, simulation_options
 from islands.cli.console import output
+from islands.cli.laboratory import import_laboratory
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.record_options import with_reading_options
@@ -27,7 +28,7 @@ from islands.cli.runs.plan import (
 )
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.diagnosis.calibration.fit_journal import FitJournal
-from islands.diagnosis.detectability import SelfTest, self_test
+from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import InterimFindings
@@ -52,7 +53,6 @@ from islands.records.reading.options import DEFAULT_READING, ReadingOptions
 from islands.records.split import hold_out
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.layout import wrap
-from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ColumnSpec, innermost, parse_spec
@@ -63,6 +63,9 @@ if TYPE_CHECKING:
 
 #: Name of a step without which a diagnosis is complete.
 SELF_TEST = "self-test"
+
+#: Module that computes it.
+SELF_TEST_MODULE = "lab.diagnosis.self_test"
 
 #: Options of a diagnosis.
 NO_PLAN = PlanOptions()
@@ -91,7 +94,10 @@ def diagnose(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     tested: Annotated[
         bool,
-        typer.Option("--self-test", help="Estimate which effects this record can reveal; takes minutes."),
+        typer.Option(
+            "--self-test",
+            help="Estimate which effects this record can reveal; in a checkout, and takes minutes.",
+        ),
     ] = False,
     planning: PlanOptions = NO_PLAN,
     workers: Annotated[
@@ -115,6 +121,7 @@ def diagnose(
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
     validate_noise_level(noise_level)
     check_folder(out, force, DIAGNOSIS_FILE)
+    self_test = import_laboratory(SELF_TEST_MODULE, "--self-test").self_test if tested else None
     # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
     with progress("diagnose") as show:
         show("reading", 0.0)
@@ -141,8 +148,10 @@ def diagnose(
             formula = _find_formula(diagnosis, seed, steps, show)
             wall = perf_counter() - began
             limits = None
-            if tested and diagnosis.verdict != Verdict.GROSS_ERROR:
-                limits = _run_self_test(diagnosis, simulator, tolerances, seed, workers, steps)
+            if self_test is not None and diagnosis.verdict != Verdict.GROSS_ERROR:
+                limits = _run_self_test(
+                    partial(self_test, diagnosis, simulator, tolerances, seed), workers, steps
+                )
             show(REPORT_FILE, BEFORE_REPORT)
             found = DiagnosisResult.from_diagnosis(diagnosis, formula, limits, wall)
             # Further processes of the same fork server, which has loaded matplotlib. A signal has ended it.
@@ -230,14 +239,7 @@ def _find_formula(diagnosis: Diagnosis, seed: int, steps: Steps, show: Display) 
     )
 
 
-def _run_self_test(
-    diagnosis: Diagnosis,
-    simulator: Simulator,
-    tolerance: Mapping[str, float],
-    seed: int,
-    workers: int | None,
-    steps: Steps,
-) -> SelfTest | None:
+def _run_self_test(test: Callable[..., SelfTest], workers: int | None, steps: Steps) -> SelfTest | None:
     """Run the self-test, as an optional step, with a separate progress bar."""
 
     def update(message: str, fraction: float | None = None, /) -> None:
@@ -246,7 +248,7 @@ def _run_self_test(
     def run() -> SelfTest:
         steps.report(SELF_TEST, 0.0)
         with process_pool(workers, check=partial(steps.check, SELF_TEST)) as parallel:
-            return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
+            return test(parallel, progress=update)
 
     return steps.attempt(SELF_TEST, run)
 

@@ -29,7 +29,7 @@ def inspect(
     rows: options.Rows = None,
     reading: ReadingOptions = DEFAULT_READING,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print a JSON document (schema islands.inspection/1).")
+        bool, typer.Option("--json", help="Print a JSON document (schema islands.records.inspection/1).")
     ] = False,
     out: Annotated[
         Path | None,

@@ -45,7 +45,7 @@ class DiagnosisResult(Diagnosis):
     formula : ResidualFormula or None
         Formula of the unexplained residual; see `explain_residual`.
     tested : SelfTest or None
-        Detection limits and false-alarm rate on the record; see `self_test`.
+        Detection limits and false-alarm rate on the record; see ``lab/diagnosis/self_test.py``.
     wall_s : float or None
         Duration in seconds; None if it was not measured.
     """

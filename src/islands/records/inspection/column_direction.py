@@ -2,7 +2,7 @@
 
 An input leads, and is a command: held between jumps, or free of noise. A response is later, smoother and
 noisier, and other columns predict it. A logistic model weighs these properties; its weights are estimated
-and its probabilities tested on simulated records by ``benchmarks/column_roles.py``.
+and its probabilities tested on simulated records by ``lab/inspection/column_roles.py``.
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from islands.diagnosis.detectability import SelfTest
+from islands.diagnosis.detectability import STRENGTHS, SelfTest
 from islands.diagnosis.discovery.effect_shape import EffectShape
 from islands.diagnosis.discovery.missing_terms import MISSING_TERM
 from islands.diagnosis.findings import ResidualFormula
@@ -16,7 +16,6 @@ from islands.diagnosis.inference.finding import Finding, Value, list_free_forms
 from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.diagnosis.result import CalibratedValue, Candidate, Diagnosis
-from islands.diagnosis.surrogates import STRENGTHS
 from islands.effects.catalogue import find_entry, get_title
 from islands.report.documents.contradictions import list_contradictions
 from islands.report.documents.experiment_json import describe_next_experiment, write_advice

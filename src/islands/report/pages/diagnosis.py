@@ -7,12 +7,11 @@ from math import floor
 import numpy as np
 from markupsafe import Markup
 
-from islands.diagnosis.detectability import NOTHING, SelfTest
+from islands.diagnosis.detectability import NOTHING, STRENGTHS, SelfTest
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.finding import list_free_forms
 from islands.diagnosis.rate_effect import find_rate_effect
 from islands.diagnosis.result import Diagnosis
-from islands.diagnosis.surrogates import STRENGTHS
 from islands.effects.interface.context import Signal
 from islands.parallel import ParallelMap
 from islands.records.loops import has_loops

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from islands.cli.engines import open_pool, start_engine
+from islands.cli.engines import start_engine
 from islands.errors import EngineError
 from islands.evolution.engine import SerialEngine
 from islands.records.writer import write_record
@@ -56,13 +56,6 @@ def test_a_search_goes_on_with_the_same_result_where_ray_does_not_start(failing_
     code, _, printed = command_line(*search, "--out", "ray", "--engine", "ray")
     assert code == 2
     assert "error: Ray does not start on this machine" in printed
-
-
-@pytest.mark.ci
-def test_tasks_run_on_processes_where_ray_does_not_start(failing_ray, capsys):
-    with open_pool(2, None, lambda: None) as parallel_map:
-        assert list(parallel_map(abs, [-1, 2, -3])) == [1, 2, 3]
-    assert "processes in place of Ray" in capsys.readouterr().err
 
 
 def test_an_address_was_given_for_a_reason():

@@ -22,8 +22,8 @@ from islands.report.documents.diagnosis_json import as_json, diagnosis_document
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.detection.injection.measurement import inject
-from islands_measurements.detection.trial import TOLERANCE, Trial, run_trial
+from lab.diagnosis.injection.measurement import inject
+from lab.diagnosis.trial import TOLERANCE, Trial, run_trial
 from support.built_in_simulators import make_piezo
 
 

@@ -9,7 +9,6 @@ import islands
 from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
-from islands.diagnosis.surrogates import make_surrogates
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
@@ -17,6 +16,7 @@ from islands.records.split import MIN_RECORDING_SAMPLES, estimation_part
 from islands.report.documents.diagnosis_json import diagnosis_document
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.specification.factory import make_simulator
+from lab.diagnosis.surrogates import make_surrogates
 from support.joined_oscillator import DT, SIGMA, STATES, oscillator_recordings
 
 #: Effects that are searched for in a fast test.

@@ -8,7 +8,7 @@ import islands
 from islands.effects.interface.context import SimulationContext
 from islands.effects.sweep import SWEPT_DISTURBANCE, SWEPT_INTERFERENCE
 from islands.effects.sweep_search import compute_response, find_sweep, measure_line, respond
-from islands_measurements.detection.trial import Trial, run_trial
+from lab.diagnosis.trial import Trial, run_trial
 
 DT, SAMPLES = 0.005, 2000
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy
-from benchmarks.monitor import run
 
 from islands.diagnosis.monitoring.record_follower import AlarmKind, MonitorSettings
 from islands.errors import RecordError, SettingsError
@@ -19,6 +18,7 @@ from islands.report.documents.monitor_state import (
     record_to_json,
 )
 from islands.report.text.monitor import describe_alarm_text, describe_last_record
+from lab.diagnosis.monitor import run
 from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
 
 

@@ -10,7 +10,7 @@ from islands.records.noise_model import (
     fit_noise,
     take_fractional_difference,
 )
-from islands_measurements.detection.injection.noise import NOISES
+from lab.diagnosis.injection.noise import NOISES
 
 
 @pytest.mark.parametrize("poles", [(), (0.9,), (0.6, 0.3), (0.95, -0.4)])

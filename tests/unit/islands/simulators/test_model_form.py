@@ -17,8 +17,8 @@ from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.model_form import SLOPE
 from islands.simulators.narx import NarxSimulator
-from islands_measurements.detection.cases import CASES
-from islands_measurements.detection.injection.measurement import FaultyRecord, inject
+from lab.diagnosis.cases import CASES
+from lab.diagnosis.injection.measurement import FaultyRecord, inject
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.report.figures.form_values import draw_effect_shape
-from islands_measurements.detection.cases import CASES
-from islands_measurements.detection.injection.measurement import inject
+from lab.diagnosis.cases import CASES
+from lab.diagnosis.injection.measurement import inject
 
 #: Effects that are searched for: the free curves, both faults and a cause of another kind.
 EFFECTS = tuple(

@@ -18,7 +18,7 @@ from islands.report.documents.extension_json import extended_document
 from islands.report.figures.form_values import draw_free_forms
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.detection.trial import Trial, run_trial
+from lab.diagnosis.trial import Trial, run_trial
 from support.simulated_records import recorded, wave
 
 U = wave(2000) / 20.0

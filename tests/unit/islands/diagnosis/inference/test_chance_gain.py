@@ -17,7 +17,7 @@ from islands.records.noise_model import estimate_effective_samples
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.detection.injection.noise import NOISES
+from lab.diagnosis.injection.noise import NOISES
 from support.simulated_records import recorded, wave
 
 EFFECTS = [CATALOGUE[name] for name in ("linear-drift", "jump", "exponential-creep", "even-nonlinearity")]

@@ -9,7 +9,7 @@ from islands.diagnosis.inference.confidence import (
     compute_confidence,
     make_unlisted_cause,
 )
-from islands_measurements.detection.trial import Trial, run_trial
+from lab.diagnosis.trial import Trial, run_trial
 
 EVEN = np.full(BLOCKS, 10.0)
 

@@ -31,8 +31,8 @@ from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.factory import make_simulator
-from islands_measurements.detection.injection.unusual.table import UNUSUAL_CAUSES
-from islands_measurements.detection.unusual_trial import draw_record
+from lab.diagnosis.injection.unusual.table import UNUSUAL_CAUSES
+from lab.diagnosis.unusual_trial import draw_record
 
 #: Input.
 SIGNAL = lfilter([0.3], [1.0, -0.7], np.random.default_rng(0).standard_normal(400))

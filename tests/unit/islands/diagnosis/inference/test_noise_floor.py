@@ -14,7 +14,7 @@ from islands.diagnosis.inference.noise_floor import (
     explainable_variance,
     noise_variance_from_periods,
 )
-from islands_measurements.detection.injection.noise import NOISES
+from lab.diagnosis.injection.noise import NOISES
 
 Array = NDArray[np.float64]
 

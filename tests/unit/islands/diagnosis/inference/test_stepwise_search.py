@@ -28,7 +28,7 @@ from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands_measurements.detection.trial import Trial, run_trial
+from lab.diagnosis.trial import Trial, run_trial
 from support.built_in_simulators import make_piezo
 from support.levels import nightly_but
 from support.simulated_records import DT, made, recorded, wave

@@ -12,7 +12,7 @@ from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.effects.interface.effect import Signal
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
-from islands_measurements.detection.injection.noise import NOISES
+from lab.diagnosis.injection.noise import NOISES
 from support.planned import amplifier, input_record, wave
 
 #: Four periods of 2.5 s, of which the first three are used for estimation.

@@ -16,7 +16,7 @@ from islands.expressions.user_primitive import primitive
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
-from islands_measurements.speed.compiled_c import compile_model
+from lab.speed.compiled_c import compile_model
 from support.exported_programs import FLAGS, needs_compiler, pointer, run_c
 from support.programs import (
     CASES,

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import scipy
-from column_roles import calibration_error
 
 from islands.records.inspection.column_roles import choose_columns, find_role, is_counter, is_numbering
+from lab.inspection.column_roles import calibration_error
 from support.known_records import delay, lag, steps, white
 from support.role_records import KINDS, LOGGERS, make_logs, make_record, make_records
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from dead_times import make_record as draw_record
 
 from islands.records.dataset import Dataset, join
 from islands.records.inspection.dead_time import estimate_dead_times
+from lab.inspection.dead_times import make_record as draw_record
 from support.known_records import delay, lag, measure, slow, steps, white
 
 
@@ -144,7 +144,7 @@ def test_a_lag_that_is_probably_wrong_is_stated_as_an_interval():
 
 @pytest.mark.nightly
 def test_stated_probability_is_the_share_of_right_values_for_slow_inputs():
-    """The records of `benchmarks/dead_times.py`, which has the table for 200."""
+    """The records of `lab/inspection/dead_times.py`, which has the table for 200."""
     stated = []
     for seed in range(40):
         record, lags = draw_record(1000 * (seed + 1))

@@ -1,0 +1,1 @@
+"""Commands of the laboratory, which `islands.cli.app` lists."""

@@ -1,0 +1,1 @@
+"""Search for defects with random and mutated records."""

@@ -1,0 +1,1 @@
+"""Inspection of records: how often roles, dead times and gross errors are right."""

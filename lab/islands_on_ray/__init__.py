@@ -1,0 +1,1 @@
+"""Islands on Ray: costs, benefits, limits, and equal results."""

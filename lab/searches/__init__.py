@@ -1,0 +1,1 @@
+"""Quality of fits and of identifications on simulated and measured records."""

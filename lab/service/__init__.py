@@ -1,0 +1,1 @@
+"""Measurements of the service: load, recovery, costs, capacity, and the page."""

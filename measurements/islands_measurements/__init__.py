@@ -1,1 +1,0 @@
-"""Measurements of the project: `speed`, and `detection` of injected faults by blind trials."""
