@@ -8,7 +8,7 @@ import pytest
 
 import islands
 from islands.persistence.models import model_from_json
-from islands.report.text.statements import BEFORE_REFIT
+from islands.report.text.facts import BEFORE_REFIT
 from islands.validation.metrics import metrics
 from islands_api.client import Client
 from islands_api.web.auth import LOCAL_OWNER

@@ -17,8 +17,8 @@ from islands.report.pages.identification import identification_report
 from islands.report.pages.origin import Origin
 from islands.report.text.coupled_statements import describe_coupled
 from islands.report.text.diagnosis_statements import VERDICTS as VERDICTS_OF_DIAGNOSES
-from islands.report.text.diagnosis_statements import DiagnosisFacts, describe_diagnosis
-from islands.report.text.statements import describe, find_statements
+from islands.report.text.diagnosis_statements import DiagnosisFacts, describe_diagnosis, find_statements
+from islands.report.text.statements import describe
 from islands.report.text.summary import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble

@@ -10,7 +10,7 @@ from islands.errors import SettingsError
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_simulation import record_of_model
 from islands.records.signal_map import match_rate
-from islands.report.text.statements import BEFORE_REFIT
+from islands.report.text.facts import BEFORE_REFIT
 from islands.validation.metrics import Metrics, metrics
 
 if TYPE_CHECKING:

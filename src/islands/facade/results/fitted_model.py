@@ -22,7 +22,7 @@ from islands.models.signal_statement import describe_signals
 from islands.models.sympy_expression import to_sympy
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
-from islands.report.text.statements import BEFORE_REFIT, is_refitted
+from islands.report.text.facts import BEFORE_REFIT, is_refitted
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
 from islands.simulation.step_response import StepResponse, step_response

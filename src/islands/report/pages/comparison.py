@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from islands.errors import SettingsError
 from islands.report.pages.origin import Origin
 from islands.report.pages.rendering import TEMPLATES, inline_figure
+from islands.report.text.facts import BEFORE_REFIT, Document, is_refitted
 from islands.report.text.headlines import write_comparison_headline
-from islands.report.text.statements import BEFORE_REFIT, Document, is_refitted
 
 #: Fewest and most models of a comparison: the colours of more lines are not distinct.
 LEAST_MODELS, MOST_MODELS = 2, 6

@@ -30,9 +30,9 @@ from islands.report.text.diagnosis_statements import (
     name_reference,
     write_value,
 )
+from islands.report.text.facts import Document
 from islands.report.text.headlines import write_diagnosis_headline
 from islands.report.text.layout import write_html
-from islands.report.text.statements import Document
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {

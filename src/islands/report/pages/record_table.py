@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from islands.report.text.statements import Document
+from islands.report.text.facts import Document
 
 
 def list_record(record: Document) -> list[tuple[str, Any]]:

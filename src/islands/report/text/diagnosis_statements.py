@@ -1,27 +1,66 @@
 """Statements about a diagnosis, from ``discrepancy.json`` alone.
 
-As those about a fit (`islands.report.text.statements`), each has a predicate on the document: a run, its
+Each has a predicate on the document: a run, its
 folder, the REST service, the page, the report and a notebook state the same. Statements about the gain are
 those of the held-out data, which may disagree with the samples used for estimation.
 """
 
 import re
-from collections.abc import Callable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import accumulate
 from math import ceil, floor, log10, sqrt
-from typing import Final
+from typing import Final, Generic, TypeVar
 
+from islands.progress import Failure, attempt
 from islands.records.channel_names import TEMPERATURES
-from islands.report.text.statements import (
-    Document,
-    Statement,
-    describe_not_computed,
-    round_ratio,
-    write_amount,
-    write_statements,
-)
+from islands.report.text.facts import Document, round_ratio, write_amount
+from islands.report.text.statements import describe_not_computed
 from islands.rounding import RESOLUTION
+
+F = TypeVar("F")
+F_contra = TypeVar("F_contra", contravariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Statement(Generic[F_contra]):
+    """A statement about a result.
+
+    Attributes
+    ----------
+    name : str
+    holds : callable
+        Predicate: whether the facts of a result make the statement true.
+    write : callable
+        Text of a statement that holds: a sentence, or a part of one.
+    """
+
+    name: str
+    holds: Callable[[F_contra], object]
+    write: Callable[[F_contra], str]
+
+
+def find_statements(statements: Iterable[Statement[F]], facts: F) -> list[Statement[F]]:
+    """Return the statements that hold, and those of which that is unknown because their predicate fails."""
+    return [each for each in statements if attempt(partial(each.holds, facts))]
+
+
+def write_statements(statements: Iterable[Statement[F]], facts: F) -> list[str]:
+    """Return the texts of the statements that hold; the text of one that fails says so."""
+    texts = []
+    for each in statements:
+        text = attempt(partial(_write_statement, each, facts))
+        if isinstance(text, Failure):
+            texts.append(f"(not computed: {each.name}: {text.reason})")
+        elif text is not None:
+            texts.append(text)
+    return texts
+
+
+def _write_statement(statement: Statement[F], facts: F) -> str | None:
+    return statement.write(facts) if statement.holds(facts) else None
+
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
 _WHOLE, _MOST = 0.9, 0.5

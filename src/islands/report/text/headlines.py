@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from islands.report.text.diagnosis_statements import DiagnosisFacts, compare_with_output
-from islands.report.text.statements import (
+from islands.report.text.facts import (
     BEFORE_REFIT,
     Document,
     ResultFacts,

@@ -1,7 +1,7 @@
 """Table of the models of a result, from ``result.json``."""
 
+from islands.report.text.facts import Document, ResultFacts
 from islands.report.text.layout import MARK
-from islands.report.text.statements import Document, ResultFacts
 from islands.validation.assessment import PARTS
 
 #: Columns of every table.

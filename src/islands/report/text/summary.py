@@ -4,10 +4,11 @@ from islands.evolution.search_result import SearchResult
 from islands.models.equations import named_signals
 from islands.models.protocol import DynamicModel
 from islands.report.text.certificates import summarise_certificates
+from islands.report.text.facts import Document
 from islands.report.text.latent_method import describe_latent_search, is_latent
 from islands.report.text.layout import LEGEND, term_table, wrap
 from islands.report.text.model_table import table
-from islands.report.text.statements import Document, describe_choice, describe_findings, describe_units
+from islands.report.text.statements import describe_choice, describe_findings, describe_units
 
 
 def summary(document: Document, model: DynamicModel) -> str:

@@ -15,8 +15,9 @@ from islands.persistence.models import read_validated_model
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.report.figures.registry import FIGURES
+from islands.report.text.facts import BEFORE_REFIT
 from islands.report.text.headlines import write_headline
-from islands.report.text.statements import BEFORE_REFIT, describe, name_statements
+from islands.report.text.statements import describe
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.metrics import metrics
 from support.noisy_records import TERMS, TRUE, make_noisy_record
@@ -192,7 +193,6 @@ def test_a_document_has_the_model_whose_errors_it_states(tmp_path):
     for each in (saved, result.best):
         assert each.describe_error().endswith(BEFORE_REFIT)
     assert BEFORE_REFIT in write_headline(document)
-    assert "refit" in name_statements(document)
     assert "estimated again on all 400 samples" in " ".join(describe(document))
 
 

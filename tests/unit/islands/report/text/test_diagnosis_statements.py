@@ -12,10 +12,10 @@ from islands.report.text.diagnosis_statements import (
     describe_diagnosis,
     describe_headline,
     describe_verdict,
+    find_statements,
     name_reference,
     write_value,
 )
-from islands.report.text.statements import find_statements
 from support.diagnosis_documents import CAUSE, GAIN, make_document
 from support.statements import find_contradictions
 

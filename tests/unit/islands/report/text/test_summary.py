@@ -526,5 +526,5 @@ def test_advice_about_a_saturated_output_names_the_class_of_models_with_a_limit(
     )
     assert free["data"]["output_limits"] == [None, None]
     assert limited["data"]["output_limits"] == [None, limit]
-    assert "sensor-limits" not in statements.name_statements(free)
-    assert "sensor-limits" in statements.name_statements(limited)
+    assert "its limit in the flat samples" not in statements.describe(free)[-1]
+    assert "its limit in the flat samples" in statements.describe(limited)[-1]
