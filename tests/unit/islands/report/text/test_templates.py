@@ -1,0 +1,347 @@
+"""Templates of sentences: each statement is written where it holds, and is complete."""
+
+import re
+from copy import deepcopy
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import islands
+from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import result_document
+from islands.report.text.coupled_statements import CoupledFacts, describe_coupled
+from islands.report.text.facts import ResultFacts
+from islands.report.text.statements import describe
+from islands.report.text.templates import write_named
+from support.coupled_systems import TWO_MASSES, make_coupled_record
+from support.searches import record
+from support.statements import find_contradictions
+
+FOLDER = files("islands.report.text") / "templates"
+
+#: Traces of a value that is missing or was not written for a reader.
+EMPTY = re.compile(
+    r"None|\bnan\b|\binf\b|Undefined|True|False|[{}\[\]]{2}|\(\)| [,.;:](\s|$)|[,;:][,.;]|\.\.|\(not computed"
+)
+
+METRICS = "models.0.metrics.validation"
+RESIDUAL = "models.0.residual_tests"
+LOST = {
+    f"{METRICS}.free_run": dict.fromkeys(("mape", "r2", "rmse", "fit_percent")),
+    f"{RESIDUAL}.verdict": "inadequate",
+}
+STRUCTURE = {
+    f"{RESIDUAL}.verdict": "inadequate",
+    f"{RESIDUAL}.predictable_percent": 5.0,
+    f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.02, "free_run": 0.94},
+}
+AHEAD = STRUCTURE | {f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.5, "free_run": 0.94}}
+WHITE = {f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.02, "free_run": 0.02}}
+TERM = {"parameter": -0.9, "standard_error": 0.001}
+CHECK = {"text": "[u(k-1)] >= 0", "named": "[u_V(k-1)] >= 0", "target": 0.0, "value": -0.5}
+
+
+def worst(name, excess=3.0):
+    """Return residual tests of which one exceeds its limit by most."""
+    names = ("xi_xi", "u_xi", "xi_xiu", "u2_xi", "u2_xi2")
+    tests = [
+        {
+            "name": each,
+            "input": None if each == "xi_xi" else 0,
+            "limit": 1.0,
+            "largest": excess * (each == name),
+        }
+        for each in names
+    ]
+    return AHEAD | {f"{RESIDUAL}.tests": tests}
+
+
+#: Changes of a result of which each statement follows.
+RESULTS = {
+    "choice": [{}, {"recommended.reasons": []}],
+    "units": [
+        {"preprocessing.feedthrough": ["u_V"], "record.reading": ["sorted by time", "2 rows left out"]},
+        {"preprocessing.average": 2, "models.0.named_signals": "y_um and u_V as deviations"},
+    ],
+    "measure_dry_friction": [
+        {
+            "record.units.output": "rad/s",
+            "models.0.terms": [TERM | {"regressor": each, "term": each} for each in terms],
+        }
+        for terms in (["u(k-1)", "sign(y(k-1))"], ["sign(y(k-1))"])
+    ],
+    "measure_criterion": [
+        {
+            "models.0.criterion": {"estimator": each, "interval": 500, "error": "free_run"},
+            "models.0.constraints": [],
+        }
+        for each in islands.ESTIMATORS
+    ],
+    "measure_refit": [
+        {"models.0.refit": {"samples": 400, "discarded": each}} for each in ("", "the free run diverges")
+    ],
+    "measure_error": [{}, LOST, {f"{METRICS}.free_run.r2": None, f"{METRICS}.free_run.mape": None}],
+    "measure_linear_model": [{}, {f"{METRICS}.free_run.rmse": 1e-12}],
+    "measure_recordings": [{"models.0.recordings.validation": {"one": {"rmse": 0.1}, "two": {"rmse": None}}}],
+    "measure_missing_outputs": [{"data.missing_outputs": 7}],
+    "measure_left_out": [{"data.left_out": {"samples": 3, "rmse": 0.1, "rmse_with": 2.0}}],
+    "measure_uncertainty": [
+        {},
+        {"models.0.kind": "latent"},
+        {"models.0.terms.0.inclusion": 0.8999, "models.0.terms.1.inclusion": 0.3},
+    ],
+    "measure_met_constraints": [{"models.0.constraints": [CHECK | {"met": True}, CHECK | {"met": True}]}],
+    "measure_preset": [{"settings.choice": {"reasons": ["A loop is closed.", "Preset hysteresis."]}}],
+    "detail_predictable_share": [{}],
+    "detail_error_level": [{}, {"data.noise": 1.0}, {"data.noise": None} | WHITE],
+    "detail_coverage": [{}],
+    "detail_few_errors": [{"models.0.bands.independent_samples": each} for each in (2.0, 7.2)],
+    "detail_one_step_share": [{}],
+    "verdict": [{}, LOST],
+    "use_simulation": [{}, LOST],
+    "use_adequate_residual": [{}],
+    "use_rounding_residual": [{f"{RESIDUAL}.predictable_share.free_run": 0.5}],
+    "use_sound": [{}],
+    "limit_unsound": [
+        {"models.0.physics.property_1": False, "recommended.reasons": ["a", "no model passes"]}
+    ],
+    "limit_unmet_constraints": [
+        {"models.0.constraints": [CHECK | {"met": False}, CHECK | {"met": False, "value": None}]}
+    ],
+    "limit_no_simulation": [LOST],
+    "limit_unrelated": [WHITE | {f"{METRICS}.free_run.r2": -0.01, "data.noise": None}],
+    "limit_poor_simulation": [{f"{METRICS}.free_run.r2": 0.3, f"{METRICS}.free_run.rmse": 1.0}],
+    "limit_diverging_excursions": [{"models.0.physics.excursions.0.bounded": False}],
+    "limit_missing_checks": [{"models.0.physics.not_computed": "why", f"{RESIDUAL}.not_computed": "why"}],
+    "limit_diverging_holds": [{"models.0.physics.holds.0.bounded": False}],
+    "limit_implausible_extremes": [
+        {
+            "models.0.physics.extremes.0": {"level": -1.2, "plausible": False} | each,
+            "recommended.reasons": ["a"],
+        }
+        for each in (
+            {"bounded": False, "ranges": None},
+            {"bounded": True, "ranges": 1940.0},
+            {"bounded": True, "ranges": None},
+        )
+    ],
+    "limit_no_better_than_linear": [{"linear.metrics.validation.free_run.rmse": 0.001}],
+    "limit_drift": [{"models.0.physics.property_1": False, "models.0.physics.hold_drift_percent": 7.5}],
+    "limit_open_loops": [{"models.0.physics.excursions.0.closure_percent": 6.0}],
+    "limit_predictable_residual": [STRUCTURE],
+    "limit_unexplained_error": [WHITE | {"data.noise": 1e-4}],
+    "limit_low_coverage": [{"models.0.bands.coverage": 0.5}],
+    "limit_wide_band": [{"models.0.bands.width": 100.0}],
+    "limit_error_ratio": [{"models.0.metrics.estimation.free_run.rmse": 1e-4}],
+    "limit_estimation_error": [{"models.0.metrics.estimation.free_run.rmse": each} for each in (1.0, None)],
+    "limit_extrapolation": [{"data.inputs.validation": [[-5.0, 5.0]]}],
+    "next_more_terms": [STRUCTURE],
+    "next_terms_of_another_form": [
+        STRUCTURE | {"data.noise": 1e-4},
+        STRUCTURE | {"data.noise": 1e-4, "models.0.kind": "latent"},
+    ],
+    "next_free_run_estimate": [STRUCTURE, STRUCTURE | {"settings.estimator": "", "data.noise": 1e-4}],
+    "next_other_terms": [
+        *(worst(name) for name in ("xi_xi", "u_xi", "xi_xiu", "u2_xi", "u2_xi2")),
+        AHEAD | {"models.0.kind": "latent", "settings.structure": "wiener"},
+    ],
+    "next_output_noise": [
+        {f"{METRICS}.one_step_ahead.rmse": 0.1, "models.0.metrics.estimation.one_step_ahead.rmse": 0.1}
+        | WHITE
+    ],
+    "next_wider_record": [{"data.inputs.validation": [[-5.0, 5.0]]}],
+    "next_sensor_limits": [{"data.output_limits": [None, 2.0]}],
+    "next_insignificant": [
+        {"models.0.terms.0.standard_error": 9.0},
+        {"models.0.terms.0.standard_error": 9.0, "settings.select": "fitness", "recommended.reasons": []},
+    ],
+    "next_unlikely": [{"models.0.terms.1.inclusion": 0.3}],
+    "next_check": [{}, WHITE | {f"{METRICS}.free_run.r2": -0.01, "data.noise": None}],
+    "other_class": [{}, {"settings.structure": "wiener"}],
+}
+
+#: The same for a result of two outputs; the second one is changed.
+COUPLED = {
+    "equations": [{}, {"models.0.kind": "coupled-latent"}],
+    "error": [{}, {"metrics.validation.free_run": LOST[f"{METRICS}.free_run"], "bands": None}],
+    "verdict": [{}],
+    "detail_predictable_share": [{}],
+    "detail_error_level": [{"data.noise": 0.01}],
+    "detail_coverage": [{}],
+    "detail_few_errors": [{"bands.independent_samples": 7.0}],
+    "limit_no_simulation": [
+        {"metrics.validation.free_run": LOST[f"{METRICS}.free_run"], "residual.verdict": "inadequate"}
+    ],
+    "limit_poor_simulation": [{"metrics.validation.free_run.r2": 0.3, "data.noise": None}],
+    "limit_predictable_residual": [
+        {
+            "residual.verdict": "inadequate",
+            "residual.predictable_percent": 5.0,
+            "residual.predictable_share.free_run": 0.94,
+        }
+    ],
+    "limit_unexplained_error": [{"data.noise": 1e-4, "residual.predictable_share.free_run": 0.02}],
+    "limit_low_coverage": [{"bands.coverage": 0.5}],
+    "limit_wide_band": [{"bands.width": 100.0}],
+    "limit_error_ratio": [{"metrics.estimation.free_run.rmse": 1e-4}],
+    "limit_estimation_error": [{"metrics.estimation.free_run.rmse": 10.0}],
+    "extrapolation": [{"inputs.validation": [[-3.0, 3.0]]}],
+    "use_simulation": [{}],
+    "use_adequate_residual": [{}],
+    "next_other_terms": [
+        {"residual.verdict": "inadequate"},
+        {"residual.verdict": "inadequate", "models.0.kind": "coupled-latent"},
+    ],
+    "next_wider_record": [{"inputs.validation": [[-3.0, 3.0]]}],
+    "next_insignificant": [{"models.0.terms.0.standard_error": 9.0, "models.0.terms.1.standard_error": 9.0}],
+    "next_check": [{}],
+}
+
+
+@cache
+def result():
+    data = record(300)
+    named = Dataset(data.u, data.y, 0.1, ("u_V",), "y_um", ("V",), "um")
+    settings = {"library": "phi-polynomial", "max_terms": 4, "estimator": "least-squares", "seed": 7}
+    document = result_document(islands.fit(named, **settings).search_result)
+    best = document["models"][document["recommended"]["rank"] - 1]
+    document["models"], document["recommended"]["rank"] = [best], 1
+    for test in best["physics"]["excursions"]:
+        test["closure_percent"] = 0.0
+    for part in best["metrics"].values():
+        part["one_step_ahead"] = dict(part["free_run"])
+    return document
+
+
+@cache
+def coupled_result():
+    data = make_coupled_record(TWO_MASSES, samples=400, noise=0.01)
+    fitted = islands.fit_coupled(data, library="polynomial", degree=1, max_terms=4, certificate=0, average=1)
+    return fitted.document()
+
+
+def change(document, changes, outputs=()):
+    """Return a document with other values at dotted paths; those of `outputs` are of the second output."""
+    changed = deepcopy(document)
+    for path, value in changes.items():
+        *folders, name = path.split(".")
+        place = changed["outputs"][1] if path.split(".")[0] in outputs else changed
+        for folder in folders:
+            place = place[int(folder) if folder.isdigit() else folder]
+        place[int(name) if name.isdigit() else name] = deepcopy(value)
+    return changed
+
+
+def write_result(changes):
+    document = change(result(), changes)
+    facts = ResultFacts(document)
+    limits = [text for name, text in write_named("result.txt", "limit", f=facts)]
+    return document, dict(write_named("result.txt", f=facts, limits=limits, details=["RMSE 1 um"]))
+
+
+def write_coupled(changes):
+    document = change(coupled_result(), changes, ("metrics", "residual", "bands", "data"))
+    facts = CoupledFacts(document)
+    return document, dict(write_named("coupled.txt", f=facts, output=facts.outputs[1], limits=[], details=[]))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"), [(name, each) for name, cases in RESULTS.items() for each in cases]
+)
+def test_a_statement_about_a_result_is_written_and_complete(name, changes):
+    document, written = write_result(changes)
+    assert name in written
+    assert not {key: text for key, text in written.items() if EMPTY.search(text)}
+    assert not find_contradictions(" ".join(describe(document)))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"), [(name, each) for name, cases in COUPLED.items() for each in cases]
+)
+def test_a_statement_about_several_outputs_is_written_and_complete(name, changes):
+    document, written = write_coupled(changes)
+    assert name in written
+    assert not {key: text for key, text in written.items() if EMPTY.search(text)}
+    assert not find_contradictions(" ".join(describe_coupled(document)))
+
+
+@pytest.mark.parametrize(("template", "cases"), [("result.txt", RESULTS), ("coupled.txt", COUPLED)])
+def test_every_statement_has_a_case(template, cases):
+    assert set(re.findall(r"block (\w+)", (FOLDER / template).read_text())) == set(cases)
+
+
+def test_a_statement_that_does_not_hold_is_not_written():
+    """The result without changes has no limit: each limit above follows from its change."""
+    written = write_result({})[1]
+    assert not [name for name in written if name.startswith("limit_")]
+    assert [name for name in written if name.startswith("next_")] == ["next_check"]
+
+
+def test_a_template_has_no_limit():
+    """A comparison of numbers is a decision, which belongs to the facts."""
+    for path in FOLDER.iterdir():
+        code = " ".join(re.findall(r"{[{%](.*?)[}%]}", path.read_text(), flags=re.DOTALL))
+        assert not re.search(r"[<>]|[!=]= *[\d.]", re.sub(r'"[^"]*"', "", code)), path.name
+
+
+@pytest.mark.parametrize(
+    ("samples", "ratio"), [(7.2, 1.8), (3.0, 3.0), (2.0, 5.0), (16.0, 1.4), (18.0, None), (None, None)]
+)
+def test_an_error_that_few_independent_samples_measure_is_uncertain(samples, ratio):
+    """The ratios are those of the quantile of 5 % of the chi-square distribution, at most 5."""
+    facts = ResultFacts(change(result(), {"models.0.bands.independent_samples": samples}))
+    assert facts.is_uncertain == (ratio is not None)
+    assert ratio is None or round(facts.stated_ratio, 1) == ratio
+
+
+@pytest.mark.parametrize(
+    ("r2", "rmse", "noise", "simulates"),
+    [
+        (0.9, 1.0, None, True),
+        (0.89, 1.0, None, False),
+        (0.3, 1.2, 1.0, True),
+        (0.3, 1.21, 1.0, False),
+        (None, 1.0, None, True),
+    ],
+)
+def test_a_free_run_follows_the_output_by_r2_or_to_its_noise(r2, rmse, noise, simulates):
+    changes = {
+        f"{METRICS}.free_run": {"r2": r2, "rmse": rmse, "mape": 1.0},
+        "data.noise": noise,
+        f"{RESIDUAL}.verdict": "minor",
+    }
+    assert ResultFacts(change(result(), changes)).simulates == simulates
+
+
+def test_the_ratio_of_two_rounding_errors_is_not_a_failure():
+    changes = {"models.0.metrics.estimation.free_run.rmse": 1e-16, f"{METRICS}.free_run.rmse": 3e-16}
+    facts = ResultFacts(change(result(), changes))
+    assert not any((facts.generalises_poorly, facts.fits_poorly, facts.noise_ratio, facts.linear_ratio))
+
+
+def test_noise_of_the_output_biases_least_squares_alone():
+    noisy = {
+        f"{METRICS}.one_step_ahead.rmse": 0.1,
+        "models.0.metrics.estimation.one_step_ahead.rmse": 0.1,
+    } | WHITE
+    assert ResultFacts(change(result(), noisy)).has_output_noise
+    assert not ResultFacts(
+        change(result(), noisy | {"models.0.criterion.estimator": "free-run"})
+    ).has_output_noise
+    assert not ResultFacts(change(result(), noisy | {"settings.estimator": ""})).has_output_noise
+    assert not ResultFacts(change(result(), WHITE)).has_output_noise
+
+
+def test_a_result_of_an_earlier_version_has_fewer_statements():
+    document = deepcopy(result())
+    for name in ("recommended", "data", "linear"):
+        del document[name]
+    for name in ("bands", "criterion", "refit", "recordings"):
+        del document["models"][0][name]
+    text = " ".join(describe(document))
+    assert not EMPTY.search(text)
+    assert np.all(
+        [word not in text for word in ("Parameters:", "Uncertainty:", "Linear model:", "noise level")]
+    )
