@@ -2,6 +2,11 @@
 
 import re
 
+#: Traces of a value that is missing or was not written for a reader.
+EMPTY = re.compile(
+    r"None|\bnan\b|\binf\b|Undefined|True|False|[{}\[\]]{2}|\(\)| [,.;:](\s|$)|[,;:][,.;]|\.\.|\(not computed"
+)
+
 #: Pairs of patterns that one text does not contain together.
 EXCLUSIVE = (
     (r"As a simulation: good", r"Fails at: (?!none of the checks)"),
@@ -77,7 +82,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
     (_WHOLE, r"(The remaining residual depends|significant structure remains|none of which is confirmed)"),
     (
         r"explains? (most of |nearly all of |a part of )?(the discrepancy|it)[.;]",
-        r"does not fall significantly",
+        r"excluded from fitting, the RMSE does not fall significantly",
     ),
     (r"explains? [^.]*in the samples used for estimation", r"the RMSE falls from"),
     (r"the RMSE falls from", r"by -[\d.]+ %"),

@@ -20,15 +20,13 @@ from islands.report.documents.extended_equations import write_extended_equations
 from islands.report.pages.origin import Origin
 from islands.report.pages.record_table import list_record
 from islands.report.pages.rendering import TEMPLATES, inline_figure
+from islands.report.text.diagnosis_facts import DiagnosisFacts, write_value
 from islands.report.text.diagnosis_statements import (
-    EXTENDED,
-    DiagnosisFacts,
     describe_causes,
     describe_details,
     describe_extended_values,
     describe_verdict,
     name_reference,
-    write_value,
 )
 from islands.report.text.facts import Document
 from islands.report.text.headlines import write_diagnosis_headline
@@ -222,7 +220,7 @@ def diagnosis_report(
         headline=_show_code(describe_verdict(document)),
         lead=write_diagnosis_headline(document),
         causes=list(map(_show_code, describe_causes(document))),
-        details=list(map(_show_code, describe_details(document, (EXTENDED,)))),
+        details=list(map(_show_code, describe_details(document, has_extension=False))),
         extended=_show_extension(document, found),
         error_columns=columns,
         errors=errors,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from islands.report.text.diagnosis_statements import DiagnosisFacts, compare_with_output
+from islands.report.text.diagnosis_facts import DiagnosisFacts
 from islands.report.text.facts import (
     BEFORE_REFIT,
     Document,
@@ -10,6 +10,7 @@ from islands.report.text.facts import (
     is_refitted,
     write_amount,
 )
+from islands.report.text.templates import write
 
 
 def write_headline(document: Document) -> str:
@@ -89,21 +90,7 @@ def write_diagnosis_headline(document: Document) -> str:
     str
         Empty if the errors are unknown.
     """
-    facts = DiagnosisFacts(document)
-    if facts.is_gross:
-        errors = document["record_findings"][0]["errors"]
-        if errors is None:
-            return ""
-        return (
-            f"Error: {_percent(errors['before'])} of the standard deviation of the output with the record as "
-            f"given, {_percent(errors['after'])} with the record corrected."
-        )
-    compared = compare_with_output(facts)
-    if facts.gain is not None:
-        before, after = map(facts.write_error, facts.errors)
-        part = "" if compared is None else f", {compared}"
-        return f"RMSE on {facts.held_out_part}: {before} without the effects, {after} with them{part}."
-    return "" if compared is None else f"Error on {facts.held_out_part}: {compared}."
+    return "".join(write("diagnosis.txt", "headline", f=DiagnosisFacts(document)))
 
 
 def _state_error(error: Document, unit: str) -> str:
@@ -115,7 +102,3 @@ def _state_error(error: Document, unit: str) -> str:
 
 def _add_refit(entry: Document) -> str:
     return f", {BEFORE_REFIT}" if is_refitted(entry) else ""
-
-
-def _percent(fraction: float) -> str:
-    return f"{100 * fraction:.3g} %"

@@ -5,7 +5,7 @@ the group to which it belongs.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache, partial
 from importlib.resources import files
 from math import floor
@@ -50,7 +50,13 @@ def write_named(template: str, group: str = "", **facts: Any) -> Iterator[tuple[
 
 def _render(template: "Template", block: str, facts: dict[str, Any]) -> str:
     text = "".join(template.blocks[block](template.new_context(facts)))
-    return re.sub(" +", " ", text).strip()
+    return re.sub(r" *\n *", "\n", re.sub(" +", " ", text)).strip()
+
+
+def _list_names(names: Iterable[str]) -> str:
+    """Write names as a list: ``A, B and C``."""
+    *others, last = dict.fromkeys(names) or ("",)
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 @cache
@@ -67,7 +73,11 @@ def _load() -> "Environment":
     )
     environment.filters |= {
         "amount": write_amount,
+        "digits": lambda value, count: float(f"{value:.{count}g}"),
+        "effect_label": lambda effect, facts: facts.label_effect(effect),
         "form": format,
+        "listed": _list_names,
+        "label": lambda name, facts: facts.label(name),
         "percent": lambda share: f"{100 * share:.0f} %",
         # A share below a limit never shows the limit.
         "round_down": lambda share: f"{floor(100 * share) / 100:.2f}",
@@ -78,5 +88,5 @@ def _load() -> "Environment":
         "LARGEST_SHARE": LARGEST_SHARE,
         "option": name_option,
     }
-    environment.globals["run"] = environment.get_template("run.txt").module
+    environment.globals["phrase"] = environment.get_template("phrases.txt").module
     return environment

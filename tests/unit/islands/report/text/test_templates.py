@@ -17,14 +17,9 @@ from islands.report.text.statements import describe
 from islands.report.text.templates import write_named
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.searches import record
-from support.statements import find_contradictions
+from support.statements import EMPTY, find_contradictions
 
 FOLDER = files("islands.report.text") / "templates"
-
-#: Traces of a value that is missing or was not written for a reader.
-EMPTY = re.compile(
-    r"None|\bnan\b|\binf\b|Undefined|True|False|[{}\[\]]{2}|\(\)| [,.;:](\s|$)|[,;:][,.;]|\.\.|\(not computed"
-)
 
 METRICS = "models.0.metrics.validation"
 RESIDUAL = "models.0.residual_tests"
