@@ -21,7 +21,7 @@ EXCLUSIVE = (
     ),
     (r"no structure is left in the free-run residual", r"[%] of the free-run residual is predictable"),
     (r"no structure is left in the free-run residual", r"neither inputs nor past outputs predict it"),
-    (r"As a simulation: good", r"RMSE ([3-9]\.\d|\d{2,}[.\d]*) times the (noise level|unpredictable)"),
+    (r"As a simulation: good", r"(RMSE|,) ([3-9]\.\d|\d{2,}[.\d]*) times the (noise level|unpredictable)"),
     (r"the residual is a rounding error", r"[%] of the free-run residual is predictable"),
     (r"the free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs alone"),
     (r"the free run on the validation data diverges", r"times that on the estimation data"),
@@ -29,16 +29,22 @@ EXCLUSIVE = (
     (r"every term has an inclusion probability", r"doubtful terms"),
     (r"every term has an inclusion probability", r"models without .* are about as good"),
     (r"As a simulation: unsuitable", r"models without .* are about as good"),
-    (r"diverges in \d+ of \d+ holds", r"Good for: [^.]*(bounded|divergence) at inputs"),
-    (r"diverges at (minor-loops|amplitude x|rate x)", r"Good for: [^.]*(bounded|divergence) at inputs"),
-    (r"the data contradict the physics checks", r"Good for: .*(bounded|divergence) at inputs.* Fails at:"),
+    (r"diverges in \d+ of \d+ holds", r"Physics: [^.]*(bounded|divergence) at inputs"),
+    (r"diverges at (minor-loops|amplitude x|rate x)", r"Physics: [^.]*(bounded|divergence) at inputs"),
+    (r"the data contradict the physics checks", r"Physics: .*(bounded|divergence) at inputs.* Fails at:"),
     (r"the data contradict the physics checks", r"(no model passes the physics checks|Fails at: none)"),
     (r"least free-run error on the validation data, RMSE", r"; left out: "),
-    (r"no model passes the physics checks", r"Good for: .*(bounded|divergence) at inputs.* Fails at:"),
-    (r"the output (diverges|leaves its recorded range) .*1\.2 of the rec", r"Good for: .*up to 1\.2 times"),
-    (r"the output (diverges|leaves its recorded range) .*\(1 of the rec", r"Good for: .*up to 1(\.2)? times"),
-    (r"the free run on the validation data diverges", r"RMSE \S+( times)? the noise level of"),
-    (r"RMSE at the noise level of", r"simulation from the inputs alone: R2 [-.\d]+\d(?! ?of|[.\d])"),
+    (r"no model passes the physics checks", r"Physics: .*(bounded|divergence) at inputs.* Fails at:"),
+    (
+        r"the output (diverges|leaves its recorded range) .*1\.2 of the rec",
+        r"Physics: .*up to 1\.2 times.* Fails at:",
+    ),
+    (
+        r"the output (diverges|leaves its recorded range) .*\(1 of the rec",
+        r"Physics: .*up to 1(\.2)? times.* Fails at:",
+    ),
+    (r"the free run on the validation data diverges", r"(RMSE|,) \S+( times)? the noise level of"),
+    (r"(RMSE|,) at the noise level of", r"simulation from the inputs alone: R2 [-.\d]+\d(?! ?of|[.\d])"),
     (r"the common free run on the validation data diverges", r"As a simulation: (good|usable)"),
     (r"the common free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs"),
     (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),
@@ -49,7 +55,7 @@ EXCLUSIVE = (
     (r"one step ahead, no structure is left", r"error one step ahead is \S+ times the noise level"),
     (r"No model found", r"(As a simulation: (good|usable)|Recommended: model|no structure is left in the)"),
     (r"No model found", r"Next: [^.]*(--estimator|estimator=|islands simulate)"),
-    (r"drifts by [\d.e+]+ % of its range at constant input", r"Good for: .*Property 1 holds.* Fails at:"),
+    (r"drifts by [\d.e+]+ % of its range at constant input", r"Physics: .*Property 1 holds.* Fails at:"),
 )
 
 #: A claimed cause that others together exceed in probability.
@@ -117,7 +123,7 @@ EXCLUSIVE_OF_DIAGNOSES = (
 #: Statements of one quantity, whose numbers are equal wherever they occur.
 REPEATED = (
     r"(\d+) % of (?:the residual of the free run|the free-run residual) is predictable",
-    r"RMSE (\S+) ?\S*, mean absolute error",
+    r"RMSE (\S+) ?\S* of the free run on",
     r"(?:calibrated, with the effects |the RMSE falls from [^()]*\([^()]*\) to )([\d.e+-]+\d)",
     r"(?:the noise alone, is (?:at most )?|noise floor(?: \(upper bound\))? )([\d.]+(?:e[+-]\d+)?)",
 )

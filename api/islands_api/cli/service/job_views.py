@@ -163,12 +163,12 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
     model = any_model_from_json(client.export(job.id, rank, "json"), f"model {rank}")
     singles: Sequence[DynamicModel] = model.models if isinstance(model, CoupledModel) else (model,)
     terms = [line for single in singles for line in term_table(single)]
-    # Results of earlier versions have no sentences. The second one is the equation in one line.
+    # Results of earlier versions have no sentences. The equation in one line is indented.
     words = str((job.summary or {}).get("words", "")).splitlines()
-    choice, sentences = "".join(words[:1]), words[2:]
-    yield from [*wrap(choice), "", *terms, ""]
-    for sentence in sentences:
-        yield from wrap(sentence.strip())
+    equation = next((at for at, line in enumerate(words) if line.startswith("    ")), 1)
+    yield from (line for sentence in words[:equation] for line in wrap(sentence))
+    yield from ["", *terms, ""]
+    yield from (line for sentence in words[equation + 1 :] for line in wrap(sentence.strip()))
 
 
 @contextmanager

@@ -8,8 +8,8 @@ import { getModelClass } from "./job_state.js";
 import { makeEquation } from "./models.js";
 import { makeTryModel } from "./try_model.js";
 
-/** Beginnings of the sentences of the summary that are shown: physical quantities, a refit, the verdict. */
-const SHOWN = ["Dry friction", "Refit", "As a simulation", "Fails at"];
+/** Beginnings of the sentences of the summary that are shown: the verdict, physics, limits, a refit. */
+const SHOWN = ["As a simulation", "Physics", "Fails at", "Refit"];
 
 /** Return the median of half the width of a band; NaN if there is none. */
 function findHalfWidth({ band }) {

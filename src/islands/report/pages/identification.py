@@ -15,9 +15,9 @@ from islands.report.text.layout import LEGEND
 from islands.report.text.model_table import columns, number, rows
 from islands.report.text.statements import (
     describe_choice,
+    describe_essence,
     describe_findings,
     describe_units,
-    describe_verdict,
 )
 
 #: Caption of the figure below the headline.
@@ -69,7 +69,7 @@ def identification_report(
         SVG by name; the report has those that assess the recommended model and the search.
     """
     facts = ResultFacts(document)
-    verdict = describe_verdict(document)
+    verdict, *essence = describe_essence(document)
     assessing = _FIGURES | (_HYSTERESIS_FIGURES if facts.claims_hysteresis else {})
     rank = facts.recommended["rank"]
     term_columns, terms = list_terms(facts.model["terms"], facts.has_named_parameters)
@@ -89,7 +89,7 @@ def identification_report(
         terms=terms,
         unit=facts.unit,
         errors=_list_errors(facts),
-        sentences=[each for each in describe_findings(document) if each != verdict],
+        sentences=[*essence, *describe_findings(document)],
         figures=_inline(assessing, figures),
         legend=LEGEND,
         columns=columns(document),

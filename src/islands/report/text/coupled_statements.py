@@ -5,7 +5,7 @@ from functools import cached_property
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.records.split import compare_input_ranges
 from islands.report.text.facts import Document, RunFacts, list_insignificant
-from islands.report.text.statements import describe_not_computed, list_findings
+from islands.report.text.statements import describe_not_computed
 from islands.report.text.templates import write
 
 
@@ -81,6 +81,7 @@ def describe_coupled(document: Document) -> list[str]:
     # A divergence of the common free run concerns every output.
     failed = [text for each in facts.outputs for text in write("coupled.txt", "limit", output=each)]
     limits = list(dict.fromkeys([*failed, *write("coupled.txt", "extrapolation", f=facts)]))
+    uses = write("coupled.txt", "use", f=facts, limits=limits)
     listed = ((each.name, write("coupled.txt", "detail", output=each)) for each in facts.outputs)
     details = [f"{name}: {', '.join(parts)}" for name, parts in listed if parts]
     return [
@@ -88,10 +89,8 @@ def describe_coupled(document: Document) -> list[str]:
         "; ".join(document["equation"].splitlines()),
         *(text for each in facts.outputs for text in write("coupled.txt", "error", output=each)),
         *write("coupled.txt", "verdict", f=facts, limits=limits, details=details),
-        *list_findings(
-            write("coupled.txt", "use", f=facts, limits=limits),
-            limits,
-            write("coupled.txt", "next", f=facts),
-        ),
+        f"Good for: {'; '.join(uses) or 'no use that the checks confirm'}.",
+        f"Fails at: {'; '.join(limits) or 'none of the checks'}.",
+        f"Next: {'; '.join(write('coupled.txt', 'next', f=facts))}.",
         *describe_not_computed(document),
     ]

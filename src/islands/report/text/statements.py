@@ -8,7 +8,7 @@ from islands.report.text.templates import write
 
 
 def describe(document: Document) -> list[str]:
-    """Describe the recommended model in sentences: equation, error, uses, failures and next steps.
+    """Describe the recommended model in sentences: its essence, the equation, and further findings.
 
     The equation and the units are indented.
 
@@ -19,10 +19,22 @@ def describe(document: Document) -> list[str]:
     """
     model = ResultFacts(document).model
     return [
+        *describe_essence(document),
         describe_choice(document),
         f"    {model.get('named_equation', model['equation'])}",
         f"    {describe_units(document)}",
         *describe_findings(document),
+    ]
+
+
+def describe_essence(document: Document) -> list[str]:
+    """State verdict, error against noise and a linear model, physics, failed checks and next steps."""
+    facts = ResultFacts(document)
+    limits, names = write("result.txt", "limit", f=facts), ("verdict", "error", "physics")
+    return [
+        *(text for name in names for text in write("result.txt", name, f=facts, limits=limits)),
+        f"Fails at: {'; '.join(limits) or 'none of the checks'}.",
+        f"Next: {'; '.join(write('result.txt', 'next', f=facts))}.",
     ]
 
 
@@ -36,33 +48,16 @@ def describe_units(document: Document) -> str:
     return "".join(write("result.txt", "units", f=ResultFacts(document)))
 
 
-def describe_verdict(document: Document) -> str:
-    """State whether the model is of use as a simulation, with the measured quantities."""
-    facts = ResultFacts(document)
-    limits, details = (write("result.txt", group, f=facts) for group in ("limit", "detail"))
-    return "".join(write("result.txt", "verdict", f=facts, limits=limits, details=details))
-
-
 def describe_findings(document: Document) -> list[str]:
-    """Describe errors, uncertainty, uses, failures and next steps of the recommended model."""
+    """Describe the estimate, further errors, uncertainty and uses of the recommended model."""
     facts = ResultFacts(document)
-    limits = write("result.txt", "limit", f=facts)
+    uses = write("result.txt", "use", f=facts, limits=write("result.txt", "limit", f=facts))
+    details = write("result.txt", "detail", f=facts)
     return [
         *write("result.txt", "measure", f=facts),
-        describe_verdict(document),
-        *list_findings(
-            write("result.txt", "use", f=facts, limits=limits), limits, write("result.txt", "next", f=facts)
-        ),
-        *describe_not_computed(document),
-    ]
-
-
-def list_findings(uses: list[str], limits: list[str], steps: list[str]) -> list[str]:
-    """State uses, failed checks and next steps, each in one sentence."""
-    return [
+        *([f"Measured: {'; '.join(details)}."] if details else []),
         f"Good for: {'; '.join(uses) or 'no use that the checks confirm'}.",
-        f"Fails at: {'; '.join(limits) or 'none of the checks'}.",
-        f"Next: {'; '.join(steps)}.",
+        *describe_not_computed(document),
     ]
 
 

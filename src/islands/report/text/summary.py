@@ -8,7 +8,12 @@ from islands.report.text.facts import Document
 from islands.report.text.latent_method import describe_latent_search, is_latent
 from islands.report.text.layout import LEGEND, term_table, wrap
 from islands.report.text.model_table import table
-from islands.report.text.statements import describe_choice, describe_findings, describe_units
+from islands.report.text.statements import (
+    describe_choice,
+    describe_essence,
+    describe_findings,
+    describe_units,
+)
 
 
 def summary(document: Document, model: DynamicModel) -> str:
@@ -22,6 +27,8 @@ def summary(document: Document, model: DynamicModel) -> str:
         The recommended model.
     """
     lines = [
+        *(line for sentence in describe_essence(document) for line in wrap(sentence)),
+        "",
         *wrap(describe_choice(document)),
         "",
         *term_table(model),

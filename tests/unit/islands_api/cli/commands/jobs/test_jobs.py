@@ -123,7 +123,8 @@ def test_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) 
     assert code == 0, err
     assert out.splitlines()[-1] == "out/: result.json, models/, figures/"
     # The text that islands fit prints, with the columns of the record.
-    assert out.startswith("Recommended: model ")
+    assert out.startswith("As a simulation: ")
+    assert "\nRecommended: model " in out
     assert "\ny_um(k) = " in out
     assert max(map(len, out.splitlines())) <= 80
     assert found.document is not None
