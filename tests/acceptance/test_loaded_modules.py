@@ -7,6 +7,7 @@ import pytest
 
 from islands.persistence.models import write_model
 from islands.systems.published_models import get_published_model
+from support.levels import nightly_but
 
 PROGRAM = """
 import sys
@@ -33,6 +34,9 @@ LIMITS = {
     "--out {folder}": (1495, "numba scipy"),
 }
 
+#: Commands of the level ci: those that neither simulate nor diagnose.
+QUICK = [command for command in LIMITS if not command.startswith(("simulate", "diagnose"))]
+
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
@@ -44,7 +48,7 @@ def record(tmp_path_factory):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("command", LIMITS)
+@pytest.mark.parametrize("command", nightly_but(QUICK, LIMITS))
 def test_a_command_loads_the_modules_that_it_needs(command, record):
     names = {"record": record, "model": record.parent / "model.json", "folder": record.parent / "fit"}
     arguments = [part.format(**names) for part in command.split()]

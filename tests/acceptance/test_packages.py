@@ -97,6 +97,7 @@ def test_an_exception_for_development_does_not_cover_the_image(tmp_path):
     assert "elsewhere.certifi: no such package" in done.stderr
 
 
+@pytest.mark.nightly
 def test_the_bill_of_materials_has_every_package_of_the_image(tmp_path):
     file = tmp_path / "sbom.json"
     done = run("write_sbom.py", "--output", file)
@@ -116,6 +117,7 @@ def test_the_bill_of_materials_has_every_package_of_the_image(tmp_path):
     assert edges.keys() == {"root-component", *(each["purl"] for each in components.values())}
 
 
+@pytest.mark.nightly
 def test_the_image_has_the_packages_that_its_command_installs(tmp_path):
     """The bill of materials follows from metadata; the installer resolves the extra itself."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "image"], check=True)

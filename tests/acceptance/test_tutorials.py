@@ -66,7 +66,7 @@ def test_page_shows_text_code_output_and_figures_but_no_checks(example: Path) ->
     assert "(11_test.py)" in page
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_example_is_executed_once_and_again_after_a_change(
     example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,7 +80,7 @@ def test_example_is_executed_once_and_again_after_a_change(
     assert not first.exists()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_failing_example_is_reported_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tutorials, "CACHE", tmp_path / "cache")
     path = tmp_path / "13_test.py"

@@ -13,6 +13,7 @@ from islands.progress import Stop, StoppedError
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 from islands.systems.catalogue import make_record
+from support.levels import nightly_but
 
 #: Seconds of CPU between two calls. Two seconds are promised; slower machines and the saving need the rest.
 LONGEST = 1.0
@@ -40,7 +41,7 @@ RUNS: dict[str, Callable[[int, Stop], object]] = {
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", nightly_but(("fit", "identify_coupled"), RUNS))
 def test_stop_function_is_called_at_least_every_second(name: str) -> None:
     calls = [process_time()]
 

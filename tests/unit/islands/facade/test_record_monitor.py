@@ -32,7 +32,7 @@ def disturb(**change):
     ("change", "kind", "cause"),
     [
         ({"k": 97.0}, AlarmKind.PARAMETER, "k"),
-        ({"c": 2.2}, AlarmKind.PARAMETER, "c"),
+        pytest.param({"c": 2.2}, AlarmKind.PARAMETER, "c", marks=pytest.mark.nightly),
         ({"play": 0.5}, AlarmKind.EFFECT, "backlash"),
     ],
 )

@@ -18,6 +18,7 @@ from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from lab.speed.compiled_c import compile_model
 from support.exported_programs import FLAGS, needs_compiler, pointer, run_c
+from support.levels import nightly_but
 from support.programs import (
     CASES,
     HOSTILE_NAMES,
@@ -43,7 +44,7 @@ def of_the_library(exported):
 
 @pytest.mark.ci
 @needs_compiler
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", nightly_but(("published 12", "many parts", "several inputs"), CASES))
 def test_the_compiled_program_simulates_like_the_kernel(name, folder):
     exported, data = CASES[name], record_of(name)
     ours, theirs, lag = free_run(exported, data), run_c(exported, data, folder), exported.maximum_lag

@@ -11,6 +11,7 @@ from islands.expressions.user_primitive import primitive
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from support.exported_programs import needs_octave, octave, run_matlab
+from support.levels import nightly_but
 from support.programs import CASES, at_the_edges, model, record, record_of
 from support.strategies import models
 
@@ -23,7 +24,7 @@ def cases(tmp_path_factory):
 
 @pytest.mark.ci
 @needs_octave
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", nightly_but(("published 12", "many parts", "several inputs"), CASES))
 def test_octave_simulates_like_the_kernel(name, cases):
     exported, data = CASES[name], record_of(name)
     ours, lag = free_run(exported, data), exported.maximum_lag
