@@ -100,24 +100,6 @@ def test_writes_under_a_lost_lease_change_nothing(store, loss):
         assert contents(store) == before
 
 
-@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
-def test_expired_lease_is_valid_until_the_job_is_claimed(store, write):
-    """No other coordinator has the job: stopping would only lose time."""
-    submitted(store)
-    lease = claimed(store, EXPIRED)
-    before = contents(store)
-    write(store.leases, lease)
-    assert contents(store) != before
-
-
-@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
-def test_lease_of_a_job_with_a_cancel_request_may_write(store, write):
-    job = submitted(store)
-    lease = claimed(store)
-    store.jobs.cancel(ALICE, job.id)
-    write(store.leases, lease)
-
-
 def test_lease_belongs_to_one_job(store):
     submitted(store), submitted(store)
     leases = claimed(store), claimed(store)

@@ -1,14 +1,11 @@
 """Contract of the store with coordinators: order of claims, duration of leases, number of attempts."""
 
-import random
 from collections import Counter
 from contextlib import ExitStack
 from uuid import uuid4
 
 import pytest
 
-from islands_service.domain.job import TERMINAL, JobState, ProgressReport
-from islands_service.store.job_rows.job_claims import ATTEMPTS
 from support.stores import (
     ALICE,
     BOB,
@@ -17,11 +14,8 @@ from support.stores import (
     LONG,
     MANY,
     at_once,
-    brought_on,
     child,
     claimed,
-    contents,
-    job_in,
     kinds,
     open_stores,
     submitted,
@@ -40,33 +34,6 @@ with Store(url) as store:
         claims += 1
         print(lease.job.id, lease.epoch)
 """
-
-
-def in_turn(jobs):
-    return sorted(jobs, key=lambda job: (-job.priority, job.created, job.id))
-
-
-def test_claim_without_a_queued_job_changes_nothing(store):
-    for state in (JobState.RUNNING, *TERMINAL):
-        job_in(store, state)
-    before = contents(store)
-    assert store.leases.claim("another", LONG) is None
-    assert contents(store) == before
-
-
-def test_claims_of_an_owner_follow_priority_and_age(store):
-    priorities = random.Random(4).choices([-100, -1, 0, 0, 3, 100], k=12)
-    jobs = [submitted(store, priority=each) for each in priorities]
-    for job in in_turn(jobs):
-        assert claimed(store).job.id == job.id
-    assert store.leases.claim("another", LONG) is None
-
-
-def test_priority_of_an_owner_does_not_delay_others(store):
-    urgent = in_turn(submitted(store, ALICE, priority=100) for _ in range(3))
-    normal = in_turn(submitted(store, BOB, priority=-100) for _ in range(3))
-    order = [claimed(store).job.id for _ in range(6)]
-    assert order == [job.id for pair in zip(urgent, normal, strict=True) for job in pair]
 
 
 @pytest.mark.parametrize("own", [None, 2])
@@ -158,51 +125,6 @@ def test_job_is_not_claimed_before_its_lease_has_expired(store):
     assert store.leases.claim("second", LONG) is None
 
 
-def test_job_is_taken_over_after_its_lease_has_expired(store):
-    job = submitted(store)
-    first = claimed(store, EXPIRED, "first")
-    second = claimed(store, LONG, "second")
-    assert (first.job.id, second.job.id) == (job.id, job.id)
-    assert (first.epoch, second.epoch) == (1, 2)
-    assert (first.job.attempt, second.job.attempt) == (1, 2)
-    assert second.job.started == first.job.started
-    assert kinds(store, job.id) == ["queued", "running", "running"]
-    assert store.leases.claim("third", LONG) is None
-
-
-def test_job_leased_under_the_same_name_is_taken_over_at_once(store):
-    """A coordinator with the same name implies that the previous process has ended."""
-    job = submitted(store)
-    claimed(store, LONG, "one")
-    assert store.leases.claim("two", LONG) is None
-    again = claimed(store, LONG, "one")
-    assert (again.job.id, again.epoch) == (job.id, 2)
-
-
-def test_renewal_is_not_an_event(store):
-    job = submitted(store)
-    lease = claimed(store)
-    before = store.jobs.get(ALICE, job.id), store.jobs.events(job.id)
-    store.leases.renew(lease, 2 * LONG)
-    assert (store.jobs.get(ALICE, job.id), store.jobs.events(job.id)) == before
-
-
-def test_renewal_returns_a_cancel_request(store):
-    job = submitted(store)
-    lease = claimed(store)
-    assert not store.leases.renew(lease, LONG).cancel_requested
-    store.jobs.cancel(ALICE, job.id)
-    assert store.leases.renew(lease, LONG).cancel_requested
-    assert store.leases.renew(lease, LONG).cancel_requested
-
-
-def test_claim_after_a_takeover_contains_the_cancel_request(store):
-    job = submitted(store)
-    claimed(store, EXPIRED, "first")
-    store.jobs.cancel(ALICE, job.id)
-    assert claimed(store, LONG, "second").job.cancel_requested
-
-
 def test_claim_and_renewal_contain_the_request_to_stop_the_search(store):
     job = submitted(store)
     lease = claimed(store, EXPIRED, "first")
@@ -212,68 +134,6 @@ def test_claim_and_renewal_contain_the_request_to_stop_the_search(store):
     assert store.leases.read_requests(lease) == (False, True)
     assert store.leases.renew(lease, EXPIRED).stop_requested
     assert claimed(store, LONG, "second").job.stop_requested
-
-
-def test_job_without_progress_fails_after_all_attempts(store):
-    job = submitted(store)
-    for attempt in range(1, ATTEMPTS + 1):
-        assert claimed(store, EXPIRED, f"{attempt}").job.attempt == attempt
-    assert store.leases.claim("another", LONG) is None
-    job = store.jobs.get(ALICE, job.id)
-    assert (job.state, job.attempt) == (JobState.FAILED, ATTEMPTS)
-    assert job.problem["type"] == "no-progress"
-    assert job.finished >= job.started
-    assert kinds(store, job.id) == ["queued", *["running"] * ATTEMPTS, "failed"]
-    assert store.jobs.events(job.id)[-1].data == job.problem
-
-
-def test_job_without_attempts_left_is_cancelled_if_requested(store):
-    job = submitted(store)
-    for _ in range(ATTEMPTS):
-        claimed(store, EXPIRED)
-    store.jobs.cancel(ALICE, job.id)
-    assert store.leases.claim("another", LONG) is None
-    job = store.jobs.get(ALICE, job.id)
-    assert (job.state, job.problem) == (JobState.CANCELLED, None)
-    assert kinds(store, job.id)[-2:] == ["cancelling", "cancelled"]
-
-
-def test_checkpoint_resets_the_count_of_attempts(store):
-    job = submitted(store)
-    for generation in range(3 * ATTEMPTS):
-        store.leases.report(claimed(store, EXPIRED), brought_on(generation))
-    for _ in range(ATTEMPTS):
-        claimed(store, EXPIRED)
-    assert store.leases.claim("another", LONG) is None
-    assert store.jobs.get(ALICE, job.id).attempt == 4 * ATTEMPTS
-
-
-def test_report_without_a_checkpoint_is_not_progress(store):
-    submitted(store)
-    for _ in range(ATTEMPTS):
-        store.leases.report(claimed(store, EXPIRED), ProgressReport({"phase": "starting"}))
-    assert store.leases.claim("another", LONG) is None
-
-
-def test_release_after_a_failure_counts_as_an_attempt(store):
-    job = submitted(store)
-    for _ in range(ATTEMPTS):
-        store.leases.release(claimed(store), attempted=True)
-    assert store.leases.claim("another", LONG) is None
-    job = store.jobs.get(ALICE, job.id)
-    assert (job.state, job.attempt) == (JobState.FAILED, ATTEMPTS)
-
-
-def test_released_job_with_a_cancel_request_is_cancelled(store):
-    job = submitted(store)
-    lease = claimed(store)
-    store.jobs.cancel(ALICE, job.id)
-    store.leases.release(lease)
-    job = store.jobs.get(ALICE, job.id)
-    assert job.state == JobState.CANCELLED
-    assert job.finished is not None
-    assert store.leases.claim("another", LONG) is None
-    assert kinds(store, job.id) == ["queued", "running", "cancelling", "cancelled"]
 
 
 def test_a_job_lets_others_pass_until_no_owner_has_a_smaller_share(store):

@@ -62,18 +62,6 @@ def test_operation_is_allowed_only_in_its_states(store, ask, state):
         kinds(store, job.id)
 
 
-def test_running_job_is_cancelled_when_it_is_released(store):
-    job = submitted(store)
-    lease = claimed(store)
-    asked_for = store.jobs.cancel(ALICE, job.id)
-    assert (asked_for.state, asked_for.cancel_requested, asked_for.finished) == (RUNNING, True, None)
-    before = contents(store)
-    assert store.jobs.cancel(ALICE, job.id) == asked_for
-    assert contents(store) == before
-    store.leases.release(lease)
-    assert store.jobs.get(ALICE, job.id).state == CANCELLED
-
-
 def test_late_cancel_request_does_not_discard_a_result(store):
     job = submitted(store)
     lease = claimed(store)
@@ -81,36 +69,6 @@ def test_late_cancel_request_does_not_discard_a_result(store):
     store.leases.finish(lease, FOUND)
     assert store.jobs.get(ALICE, job.id).state == SUCCEEDED
     assert kinds(store, job.id) == ["queued", "running", "cancelling", "succeeded"]
-
-
-def test_resumed_job_continues_from_its_checkpoint(store):
-    job = submitted(store)
-    lease = claimed(store)
-    store.leases.report(lease, brought_on(6))
-    store.leases.finish(lease, FAILED)
-    resumed = store.jobs.resume(ALICE, job.id)
-    assert (resumed.state, resumed.problem, resumed.finished) == (QUEUED, None, None)
-    assert (resumed.cancel_requested, resumed.checkpoint) == (False, brought_on(6).checkpoint)
-    assert resumed.progress == {"generation": 6}
-    again = claimed(store)
-    assert (again.job.id, again.job.cancel_requested, again.job.attempt) == (job.id, False, 2)
-    assert not store.leases.renew(again, 1.0).cancel_requested
-    assert kinds(store, job.id) == ["queued", "running", "progress", "failed", "queued", "running"]
-
-
-@pytest.mark.parametrize("running", [False, True])
-def test_resume_clears_the_cancel_request(store, running):
-    job = submitted(store)
-    lease = claimed(store) if running else None
-    store.jobs.cancel(ALICE, job.id)
-    if lease is not None:
-        store.leases.release(lease)
-    assert store.jobs.resume(ALICE, job.id).cancel_requested is False
-    again = claimed(store)
-    assert again.job.cancel_requested is False
-    assert not store.leases.renew(again, 1.0).cancel_requested
-    store.leases.release(again)
-    assert store.jobs.get(ALICE, job.id).state == QUEUED
 
 
 def test_deleted_job_leaves_no_rows_and_other_jobs_are_unchanged(store):
@@ -155,18 +113,6 @@ def test_owner_cannot_see_data_of_another_owner(store):
         with pytest.raises(DatasetNotFoundError, match=dataset.id):
             getattr(store.datasets, ask)(ALICE, dataset.id)
     assert store.datasets.get(BOB, dataset.id) == dataset
-
-
-def test_pages_are_newest_first_and_hold_every_job_once(store):
-    jobs = [submitted(store, name=f"{each}") for each in range(11)]
-    submitted(store, BOB)
-    expected = sorted(jobs, key=lambda job: (job.created, job.id), reverse=True)
-    for limit in (1, 2, 3, 5, 10, 11, 12):
-        found = pages(store, ALICE, limit)
-        assert [each for page in found for each in page] == [job.id for job in expected]
-        assert [len(page) for page in found[:-1]] == [limit] * (len(found) - 1)
-        assert 0 < len(found[-1]) <= limit
-    assert store.jobs.page(ALICE, limit=3).jobs == tuple(expected[:3])
 
 
 def test_list_read_during_changes_contains_every_other_job_once(store):

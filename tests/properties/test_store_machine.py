@@ -336,7 +336,7 @@ def new_sqlite(prepared_sqlite, tmp_path):
 
 @pytest.mark.ci
 def test_on_sqlite_the_store_is_a_dictionary(new_sqlite, monkeypatch):
-    play(new_sqlite, monkeypatch, examples=5, steps=30)
+    play(new_sqlite, monkeypatch, examples=10, steps=30)
 
 
 @pytest.mark.nightly
@@ -344,6 +344,11 @@ def test_on_sqlite_the_store_is_a_dictionary_for_long(new_sqlite, monkeypatch):
     play(new_sqlite, monkeypatch, examples=40, steps=60)
 
 
-@pytest.mark.nightly
+@pytest.mark.ci
 def test_on_postgresql_the_store_is_a_dictionary(prepared_postgres, monkeypatch):
+    play(lambda: emptied(prepared_postgres), monkeypatch, examples=5, steps=30)
+
+
+@pytest.mark.nightly
+def test_on_postgresql_the_store_is_a_dictionary_for_long(prepared_postgres, monkeypatch):
     play(lambda: emptied(prepared_postgres), monkeypatch, examples=20, steps=40)
