@@ -16,7 +16,7 @@ from islands.estimation.estimator_table import (
 from islands.estimation.estimators import estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import Refinement, begin_refinement, refine
-from islands.estimation.structure_selection.deviations import Offsets, estimate_deviations, subtract_offsets
+from islands.estimation.structure_selection.deviations import Offsets, add_offsets, subtract_offsets
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
@@ -266,9 +266,8 @@ def _estimate_models(
     Models whose free run diverges on the validation data are returned only if the fitness selects.
     """
     found = (
-        estimate_deviations(
-            each.regressors,
-            offsets,
+        estimate(
+            add_offsets(each.regressors, offsets),
             split.estimation,
             settings.constraints,
             settings.maximum_lag,

@@ -8,6 +8,7 @@ from typing import TypedDict
 
 from islands.available_cpus import count_cpus
 from islands.errors import SettingsError, check_integers, lookup
+from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import ESTIMATORS, REFITS, make_criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
@@ -22,7 +23,7 @@ from islands.estimation.structure_selection.certificate import (
 )
 from islands.estimation.structure_selection.deviations import (
     Offsets,
-    estimate_deviations,
+    add_offsets,
     find_offsets,
     subtract_offsets,
 )
@@ -319,9 +320,8 @@ def _estimate(
             )
             if not is_needed and steps.skip("estimation of further structures"):
                 continue
-            estimated = estimate_deviations(
-                structures[place], offsets, split.estimation, constraints, warm_up
-            )
+            structure = add_offsets(structures[place], offsets)
+            estimated = estimate(structure, split.estimation, constraints, warm_up)
             if not isinstance(estimated, EvaluationOutcome):
                 estimated = estimate_with(
                     settings.selecting_estimator, estimated, split.estimation, constraints, warm_up, interval

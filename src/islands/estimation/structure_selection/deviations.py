@@ -14,14 +14,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.parameter_constraints import constraint
 from islands.expressions.primitives import SUB
 from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
 from islands.records.dataset import Dataset
-from islands.simulation.outcome import EvaluationOutcome
 
 #: Functions whose expressions keep their form in deviations: polynomials and differences of lags.
 SHIFTABLE = frozenset({"mul", "add", "sub", "phi1", "phi2", "square", "cube"})
@@ -90,36 +88,3 @@ def _subtract(expression: Expression, offsets: Offsets) -> Expression:
         case Apply(primitive, arguments):
             return Apply(primitive, tuple(_subtract(argument, offsets) for argument in arguments))
     return expression
-
-
-def estimate_deviations(
-    structure: Sequence[Regressor],
-    offsets: Offsets,
-    record: Dataset,
-    constraints: str = "none",
-    warm_up: int | None = None,
-    standard_errors: bool = True,
-) -> FittedStructure | EvaluationOutcome:
-    """Estimate a structure in deviations on the record in its own units.
-
-    The constant that the offsets require is left out if it does not reduce the Bayesian information
-    criterion.
-
-    Parameters
-    ----------
-    structure : sequence of Regressor
-        Regressors in deviations, without back-shifts.
-    offsets : tuple of float
-    record, constraints, warm_up, standard_errors
-        As in `estimate`.
-    """
-    restored = add_offsets(structure, offsets)
-    found = estimate(restored, record, constraints, warm_up, standard_errors)
-    smaller = [item for item in restored if item.expression != _ONE]
-    if len(restored) == len(structure) or not smaller or isinstance(found, EvaluationOutcome):
-        return found
-    without = estimate(smaller, record, constraints, warm_up, standard_errors)
-    if isinstance(without, EvaluationOutcome):
-        return found
-    largest_ratio = record.samples ** (1.0 / record.samples)
-    return without if without.residual_variance <= largest_ratio * found.residual_variance else found

@@ -7,7 +7,6 @@ import islands
 from islands.estimation.estimate import estimate
 from islands.estimation.structure_selection.deviations import (
     add_offsets,
-    estimate_deviations,
     find_offsets,
     subtract_offsets,
 )
@@ -95,15 +94,6 @@ def test_constraint_holds_exactly_at_every_offset(output, source):
     assert error(found, 4) < 1e-8
 
 
-def test_constant_is_left_out_if_the_law_has_none():
-    y = simulate(lambda y, u, k: 0.7 * y[k - 1] - 0.2 * y[k - 2] + 0.5 * u[k - 1])
-    record, terms = Dataset(U + 1e5, y + 1e5, 0.1), structure("y(k-1)", "y(k-2)", "u(k-1)")
-    found = estimate_deviations(terms, (1e5, 1e5), record)
-    assert found.model.theta == pytest.approx((0.7, -0.2, 0.5), abs=1e-7)
-    shifted = estimate_deviations(terms, (1e5, 2e5), Dataset(U + 2e5, y + 1e5, 0.1))
-    assert shifted.model.theta[-1] == pytest.approx(-5e4, abs=1.0)
-
-
 def test_structure_has_the_same_residual_in_deviations_and_in_units():
     terms = structure("y(k-1)", "u(k-1)^2*y(k-1)", "(u(k-1) - u(k-2))*y(k-2)", "sign(u(k-1) - u(k-2))*u(k-1)")
     record = Dataset(U + 5e4, LAWS["cubic"][0] - 3e3 + 0.1 * NOISE, 0.1)
@@ -116,7 +106,7 @@ def test_structure_has_the_same_residual_in_deviations_and_in_units():
         "sign(u(k-1) - u(k-2))*(u(k-1) - 50000)",
     }
     centred = estimate((*terms, *structure("1")), subtract_offsets(record, offsets))
-    found = estimate_deviations(terms, offsets, record)
+    found = estimate(add_offsets(terms, offsets), record)
     assert found.residual_variance == pytest.approx(centred.residual_variance, rel=1e-6)
 
 
