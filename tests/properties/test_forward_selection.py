@@ -11,7 +11,12 @@ import pytest
 
 import islands
 from islands.estimation.estimate import FittedStructure, estimate
-from islands.estimation.forward_selection import forward_selection
+from islands.estimation.forward_selection import (
+    MAX_POOL,
+    forward_selection,
+    make_selection_problem,
+    select_pool,
+)
 from islands.expressions.printing import plain
 from islands.models.candidate_library import candidates
 from islands.records.dataset import Dataset, join
@@ -271,3 +276,18 @@ def test_estimation_failure_is_an_outcome_with_a_reason(samples, constraints, ve
 def test_structure_without_y_is_infeasible_under_the_constraint():
     terms = islands.make_model([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
     assert estimate(terms, measured(), "hysteresis").verdict is Status.INFEASIBLE
+
+
+def test_the_candidates_of_a_search_do_not_follow_rounding():
+    """Forward selection explains 80 rows with 77 terms; the order of the last ones is that of rounding."""
+    u, rng = white(80, 0, 3), np.random.default_rng(1)
+    y = np.convolve(u.sum(axis=1) + u[:, 0] * u[:, 1], [0.5, 0.3, 0.2])[:80] + 0.01 * rng.normal(size=80)
+    terms = library("polynomial", 3, inputs=3)
+
+    def select(record):
+        return select_pool(terms, make_selection_problem(terms, record), 10)
+
+    pool = select(Dataset(u, y, 0.1))
+    assert len(pool) == MAX_POOL < len(terms)
+    assert select(Dataset(np.round(u, 7), np.round(y, 7), 0.1)) == pool
+    assert select(Dataset(1e9 * u, 1e-6 * y, 0.1)) == pool

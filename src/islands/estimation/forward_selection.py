@@ -19,6 +19,7 @@ from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import gram_matrix
 from islands.records.dataset import Dataset
+from islands.rounding import ROUNDING
 from islands.simulation.outcome import EvaluationOutcome
 
 Structure = tuple[Regressor, ...]
@@ -129,9 +130,30 @@ def select_pool(
 ) -> Sequence[Regressor]:
     """Return the regressors for a search by exchange.
 
-    They are the library or, if it has more than `MAX_POOL`, those that forward selection finds first.
+    They are the library or, if it has more than `MAX_POOL`, the largest structure of forward selection and
+    the candidates that would reduce its error most. Further steps of the selection would follow the rounding
+    of the record: a few hundred rows are explained by fewer terms than the pool has.
     """
     if len(library) <= MAX_POOL:
         return library
-    structures = select_forward(problem, max(max_terms, MAX_POOL))
-    return structures[-1] if structures else library
+    chosen = froe(problem.gram, max_terms=max_terms).order
+    pool: dict[Regressor, None] = dict.fromkeys(problem.compose(chosen))
+    for at in _rank_by_gain(problem.gram, chosen):
+        added = dict.fromkeys(problem.free[at].regressors)
+        if len(pool | added) > MAX_POOL:
+            break
+        pool |= added
+    return tuple(canonical_order(pool))
+
+
+def _rank_by_gain(gram: NDArray[np.float64], chosen: Sequence[int]) -> NDArray[np.int64]:
+    """Return the candidates in the order of the errors that they reduce in addition to some of them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        norms = np.sqrt(np.diag(gram))
+        scaled = gram / norms[:, None] / norms
+    parts = scaled[list(chosen)]
+    explained = np.linalg.solve(parts[:, list(chosen)], parts)
+    left = 1.0 - np.einsum("ij,ij->j", parts, explained)[:-1]
+    gain = (scaled[:-1, -1] - np.einsum("ij,i->j", parts[:, :-1], explained[:, -1])) ** 2
+    gain = np.divide(gain, left, out=np.zeros_like(gain), where=left > ROUNDING)
+    return np.argsort(-np.nan_to_num(gain), kind="stable")
