@@ -322,8 +322,7 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
         name = f"1/free-run-{number}"
         made |= _save_all({name: partial(draw_free_run, each, y, band=band)})
         figures[each.output_name] = made[f"{name}.svg"]
-    words = str((job.summary or {}).get("words", "")).splitlines()
-    sentences = [*words[:1], *words[2:]]  # the second one is the equations
+    sentences = str((job.summary or {}).get("words", "")).splitlines()
     terms = stored.document["terms"]
     made[REPORT] = coupled_report(_origin(job), model, document, terms, sentences, figures)
     return made

@@ -165,7 +165,7 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
     terms = [line for single in singles for line in term_table(single)]
     # Results of earlier versions have no sentences. The equation in one line is indented.
     words = str((job.summary or {}).get("words", "")).splitlines()
-    equation = next((at for at, line in enumerate(words) if line.startswith("    ")), 1)
+    equation = next((at for at, line in enumerate(words) if line.startswith(" ")), len(words))
     yield from (line for sentence in words[:equation] for line in wrap(sentence))
     yield from ["", *terms, ""]
     yield from (line for sentence in words[equation + 1 :] for line in wrap(sentence.strip()))

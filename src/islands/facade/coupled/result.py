@@ -409,7 +409,7 @@ class CoupledResult(FittedCoupledModel):
         }
 
     def sentences(self) -> list[str]:
-        """Return the result in sentences; the second one is the equations."""
+        """Return the result in sentences; the equations are indented."""
         return describe_coupled(self.document())
 
     def _names(self) -> dict[str, list[str]]:
@@ -423,7 +423,12 @@ class CoupledResult(FittedCoupledModel):
         return f"{self.model.size} terms, parameters {refined}"
 
     def __str__(self) -> str:
+        sentences, errors = self.sentences(), len(self.model.models)
+        # The errors are in the table.
+        head, rest = [sentences[0], *sentences[errors + 1 : errors + 3]], sentences[errors + 5 :]
         lines = [
+            *(line for sentence in head for line in wrap(sentence)),
+            "",
             f"{len(self.model.models)} outputs, {self._describe_parameters()}:",
             "",
             *(line for single in self.model.models for line in [*term_table(single), ""]),
@@ -439,9 +444,7 @@ class CoupledResult(FittedCoupledModel):
                 f"{name:20} {f'{free.rmse:.4g}{unit}':>18} {free.mape:10.3g} {free.r2:8.4f} "
                 f"{f'{one.rmse:.4g}{unit}':>18}"
             )
-        # The errors are in the table.
-        verdict = self.sentences()[2 + len(self.model.models) :]
-        return "\n".join([*lines, "", *(line for sentence in verdict for line in wrap(sentence))])
+        return "\n".join([*lines, "", *(line for sentence in rest for line in wrap(sentence))])
 
 
 def _average(metrics: Sequence[Metrics]) -> dict[str, float]:

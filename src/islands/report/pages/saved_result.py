@@ -52,14 +52,13 @@ def _write(saved: SavedDocument, model: AnyModel) -> bytes:
     document = saved.content
     if not isinstance(model, CoupledModel):
         return identification_report(origin, document, model.equation().mathml, drawn)
-    sentences = describe_coupled(document)
     runs = {each["name"]: f"free-run-{Path(each['folder']).name}.svg" for each in document["outputs"]}
     return coupled_report(
         origin,
         model,
         document,
         document["models"][0]["terms"],
-        [*sentences[:1], *sentences[2:]],  # the second one is the equations
+        describe_coupled(document),
         {output: drawn[name] for output, name in runs.items() if name in drawn},
     )
 

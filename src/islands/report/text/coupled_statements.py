@@ -76,7 +76,7 @@ class CoupledFacts:
 
 
 def describe_coupled(document: Document) -> list[str]:
-    """Describe a result of several outputs in sentences; the second one is the equations."""
+    """Describe a result of several outputs in sentences; the equations are indented."""
     facts = CoupledFacts(document)
     # A divergence of the common free run concerns every output.
     failed = [text for each in facts.outputs for text in write("coupled.txt", "limit", output=each)]
@@ -85,12 +85,12 @@ def describe_coupled(document: Document) -> list[str]:
     listed = ((each.name, write("coupled.txt", "detail", output=each)) for each in facts.outputs)
     details = [f"{name}: {', '.join(parts)}" for name, parts in listed if parts]
     return [
-        *write("coupled.txt", "equations", f=facts),
-        "; ".join(document["equation"].splitlines()),
-        *(text for each in facts.outputs for text in write("coupled.txt", "error", output=each)),
         *write("coupled.txt", "verdict", f=facts, limits=limits, details=details),
-        f"Good for: {'; '.join(uses) or 'no use that the checks confirm'}.",
+        *(text for each in facts.outputs for text in write("coupled.txt", "error", output=each)),
         f"Fails at: {'; '.join(limits) or 'none of the checks'}.",
         f"Next: {'; '.join(write('coupled.txt', 'next', f=facts))}.",
+        *write("coupled.txt", "equations", f=facts),
+        f"    {'; '.join(document['equation'].splitlines())}",
+        f"Good for: {'; '.join(uses) or 'no use that the checks confirm'}.",
         *describe_not_computed(document),
     ]

@@ -28,13 +28,13 @@ def said(document):
 def test_the_summary_and_the_sentences_have_the_verdict_of_the_common_free_run(found, document):
     sentences = describe_coupled(document)
     assert found.sentences() == sentences
-    assert "y1(k) = " in sentences[1]
+    assert sentences[6].startswith("    y1(k) = ")
     verdict = said(document)["As a simulation"]
     assert verdict.startswith("As a simulation: good (y1: ")
     assert "; y2: " in verdict
     assert said(document)["Fails at"] == "Fails at: none of the checks."
     text = " ".join(str(found).split())
-    assert all(" ".join(each.split()) in text for each in sentences[4:])
+    assert all(" ".join(each.split()) in text for each in (sentences[0], *sentences[3:5], *sentences[7:]))
 
 
 def test_one_output_that_fails_is_a_limit_of_the_model(document):
