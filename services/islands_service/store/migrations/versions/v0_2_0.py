@@ -8,7 +8,6 @@ down_revision = None
 
 _metadata = sa.MetaData(
     naming_convention={
-        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
         "uq": "uq_%(table_name)s_%(column_0_N_name)s",
         "fk": "fk_%(table_name)s_%(column_0_name)s",
         "pk": "pk_%(table_name)s",
@@ -71,25 +70,6 @@ sa.Table(
     sa.Column("search_result", sa.Text, nullable=False, server_default=""),
     sa.Column("model_error", sa.Float),
     sa.UniqueConstraint("owner", "idempotency_key"),
-    sa.Index(None, "owner", "created", "id"),
-    sa.Index(None, "owner", "state", "created", "id"),
-    sa.Index(
-        "ix_jobs_model_error",
-        "owner",
-        "model_error",
-        "id",
-        sqlite_where=sa.text("model_error IS NOT NULL"),
-        postgresql_where=sa.text("model_error IS NOT NULL"),
-    ),
-    sa.Index("ix_jobs_queue", "state", "owner", sa.text("priority DESC"), "created", "id", "islands"),
-    sa.Index(
-        "ix_jobs_monitor",
-        "monitor_id",
-        "state",
-        "record_number",
-        sqlite_where=sa.text("monitor_id IS NOT NULL"),
-        postgresql_where=sa.text("monitor_id IS NOT NULL"),
-    ),
 )
 
 sa.Table(
@@ -185,7 +165,6 @@ sa.Table(
     sa.Column("created", sa.Float, nullable=False),
     sa.Column("updated", sa.Float, nullable=False),
     _text("islands_version", 64, nullable=True),
-    sa.Index(None, "owner", "created", "id"),
 )
 
 sa.Table(
@@ -200,7 +179,6 @@ sa.Table(
     _text("sha256", 64),
     sa.Column("state", sa.Text, nullable=False),
     sa.Column("document", sa.Text, nullable=False),
-    sa.Index(None, "monitor_id", "sha256"),
 )
 
 sa.Table(
@@ -213,7 +191,6 @@ sa.Table(
     _text("secret", 64),
     sa.Column("created", sa.Float, nullable=False),
     sa.Column("busy_until", sa.Float, nullable=False, server_default=sa.text("0")),
-    sa.Index(None, "owner"),
 )
 
 sa.Table(
@@ -231,8 +208,6 @@ sa.Table(
     sa.Column("delivered", sa.Float),
     sa.Column("status", sa.Integer),
     sa.Column("error", sa.Text),
-    sa.Index(None, "webhook_id", "next_at"),
-    sa.Index(None, "webhook_id", "created"),
 )
 
 sa.Table(
@@ -250,7 +225,6 @@ sa.Table(
     sa.Column("max_streams", sa.BigInteger),
     sa.Column("max_drawings", sa.BigInteger),
     sa.Column("dataset_retention", sa.BigInteger),
-    sa.Index(None, "virtual_time"),
 )
 
 sa.Table(
@@ -264,11 +238,39 @@ sa.Table(
     _text("key_id", 16, nullable=True),
     _text("address", 64),
     sa.Column("details", sa.Text),
-    sa.Index(None, "at"),
-    sa.Index(None, "owner", "at"),
+)
+
+
+#: Tables and columns of the indexes with default names. The order of their creation, and of the others after
+#: them, decides which one SQLite takes for a query that several suit alike.
+_INDEXES = (
+    ("jobs", "owner", "created", "id"),
+    ("jobs", "owner", "state", "created", "id"),
+    ("audit", "at"),
+    ("audit", "owner", "at"),
+    ("owners", "virtual_time"),
+    ("webhooks", "owner"),
+    ("deliveries", "webhook_id", "next_at"),
+    ("deliveries", "webhook_id", "created"),
+    ("monitors", "owner", "created", "id"),
+    ("monitor_records", "monitor_id", "sha256"),
 )
 
 
 def upgrade() -> None:
-    """Create the tables."""
+    """Create the tables and the indexes."""
     _metadata.create_all(op.get_bind(), checkfirst=False)
+    for table, *columns in _INDEXES:
+        op.create_index(f"ix_{table}_{'_'.join(columns)}", table, columns)
+    op.create_index(
+        "ix_jobs_queue", "jobs", ["state", "owner", sa.text("priority DESC"), "created", "id", "islands"]
+    )
+    _create_partial_index(
+        "ix_jobs_monitor", ["monitor_id", "state", "record_number"], "monitor_id IS NOT NULL"
+    )
+    _create_partial_index("ix_jobs_model_error", ["owner", "model_error", "id"], "model_error IS NOT NULL")
+
+
+def _create_partial_index(name: str, columns: list[str], condition: str) -> None:
+    where = sa.text(condition)
+    op.create_index(name, "jobs", columns, sqlite_where=where, postgresql_where=where)
