@@ -19,7 +19,6 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from islands.errors import IslandsError, SettingsError
-from islands.evolution.presets import AUTO, resolve_settings
 from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.export import FILE_EXPORTS
 from islands.facade.coupled.result import read_fitted_model
@@ -192,23 +191,17 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
     average, shooting = models[0].average, read_shooting_interval(document)
     split = match_split(models[0], average_split(split_data(record, validation), average))
-    # Results of earlier versions have no ensemble.
-    ensemble = ensemble_from_document(document.get("ensemble"), models[0])
+    ensemble = ensemble_from_document(document["ensemble"], models[0])
     assessed = []
     for entry, model in zip(stored, models, strict=True):
-        warm_up = entry.document.get("warm_up")
-        if warm_up is None:
-            # Results of earlier versions do not state their warm-up; their default was this preset.
-            preset = "hysteresis" if spec.preset == AUTO else spec.preset
-            warm_up = resolve_settings(preset, spec.changes).maximum_lag
         criterion = read_criterion(entry.document)
-        constraints, refit = document["settings"]["constraints"], entry.document.get("refit")
+        constraints, refit = document["settings"]["constraints"], entry.document["refit"]
         validated = read_validated_model(entry.document, model)
-        assessment = assess(validated, split, shooting, warm_up, constraints, criterion)
+        assessment = assess(validated, split, shooting, entry.document["warm_up"], constraints, criterion)
         if refit:
             discarded = refit["discarded"] or ""
             assessment = with_refit(assessment, model, refit["samples"], discarded, split, constraints)
-        bands = bands_from_document(entry.document.get("bands"), ensemble)
+        bands = bands_from_document(entry.document["bands"], ensemble)
         assessed.append(replace(assessment, bands=bands))
     search = _search(document, store.results.history(job.id))
     # The comparison is part of the report on all models only.
@@ -258,8 +251,7 @@ def _search(result: Mapping[str, Any], history: list[list[Any]]) -> SearchStatis
         history_from_document(history),
         {},
         document["ended_by"],
-        # Results of earlier versions have none.
-        not_computed={each["step"]: each["reason"] for each in result.get("not_computed", ())},
+        not_computed={each["step"]: each["reason"] for each in result["not_computed"]},
     )
 
 

@@ -302,7 +302,7 @@ def figure_names(which: JobRef, rank: int | None) -> RequestSpec[tuple[str, ...]
 
 
 def get_recommended_rank(job: JobView) -> int:
-    """Return the rank of the recommended model of a job; 1 for results of earlier versions."""
+    """Return the rank of the recommended model of a job; 1 without a result."""
     return int((job.summary or {}).get("rank", 1))
 
 

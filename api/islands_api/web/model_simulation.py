@@ -60,9 +60,9 @@ class SimulatedModel:
     units : tuple of str
         Of the inputs, then of the output.
     ranges : tuple of (float, float)
-        Range of every input in the estimation data, as measured; empty in results of earlier versions.
+        Range of every input in the estimation data, as measured.
     output_range : float
-        Range of the output in the record; 0 in results of earlier versions.
+        Range of the output in the record.
     """
 
     model: DynamicModel

@@ -194,9 +194,8 @@ def _identify(
         )
         return fitted.with_wall_time(reporter.spent).search_result
     preset: str | Choice = spec.preset
-    if preset == AUTO and start.state is not None:
-        # A job of an earlier version without preset stored no choice, and had this default.
-        preset = start.choice or "hysteresis"
+    if preset == AUTO and start.choice is not None:
+        preset = start.choice
     elif preset == AUTO:
         try:
             preset = choose_preset(record, validation, spec.changes, reporter.report_stage, stop)

@@ -193,9 +193,7 @@ class Submission:
     def request(self) -> str:
         """The request as canonical text: equal texts are equal requests."""
         asked = {"kind": self.kind, "spec": self.spec, "name": self.name, "priority": self.priority}
-        # Requests of earlier versions have no tags.
-        tags = {"tags": self.tags} if self.tags else {}
-        return json.dumps({**asked, **tags}, sort_keys=True)
+        return json.dumps({**asked, "tags": self.tags}, sort_keys=True)
 
 
 @dataclass(frozen=True, slots=True)

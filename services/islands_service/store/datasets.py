@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Row, bindparam, case, func, insert, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, func, insert, select, tuple_, update
 
 from islands.errors import IslandsError
 from islands_service.domain.job import ACTIVE, QuotaError, Requester
@@ -316,17 +316,12 @@ def _find_row(
     return row
 
 
-#: Rows for a page. Those of earlier versions have no summary, and it is made from their preview.
-_PAGE = select(
-    *(column for column in datasets.c if column.name not in ("preview", "deleted")),
-    case((datasets.c.summary.is_(None), datasets.c.preview)).label("preview"),
-)
+#: Rows for a page.
+_PAGE = select(*(column for column in datasets.c if column.name not in ("preview", "deleted")))
 
 
 def _read_summary(row: Any) -> dict[str, Any]:
-    return (
-        summarise_preview(json.loads(row.preview)) if row.summary is None else dict(json.loads(row.summary))
-    )
+    return dict(json.loads(row.summary))
 
 
 def _make_dataset(row: Any, preview: Mapping[str, Any] | None = None) -> StoredDataset:

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +16,6 @@ from islands.models.narx import Model, require_narx
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel, no_model_error
 from islands.persistence.narx_documents import SCHEMA, narx_json, read_narx
-from islands.persistence.result_models import read_preprocessing
 
 #: Schema of models of several outputs.
 COUPLED_SCHEMA = "islands.coupled-model/1"
@@ -95,11 +93,7 @@ def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVE
     ModelError
         The file does not exist or is not a model file. The message names the invalid field.
     """
-    model = model_from_json(_read_text(path), str(path), primitives)
-    if isinstance(model, Model) and not model.preprocessing:
-        # Earlier versions wrote the preprocessing to result.json alone.
-        return replace(model, preprocessing=read_preprocessing(path))
-    return model
+    return model_from_json(_read_text(path), str(path), primitives)
 
 
 def model_from_json(

@@ -56,7 +56,7 @@ def narx_json(model: Model) -> str:
         document = ModelDocument.model_validate(model.document())
     except ValidationError as error:
         raise ModelError(f"the model cannot be written: {_explain(error)}") from error
-    # Models of measured signals have the files of earlier versions.
+    # Models of measured signals need no steps.
     left_out = {"preprocessing"} if model.preprocessing is None else None
     return document.model_dump_json(by_alias=True, indent=2, exclude=left_out) + "\n"
 

@@ -111,8 +111,7 @@ def read_saved_model(
 
 def find_recommended(result: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the entry of the recommended model in ``result.json``."""
-    # Results of earlier versions recommend no model.
-    entry: Mapping[str, Any] = result["models"][result.get("recommended", {"rank": 1})["rank"] - 1]
+    entry: Mapping[str, Any] = result["models"][result["recommended"]["rank"] - 1]
     return entry
 
 

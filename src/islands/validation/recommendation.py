@@ -101,8 +101,7 @@ class Recommendation:
     reasons : tuple of str
         Reasons for the choice, each a statement about measured quantities.
     reference : int or None
-        Rank of the model that the others are compared with. None if models are not compared, and in results
-        of earlier versions.
+        Rank of the model that the others are compared with. None if models are not compared.
     excluded : tuple of Exclusion
         In the order of the criteria. The smallest of the models that none excludes is recommended.
     """

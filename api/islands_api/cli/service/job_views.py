@@ -65,8 +65,7 @@ def show_job(job: JobView, as_json: bool) -> None:
     if job.kind != IDENTIFICATION:
         show_findings(job)
     elif job.summary is not None:
-        # Results of earlier versions have no sentences.
-        for sentence in job.summary.get("words", job.summary["equation"]).splitlines():
+        for sentence in job.summary["words"].splitlines():
             output.print("\n".join(wrap(sentence.strip())), markup=False)
         if kept := describe_kept_models(job):
             output.print("\n".join(wrap(f"The job {kept}.")), markup=False)
@@ -147,7 +146,6 @@ def show_models(client: Client, job: JobView, models: Sequence[ModelView]) -> No
             str(model.size),
             *map(_format_number, mape),
             *((drift, "yes" if model.physics["property_1"] else "no") if hysteresis else ()),
-            # Results of earlier versions have no verdict.
             model.residual_tests.get("verdict", "-"),
         )
     output.print(table)
@@ -158,12 +156,11 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
     """Yield the lines that ``islands fit`` prints about the recommended model."""
     if not models:
         return
-    # Results of earlier versions recommend no model.
     rank = next((model.rank for model in models if model.recommended), 1)
     model = any_model_from_json(client.export(job.id, rank, "json"), f"model {rank}")
     singles: Sequence[DynamicModel] = model.models if isinstance(model, CoupledModel) else (model,)
     terms = [line for single in singles for line in term_table(single)]
-    # Results of earlier versions have no sentences. The equation in one line is indented.
+    # The equation in one line is indented.
     words = str((job.summary or {}).get("words", "")).splitlines()
     equation = next((at for at, line in enumerate(words) if line.startswith(" ")), len(words))
     yield from (line for sentence in words[:equation] for line in wrap(sentence))

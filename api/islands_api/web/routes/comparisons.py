@@ -51,7 +51,6 @@ async def _find_model(state: AppState, caller: Principal, text: str) -> tuple[st
     """Return the job and the rank of a model that exists."""
     name, _, rank = text.partition(":")
     job = await get_job_of_kind(state, caller, name, IDENTIFICATION)
-    # Results of earlier versions name no recommended model.
     number = int(rank) if rank else int((job.summary or {}).get("rank") or 1)
     await get_model(state, caller, name, number)
     return name, number

@@ -115,8 +115,6 @@ async def next_experiment(job: Id, caller: Reader, state: AppStateDep) -> Respon
 
 
 def _explain_absence(document: dict[str, Any]) -> str:
-    if "next_experiment" not in document:
-        return "an earlier version of islands has run it: submit it again"
     if document["next_experiment"] is None or document["decisive_experiment"] is None:
         return "the record tells its causes apart, or no cause was named"
     return "see its decisive_experiment in /result"
@@ -144,9 +142,7 @@ async def outputs(
     await get_result(state, await get_job_of_kind(state, caller, job, DISCREPANCY))
     blob = await state.run_blocking(state.store.results.artefact, job, OUTPUTS)
     if blob is None:
-        raise ResourceNotFoundError(
-            f"job {job} has no outputs, because an earlier version of islands has run it: submit it again"
-        )
+        raise ResourceNotFoundError(f"job {job} has no outputs: submit it again")
     tag = f'"{hashlib.sha256(repr((blob, start, stop, points)).encode()).hexdigest()[:32]}"'
     # A cancelled job that is resumed replaces its outputs.
     headers = {"Cache-Control": REVALIDATE, "Vary": "Authorization", "ETag": tag}

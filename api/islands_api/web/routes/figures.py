@@ -233,13 +233,12 @@ async def _list_search_figures(state: AppState, caller: Principal, job: str) -> 
 
 
 async def _list_model_figures(state: AppState, job: str, found: StoredModel) -> tuple[str, ...]:
-    # Results of earlier versions do not say whether there is a loop, and have the figure.
     document = await state.run_blocking(state.store.results.document, job) or {}
     if "outputs" in document:
         return tuple(f"free-run-{number + 1}" for number in range(len(document["outputs"])))
     is_latent = found.document.get("kind") == LatentModel.kind
     model = model_from_json(found.file, f"model {found.rank}") if is_latent else None
-    return list_model_figures(model, document.get("loop", True))
+    return list_model_figures(model, document["loop"])
 
 
 async def _count_outputs(state: AppState, job: str) -> int:
@@ -284,7 +283,6 @@ def _find_part(name: str) -> str | None:
 async def _draw(state: AppState, caller: Principal, job: str, rank: int | None, part: str | None) -> None:
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     for dataset in parse_identification(found.spec).datasets:
-        # Raises if an earlier version deleted it.
         await state.run_blocking(state.store.datasets.get, caller.owner, dataset, deleted=True)
     _FAILURES.refuse(job, rank, part)
     try:

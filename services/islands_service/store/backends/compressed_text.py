@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Text
 from sqlalchemy.types import TypeDecorator
 
-#: Beginning of a compressed text. No JSON document begins like this, and earlier versions compressed nothing.
+#: Beginning of a compressed text. No JSON document begins like this.
 _MARK = "zlib:"
 
 #: Characters of a text that is not worth the time.

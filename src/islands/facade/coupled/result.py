@@ -185,8 +185,7 @@ def read_fitted_model(
         The document is damaged.
     """
     try:
-        # Results of earlier versions have no ensemble and no warm-up.
-        shared = ensemble_from_document(document.get("ensemble"), model, primitives)
+        shared = ensemble_from_document(document["ensemble"], model, primitives)
         own = [
             ensemble_from_document(each.get("ensemble"), single, primitives)
             for each, single in zip(document["outputs"], model.models, strict=True)
@@ -195,7 +194,7 @@ def read_fitted_model(
             bands_from_document(each.get("bands"), ensemble or shared)
             for each, ensemble in zip(document["outputs"], own, strict=True)
         ]
-        warm_up = int(document.get("warm_up") or model.maximum_lag)
+        warm_up = int(document["warm_up"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"{name} is damaged: {error!r} is missing or wrong") from error
     return FittedCoupledModel(model, warm_up, tuple(each for each in bands if each is not None))

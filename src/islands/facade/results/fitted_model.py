@@ -350,7 +350,7 @@ class FittedModel:
         if self.prediction_bands is None:
             raise ModelError(
                 f"model {self.rank} has no prediction bands: its free run diverged, or the search was "
-                "stopped before them or is of an earlier version. Take another model"
+                "stopped before them. Take another model"
             )
         warm_up = self.warm_up if warm_up is None else warm_up
         data = match_rate(self.model, record_of_model(self.model, record))

@@ -257,24 +257,17 @@ class Result:
             steps.attempt("figures of responses", draw_all_responses)
 
     def __str__(self) -> str:
-        if (document := self._describable_document()) is None:
-            return (Path(self.folder or "") / "summary.txt").read_text(encoding="utf-8")
-        return summary(document, self.best.model)
+        return summary(self._describable_document(), self.best.model)
 
     def _repr_html_(self) -> str:
         figure = None if self._search_result is None else self.best.plot()
-        if (document := self._describable_document()) is None:
-            reasons = [f"Recommended: model {self.best.rank}: {'; '.join(self.recommendation.reasons)}"]
-            return render_html(self.best.model, [*reasons, self.best.describe_error()])
         # The equation, which is indented, is shown in MathML.
-        sentences = [line for line in describe(document) if not line.startswith(" ")]
+        sentences = [line for line in describe(self._describable_document()) if not line.startswith(" ")]
         return render_html(self.best.model, sentences, figure)
 
-    def _describable_document(self) -> Mapping[str, Any] | None:
-        """Return ``result.json``; None for one of an earlier version, which lacks facts."""
-        if self._search_result is not None:
-            return result_document(self._search_result)
-        return self.document if "data" in self.document else None
+    def _describable_document(self) -> Mapping[str, Any]:
+        """Return ``result.json``."""
+        return self.document if self._search_result is None else result_document(self._search_result)
 
 
 def _row(entry: FittedModel, recommended: bool) -> dict[str, object]:

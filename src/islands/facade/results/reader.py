@@ -50,28 +50,27 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
     try:
         entries = document["models"]
         models = [read_listed_model(folder, entry, primitives) for entry in entries]
-        # Results of earlier versions have no ensemble and no warm-up, and recommend no model.
-        ensemble = ensemble_from_document(document.get("ensemble"), models[0], primitives)
+        ensemble = ensemble_from_document(document["ensemble"], models[0], primitives)
         shooting = read_shooting_interval(document)
         stored = tuple(
             FittedModel(
                 model,
                 entry["rank"],
                 _read_metrics(entry["metrics"]),
-                model.maximum_lag if entry.get("warm_up") is None else entry["warm_up"],
+                entry["warm_up"],
                 shooting,
-                bands_from_document(entry.get("bands"), ensemble),
+                bands_from_document(entry["bands"], ensemble),
                 document["record"]["units"]["output"],
                 MappingProxyType(entry),
             )
             for entry, model in zip(entries, models, strict=True)
         )
-        chosen = document.get("recommended", {})
+        chosen = document["recommended"]
         recommendation = Recommendation(
             find_recommended(document)["rank"],
-            tuple(chosen.get("reasons", ())),
-            chosen.get("reference"),
-            tuple(Exclusion(each["reason"], tuple(each["ranks"])) for each in chosen.get("excluded", ())),
+            tuple(chosen["reasons"]),
+            chosen["reference"],
+            tuple(Exclusion(each["reason"], tuple(each["ranks"])) for each in chosen["excluded"]),
         )
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error

@@ -28,7 +28,7 @@ def report_saved_result(folder: Path) -> bytes:
     Raises
     ------
     ModelError
-        There is no result, it is damaged or of an earlier version, or the diagnosis was stopped before its
+        There is no result, it is damaged or of another version, or the diagnosis was stopped before its
         report.
     """
     saved = open_document(folder)
@@ -41,7 +41,7 @@ def report_saved_result(folder: Path) -> bytes:
         return _write(saved, model)
     except (KeyError, TypeError, IndexError) as error:
         raise ModelError(
-            f"{saved.file} is damaged or of an earlier version, {error!r} is missing or wrong: identify again"
+            f"{saved.file} is damaged or of another version: {error!r} is missing or wrong; identify again"
         ) from error
 
 

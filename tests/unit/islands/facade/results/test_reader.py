@@ -71,21 +71,6 @@ def test_damaged_results_are_named(folder, tmp_path, damage, message):
         islands.read_result(tmp_path / "copy")
 
 
-def test_a_result_of_an_earlier_version_has_no_bands_and_starts_after_the_lags(folder, tmp_path):
-    shutil.copytree(folder, tmp_path / "copy")
-    file = tmp_path / "copy" / "result.json"
-    document = json.loads(file.read_text())
-    del document["ensemble"], document["recommended"]
-    for entry in document["models"]:
-        del entry["warm_up"], entry["bands"]
-    file.write_text(json.dumps(document))
-    stored = islands.read_result(tmp_path / "copy")
-    assert [each.warm_up for each in stored.models] == [each.model.maximum_lag for each in stored.models]
-    assert stored.best.rank == 1
-    with pytest.raises(islands.ModelError, match="no prediction bands"):
-        stored.best.bands(record(300))
-
-
 def test_a_folder_without_a_result_is_named(tmp_path):
     with pytest.raises(islands.ModelError, match=r"has no result\.json"):
         islands.read_result(tmp_path)

@@ -188,7 +188,3 @@ def test_a_simulation_over_shooting_intervals_has_the_reported_error(tmp_path):
     assert document["settings"]["shooting"] == 52
     assert document["preprocessing"]["shooting_interval"] == 10
     assert islands.load(tmp_path / "models/01.json").shooting_interval == 10
-    # Results of earlier versions state the setting only, and used it as the number of means.
-    del document["preprocessing"]["shooting_interval"]
-    (tmp_path / "result.json").write_text(json.dumps(document))
-    assert islands.load(tmp_path / "models/01.json").shooting_interval == 52

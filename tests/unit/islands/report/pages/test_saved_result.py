@@ -42,11 +42,11 @@ def test_report_of_a_diagnosis_is_the_one_that_it_wrote(tmp_path):
     assert report_saved_result(tmp_path) == b"written"
 
 
-def test_result_of_an_earlier_version_is_refused_with_advice(folder):
+def test_result_of_another_version_is_refused_with_advice(folder):
     document = json.loads((folder / "result.json").read_text())
     del document["search"]
     (folder / "result.json").write_text(json.dumps(document))
-    with pytest.raises(ModelError, match=r"earlier version, KeyError.*'search'.*identify again"):
+    with pytest.raises(ModelError, match=r"another version: KeyError.*'search'.*identify again"):
         report_saved_result(folder)
 
 
