@@ -11,7 +11,7 @@ from math import ceil, floor, log10, sqrt
 from typing import Final
 
 from islands.records.channel_names import TEMPERATURES
-from islands.report.text.facts import Document, round_ratio, write_amount
+from islands.report.text.facts import FAR_RATIO, NOISE_RATIO, Document, round_ratio, write_amount
 from islands.rounding import RESOLUTION
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
@@ -22,12 +22,6 @@ _CERTAIN = 0.5
 
 #: Confidence below which a cause is called probable.
 _SURE = 0.9
-
-#: Ratio of an error and the noise floor up to which the error is that of the noise.
-_NOISE_RATIO = 1.2
-
-#: Ratio of an error and the noise floor from which on noise does not explain the error.
-_FAR_RATIO = 3.0
 
 #: Error as a fraction of the standard deviation of the output above which white and coloured noise are large.
 _LARGE_NOISE, _LARGE_COLOURED_NOISE = 0.3, 0.1
@@ -429,7 +423,7 @@ class DiagnosisFacts:
     @property
     def is_below_floor(self) -> bool:
         """Whether the error of the held-out data is below the noise floor."""
-        return self.noise_ratio is not None and self.noise_ratio < 1.0 / _NOISE_RATIO
+        return self.noise_ratio is not None and self.noise_ratio < 1.0 / NOISE_RATIO
 
     @property
     def is_noise_compared(self) -> bool:
@@ -515,12 +509,12 @@ class DiagnosisFacts:
     @property
     def is_far(self) -> bool:
         """Whether the error of the held-out data is far above the noise floor."""
-        return (self.noise_ratio or 0.0) >= _FAR_RATIO
+        return (self.noise_ratio or 0.0) >= FAR_RATIO
 
     @property
     def is_noise(self) -> bool:
         """Whether the error of the held-out data is at most that of the noise."""
-        return self.noise_ratio is not None and self.noise_ratio <= _NOISE_RATIO
+        return self.noise_ratio is not None and self.noise_ratio <= NOISE_RATIO
 
     @property
     def is_correlated(self) -> bool:

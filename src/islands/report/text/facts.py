@@ -23,11 +23,11 @@ _GOOD_R2 = 0.9
 #: R2 of a simulation below which it is hardly better than the mean of the output.
 _NO_R2 = 0.05
 
-#: Largest ratio of the free-run error and the noise level at which the error is that of the noise.
-_NOISE_RATIO = 1.2
+#: Largest ratio of an error and the noise level at which the error is that of the noise.
+NOISE_RATIO = 1.2
 
-#: Ratio of the free-run error and the noise level from which on noise does not explain the error.
-_FAR_RATIO = 3.0
+#: Ratio of an error and the noise level from which on noise does not explain the error.
+FAR_RATIO = 3.0
 
 #: Ratio of the errors on validation data and estimation data above which a model does not generalise.
 _LARGE_RATIO = 2.0
@@ -172,20 +172,20 @@ class RunFacts:
         return bool(self.bands and output_range and 2.0 * self.half_width > output_range)
 
     @property
-    def verdict(self) -> str | None:
-        """Verdict on the residual of the free run. Results of earlier versions have none."""
-        found: str | None = self.residual.get("verdict")
+    def verdict(self) -> str:
+        """Verdict on the residual of the free run."""
+        found: str = self.residual["verdict"]
         return found
 
     def share(self, mode: str) -> float | None:
         """Return the predictable share of a residual; null after a divergence."""
-        found: float | None = self.residual.get("predictable_share", {}).get(mode)
+        found: float | None = self.residual["predictable_share"][mode]
         return found
 
     @property
     def has_structure(self) -> bool:
         """Whether the residual of the free run has a predictable part, or the free run diverges."""
-        return self.verdict not in (ADEQUATE, NOT_COMPUTED, None)
+        return self.verdict not in (ADEQUATE, NOT_COMPUTED)
 
     @property
     def has_visible_structure(self) -> bool:
@@ -221,7 +221,7 @@ class RunFacts:
     @property
     def is_at_noise(self) -> bool:
         """Whether the error is at most the noise level, which has an uncertainty."""
-        return self.noise_ratio is not None and self.noise_ratio <= _NOISE_RATIO
+        return self.noise_ratio is not None and self.noise_ratio <= NOISE_RATIO
 
     @property
     def simulates(self) -> bool:
@@ -230,7 +230,7 @@ class RunFacts:
         if rmse is None or self.is_unrelated:
             return False
         # R2 is undefined for a constant output.
-        return r2 is None or r2 >= _GOOD_R2 or (noise is not None and rmse <= _NOISE_RATIO * noise)
+        return r2 is None or r2 >= _GOOD_R2 or (noise is not None and rmse <= NOISE_RATIO * noise)
 
     @property
     def predicts(self) -> bool:
@@ -256,7 +256,7 @@ class RunFacts:
     @property
     def is_far_ahead(self) -> bool:
         """Whether the error one step ahead is far above the noise."""
-        return self.one_step_ratio >= _FAR_RATIO
+        return self.one_step_ratio >= FAR_RATIO
 
     @property
     def noise_ratio(self) -> float | None:
@@ -272,7 +272,7 @@ class RunFacts:
     @property
     def exceeds_noise(self) -> bool:
         """Whether an unpredictable residual of the free run is far above the noise."""
-        return self.is_unpredictable and (self.noise_ratio or 0.0) >= _FAR_RATIO
+        return self.is_unpredictable and (self.noise_ratio or 0.0) >= FAR_RATIO
 
     @property
     def error_ratio(self) -> float:
@@ -302,7 +302,7 @@ class RunFacts:
 
 
 class ResultFacts(RunFacts):
-    """Quantities of a ``result.json`` that the statements read. Those of earlier versions lack some of them.
+    """Quantities of a ``result.json`` that the statements read.
 
     Parameters
     ----------
@@ -313,13 +313,13 @@ class ResultFacts(RunFacts):
     def __init__(self, document: Document) -> None:
         self.document = document
         self.record: Document = document["record"]
-        # Results of earlier versions recommend no model.
-        self.recommended: Document = document.get("recommended", {"rank": 1, "reasons": ()})
+        self.recommended: Document = document["recommended"]
         self.model: Document = document["models"][self.recommended["rank"] - 1]
         self.physics: Document = self.model["physics"]
         model, unit = self.model, self.record["units"]["output"]
-        bands, data = model.get("bands") or {}, document.get("data", {})
-        super().__init__(model["metrics"], unit, bands, model["residual_tests"], data)
+        super().__init__(
+            model["metrics"], unit, model["bands"] or {}, model["residual_tests"], document["data"]
+        )
 
     @property
     def reasons(self) -> Sequence[str]:
@@ -329,7 +329,7 @@ class ResultFacts(RunFacts):
 
     @property
     def physics_reason(self) -> str:
-        """What the physics checks of the model show; empty in results of earlier versions."""
+        """What the physics checks of the model show; empty where they are not computed."""
         return self.reasons[1] if len(self.reasons) > 1 else ""
 
     @cached_property
@@ -358,13 +358,13 @@ class ResultFacts(RunFacts):
 
     @property
     def criterion(self) -> Document:
-        """Error that the parameters minimise. Empty in results of earlier versions."""
-        return self.model.get("criterion") or {}
+        """Error that the parameters minimise. Empty if they are given."""
+        return self.model["criterion"] or {}
 
     @property
     def refit(self) -> Document:
         """Estimate of the parameters on all data. Empty if there is none."""
-        return self.model.get("refit") or {}
+        return self.model["refit"] or {}
 
     @property
     def is_refitted(self) -> bool:
@@ -374,12 +374,13 @@ class ResultFacts(RunFacts):
     @property
     def recordings(self) -> Document:
         """Errors of the free run by recording of the validation data; empty if there is one."""
-        return self.model.get("recordings", {}).get("validation") or {}
+        errors: Document = self.model["recordings"]["validation"]
+        return errors
 
     @property
     def linear(self) -> Document:
-        """Linear model of the same data. Empty if the model is linear, and in results of earlier versions."""
-        return self.document.get("linear") or {}
+        """Linear model of the same data. Empty if the model is linear."""
+        return self.document["linear"] or {}
 
     @property
     def linear_error(self) -> float:
@@ -446,7 +447,7 @@ class ResultFacts(RunFacts):
     @property
     def signals(self) -> str:
         """Signals that the equation reads."""
-        signals: str = self.model.get("named_signals", self.model.get("signals", ""))
+        signals: str = self.model["named_signals"]
         return signals
 
     @property
@@ -458,13 +459,13 @@ class ResultFacts(RunFacts):
     @property
     def recorded_dt(self) -> float:
         """Sampling time of the record before its preprocessing."""
-        steps = self.preprocessing.get("steps")
+        steps = self.preprocessing["steps"]
         return float(self.record["dt"] if steps is None else steps["dt"])
 
     @property
     def counts_samples(self) -> bool:
         """Whether k counts samples of the given data: means or filtered rates have other units."""
-        done, steps = self.preprocessing, self.preprocessing.get("steps")
+        done, steps = self.preprocessing, self.preprocessing["steps"]
         filtered = steps is not None and Preprocessing.from_document(steps).has_rate_steps
         return bool(done["average"] == 1 and not filtered)
 
@@ -481,7 +482,7 @@ class ResultFacts(RunFacts):
     @cached_property
     def doubtful(self) -> list[tuple[str, float]]:
         """Terms that are not certain, each with the probability of its inclusion."""
-        shares = [(term["term"], term.get("inclusion")) for term in self.model["terms"] if "term" in term]
+        shares = [(term["term"], term["inclusion"]) for term in self.model["terms"]]
         return [(text, share) for text, share in shares if share is not None and share < CERTAIN]
 
     @property
@@ -503,13 +504,12 @@ class ResultFacts(RunFacts):
     def constraints(self) -> list[tuple[str, Document]]:
         """Constraints of the user, with names of the record; the physics checks have Property 1."""
         checks = [check for check in self.model["constraints"] if check["text"] != "hysteresis"]
-        return [(check.get("named", check["text"]), check) for check in checks]
+        return [(check["named"], check) for check in checks]
 
     @property
     def implausible(self) -> list[Document]:
         """Extremes of the inputs at which the output diverges or is far from its range."""
-        # Results of earlier versions have no extremes, or do not state which are plausible.
-        return [test for test in self.physics.get("extremes", ()) if not test.get("plausible", True)]
+        return [test for test in self.physics["extremes"] if not test["plausible"]]
 
     def inputs_at(self, level: float) -> list[tuple[str, float, str]]:
         """Return name, value and unit of the inputs at a level of the physics checks; empty if unknown."""
@@ -523,7 +523,7 @@ class ResultFacts(RunFacts):
     def missing_checks(self) -> list[str]:
         """Names of the checks that are not computed."""
         checks = {"physics checks": self.physics, "residual tests": self.residual}
-        return [name for name, each in checks.items() if each.get("not_computed")]
+        return [name for name, each in checks.items() if each["not_computed"]]
 
     @property
     def diverging(self) -> list[str]:
@@ -615,7 +615,7 @@ def round_ratio(ratio: float) -> float:
 def list_insignificant(terms: Iterable[Document]) -> list[str]:
     """Return the terms whose parameters are within two standard errors of zero."""
     return [
-        term.get("term", term["regressor"])
+        term["term"]
         for term in terms
         if term["standard_error"] is not None
         and abs(term["parameter"]) < SIGNIFICANT * term["standard_error"]
@@ -630,5 +630,5 @@ def is_refitted(entry: Document) -> bool:
     entry : mapping
         Entry of the model in ``result.json``.
     """
-    refit = entry.get("refit")
+    refit = entry.get("refit")  # an entry of several outputs has none
     return bool(refit and not refit["discarded"])

@@ -21,7 +21,7 @@ def describe(document: Document) -> list[str]:
     return [
         *describe_essence(document),
         describe_choice(document),
-        f"    {model.get('named_equation', model['equation'])}",
+        f"    {model['named_equation']}",
         f"    {describe_units(document)}",
         *describe_findings(document),
     ]
@@ -62,5 +62,5 @@ def describe_findings(document: Document) -> list[str]:
 
 
 def describe_not_computed(document: Document) -> list[str]:
-    """State each optional step that failed, with the reason; a result of an earlier version has none."""
-    return [f"Not computed: {each['step']}: {each['reason']}." for each in document.get("not_computed", ())]
+    """State each optional step that failed, with the reason."""
+    return [f"Not computed: {each['step']}: {each['reason']}." for each in document["not_computed"]]

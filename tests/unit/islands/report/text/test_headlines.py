@@ -13,9 +13,10 @@ CONSTANT = {"rmse": 0.25, "mape": None, "r2": None}
 
 def result(error: dict[str, Any], size: int = 2, **entry: Any) -> dict[str, Any]:
     metrics = {"validation": {"free_run": error, "one_step_ahead": FREE}}
-    model = {"size": size, "metrics": metrics, "physics": {}, "residual_tests": {}, **entry}
+    empty = {"physics": {}, "residual_tests": {}, "bands": None, "refit": None}
+    model = {"size": size, "metrics": metrics, **empty, **entry}
     record = {"names": {"output": "y_um", "inputs": ["u_V"]}, "units": {"output": "um", "inputs": ["V"]}}
-    return {"record": record, "models": [model]}
+    return {"record": record, "models": [model], "recommended": {"rank": 1, "reasons": []}, "data": {}}
 
 
 @pytest.mark.parametrize(

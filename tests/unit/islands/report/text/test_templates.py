@@ -5,7 +5,6 @@ from copy import deepcopy
 from functools import cache
 from importlib.resources import files
 
-import numpy as np
 import pytest
 
 import islands
@@ -34,7 +33,7 @@ STRUCTURE = {
 }
 AHEAD = STRUCTURE | {f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.5, "free_run": 0.94}}
 WHITE = {f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.02, "free_run": 0.02}}
-TERM = {"parameter": -0.9, "standard_error": 0.001}
+TERM = {"parameter": -0.9, "standard_error": 0.001, "inclusion": 1.0}
 CHECK = {"text": "[u(k-1)] >= 0", "named": "[u_V(k-1)] >= 0", "target": 0.0, "value": -0.5}
 
 
@@ -331,16 +330,3 @@ def test_noise_of_the_output_biases_least_squares_alone():
     ).has_output_noise
     assert not ResultFacts(change(result(), noisy | {"settings.estimator": ""})).has_output_noise
     assert not ResultFacts(change(result(), WHITE)).has_output_noise
-
-
-def test_a_result_of_an_earlier_version_has_fewer_statements():
-    document = deepcopy(result())
-    for name in ("recommended", "data", "linear"):
-        del document[name]
-    for name in ("bands", "criterion", "refit", "recordings"):
-        del document["models"][0][name]
-    text = " ".join(describe(document))
-    assert not EMPTY.search(text)
-    assert np.all(
-        [word not in text for word in ("Parameters:", "Uncertainty:", "linear model", "noise level")]
-    )
