@@ -95,6 +95,15 @@ def test_unsupported_format_is_rejected(folder: Path) -> None:
         assert "bouc-wen-piezo has no closed form as a difference equation: take the format plain" in message
 
 
+def test_a_simulation_of_equations_is_written_as_c_and_matlab(folder: Path) -> None:
+    out = folder / "simulation.c"
+    succeed("show", folder, "--format", "c", "--out", out)
+    assert out.read_text().rstrip() == succeed("show", folder / "extended.json", "--format", "c").rstrip()
+    assert "int simulate(const struct parameters *p," in out.read_text()
+    printed = succeed("show", folder, "--format", "matlab")
+    assert printed.startswith("function y = extended_simulation(u, initial, p)")
+
+
 def test_equations_are_simulated_without_a_diagnosis(tmp_path: Path) -> None:
     case = made()["ode"]
     write_record(case.record, tmp_path / "record.csv")

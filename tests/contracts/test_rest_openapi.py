@@ -193,6 +193,24 @@ def test_responses_of_other_requests_match_the_documentation(service, document):
     assert check_response(document, ended).status_code == 204
 
 
+def test_a_model_equals_its_entry_in_the_result(service, finished):
+    result = service.client.get(f"/v1/jobs/{finished}/result").json()
+    models = service.client.get(f"/v1/jobs/{finished}/models").json()["items"]
+    assert result["models"] == models
+    assert [model["rank"] for model in models] == list(range(1, len(models) + 1))
+    for model in models:
+        assert service.client.get(f"/v1/jobs/{finished}/models/{model['rank']}").json() == model
+    job = service.client.get(f"/v1/jobs/{finished}").json()
+    (chosen,) = (model for model in models if model["recommended"])
+    assert job["summary"]["size"] == chosen["size"]
+    for name in ("rank", "reasons"):
+        assert job["summary"][name] == result["recommended"][name]
+    assert job["summary"]["models"] == len(models)
+    assert models[0]["metrics"]["validation"]["free_run"]["mape"] < 1.0
+    missing = service.client.get(f"/v1/jobs/{finished}/models/{len(models) + 1}")
+    assert "see its /models" in problem_of(missing, 404, "not-found")
+
+
 @pytest.mark.parametrize("form", EXPORTS)
 def test_a_model_is_exported_in_every_format(service, document, finished, form):
     path = f"/v1/jobs/{finished}/models/1/export"

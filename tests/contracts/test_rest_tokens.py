@@ -90,6 +90,37 @@ def test_a_token_that_is_not_valid_is_refused_with_its_reason(service, issuer, m
     assert answer.headers["www-authenticate"] == 'Bearer realm="islands", error="invalid_token"'
 
 
+@pytest.fixture
+def patient(shared):
+    """The cache of the keys, whose clock the test moves."""
+    keys = shared.app.state.islands.tokens.keys
+    clock = keys._clock
+    moved = [0.0]
+    keys._clock = lambda: clock() + moved[0]
+
+    def wait(seconds):
+        moved[0] += seconds
+
+    yield wait
+    keys._clock = clock
+
+
+def test_known_tokens_are_accepted_while_the_issuer_is_away(service, issuer, patient):
+    assert owner_of(service, issuer)
+    issuer.away = True
+    try:
+        patient(700.0)
+        assert owner_of(service, issuer)
+        unknown = issuer.token(make_key("after the outage"))
+        patient(10.0)
+        answer = service.client.get("/v1/jobs", headers=bearer(unknown))
+        assert issuer.url in problem_of(answer, 503, "issuer-unavailable")
+        assert answer.headers["retry-after"]
+    finally:
+        issuer.away = False
+        patient(10.0)
+
+
 def test_a_stream_ends_when_its_token_expires(service, issuer, monkeypatch):
     from islands_api.web.routes import events
 

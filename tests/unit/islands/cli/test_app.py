@@ -1,5 +1,6 @@
 """Command line in this process: parsing of options, output folders, and errors."""
 
+import json
 import os
 import shutil
 from contextlib import chdir
@@ -122,6 +123,17 @@ def test_read_only_folder_is_rejected(tmp_path, monkeypatch):
 
 
 # Commands.
+
+
+def test_fit_prints_the_models_and_the_output_folder(fitted):
+    out = fitted
+    evaluations = json.loads(Path("out/result.json").read_text())["search"]["evaluations"]
+    method = Path("out/method.txt").read_text()
+    assert method.startswith("120 samples, 0.01 s: u_V to y_um\n")
+    assert f"{evaluations} models estimated: {evaluations} ok" in method
+    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
+    assert Path("out/summary.txt").read_text() in out
+    assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
 
 
 def test_simulate_reads_the_columns_of_the_model(run, fitted):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from io import StringIO
+from math import inf
 
 import pytest
 from rich.console import Console
@@ -63,6 +64,15 @@ def test_display_has_generation_speed_time_left_and_best_by_size(displayed):
     assert found[0][3] is None
     assert found[1][3] > 36.0
     assert 0.0 < found[0][1] < found[1][1] < 1.0
+
+
+def test_each_island_has_its_best_error_and_its_age(displayed):
+    state = at(3, 50, [4.0, 1.0, inf], [1.0, 1.0, inf], [1.0, 1.0, inf], [0.25, 1.0, inf])
+    assert displayed(Settings(islands=3), state)[0][2][1:] == [
+        "  island   0  RMSE 0.5, for 0 generations",
+        "  island   1  RMSE 1, for 3 generations",
+        "  island   2  no model yet, for 3 generations",
+    ]
 
 
 def test_lines_below_the_bar_are_verbatim_and_erased_at_the_end(monkeypatch):

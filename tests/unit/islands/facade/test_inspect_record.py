@@ -8,6 +8,7 @@ import islands
 from islands.cli.options import columns
 from islands.records.inspection.findings import SCHEMA
 from islands.records.reading.options import ReadingOptions
+from islands.report.text.inspection import WIDTH, format_inspection
 from support.known_records import delay, lag, measure, steps
 from support.parsed_files import list_parsed
 
@@ -108,6 +109,15 @@ def test_the_document_is_json(tmp_path):
     document = json.loads(json.dumps(found.as_document(), allow_nan=False))
     assert document["schema"] == SCHEMA
     assert {fact["name"] for fact in document["facts"]} >= {"dead-time", "rest", "noise"}
+
+
+def test_text_has_80_columns(tmp_path):
+    long = "t_s,u_" + "very_long_name_" * 5 + "V,y_um"
+    for options in ({}, {"header": long}, {"drop": range(100, 900, 50)}):
+        text = format_inspection(islands.inspect_record(write(tmp_path / "r.csv", **options)))
+        lines = [line for line in text.splitlines() if "very_long" not in line and str(tmp_path) not in line]
+        assert max(map(len, lines)) <= WIDTH
+        assert "Next:" in text
 
 
 def test_a_column_of_dates_is_read_with_that_of_the_time_of_day(tmp_path):

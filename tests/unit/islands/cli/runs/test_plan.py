@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from islands.cli.runs.plan import parse_excitation
 from islands.diagnosis.planning import decisive_experiment, experiment_setup
+from islands.diagnosis.planning.planned_input import InputForm
+from islands.errors import SettingsError
 from islands.records.reading import read_record
 from islands.records.writer import write_input
 from support.planned import DT, take_effects, wave
@@ -70,3 +73,14 @@ def test_incomplete_options_are_refused(
     )
     assert code == 2
     assert message in error
+
+
+def test_a_described_input_has_its_form_and_numbers() -> None:
+    multisine, steps = parse_excitation("multisine:0.1:5"), parse_excitation("steps:0.5")
+    assert (multisine.form, multisine.lowest, multisine.frequency) == (InputForm.MULTISINE, 0.1, 5.0)
+    assert (steps.form, steps.frequency) == (InputForm.STEPS, 2.0)
+    for text in ("sine", "sine:-1", "multisine:1", "steps:a"):
+        with pytest.raises(SettingsError, match="write multisine:LOW:HIGH"):
+            parse_excitation(text)
+    with pytest.raises(SettingsError, match="unknown excitation"):
+        parse_excitation("chirp:1")

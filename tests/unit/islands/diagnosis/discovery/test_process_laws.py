@@ -9,7 +9,8 @@ import pytest
 import scipy
 
 import islands
-from islands.diagnosis.discovery.candidate_terms import list_candidate_terms
+from islands.diagnosis.discovery.candidate_terms import list_candidate_terms, write_rate_size
+from islands.diagnosis.discovery.process_laws import describe_law
 from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
@@ -267,3 +268,19 @@ def test_another_rate_in_one_direction_is_a_candidate_far_from_zero() -> None:
     sizes = dict.fromkeys(("x", "dx/dt", "u", "rate(u)"), 2.0)
     kept = drop_redundant_terms(list_candidate_terms(system, sizes, 10.0, {}), system)
     assert "abs((u + level - x)/T)" in {each.text for each in kept}
+
+
+def test_laws_are_stated_in_words_and_other_terms_are_not() -> None:
+    system = OdeSpec.model_validate(PROCESS).make_system()
+    sizes = dict.fromkeys(("x", "dx/dt", "u", "rate(u)"), 2.0)
+    values = {"T": 2.0, "a1": -0.2, "s1": 270.0}
+    stated = {
+        each.text: describe_law(each, 1, system, values)
+        for each in list_candidate_terms(system, sizes, 10.0, {})
+        if each.target == "x"
+    }
+    (_, own), *_ = system.derivatives
+    assert "T is 2.5 s while x rises, and 1.67 s while it falls" in stated[write_rate_size(own)]
+    assert "fourth power of x, as by radiation" in stated["x**4"]
+    assert "fourth power of x + s1, as by radiation" in stated["(x + {scale})**4"]
+    assert sum(map(bool, stated.values())) == 3

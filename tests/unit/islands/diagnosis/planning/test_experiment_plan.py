@@ -11,6 +11,9 @@ from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.planning import decisive_experiment
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
+from islands.report.documents.diagnosis_json import as_json
+from islands.report.documents.plan_json import plan_document
+from islands.report.figures.separability import draw_separability
 from islands.report.text.plan import plan_text
 from islands.simulators.recorded_output import RecordedOutput
 from support.planned import DT, amplifier, input_record, take_effects, wave
@@ -46,12 +49,36 @@ def test_the_decisive_experiment_is_for_inseparable_pairs(
     assert plan.record.y[100] == pytest.approx(2.0 * plan.record.u[100, 0])
 
 
+def test_the_document_and_the_text_have_the_same_answers(plan: islands.ExperimentPlan) -> None:
+    document = plan_document(plan)
+    assert as_json(document).startswith("{")
+    causes = {each["name"]: each for each in document["causes"]}
+    assert set(causes) == {"delay", "sensor-lag", "offset"}
+    delay, lag, offset = plan.isolability.rows
+    assert document["separable_from_misfit"][0][2] == delay.misfits[2]
+    assert delay.misfits[1] > 1.0 > delay.misfits[2]
+    text = plan_text(plan)
+    assert "Decisive experiment: " in text
+    assert max(map(len, text.splitlines())) <= 100
+    rows = [line for line in text.splitlines() if line.startswith(" 1 delay")]
+    assert rows[0].split()[2:] == ["x" if np.isfinite(delay.misfits[1]) else "#", "."]
+    assert lag.detectable is not None
+    assert offset.detectable is not None
+
+
 def test_a_sufficient_input_needs_no_decisive_experiment() -> None:
     found = islands.plan_experiment(
         input_record(wave((0.5, 3.0))), amplifier(), noise_std=0.1, effects=take_effects("offset", "backlash")
     )
     assert found.decisive is None
     assert "this input is sufficient" in plan_text(found)
+
+
+def test_the_figure_has_a_row_and_a_column_for_each_cause(plan: islands.ExperimentPlan) -> None:
+    axes = draw_separability(plan.isolability, "a title").axes[0]
+    rows, columns = axes.get_yticklabels(), axes.get_xticklabels()
+    assert [text.get_text() for text in rows] == [text.get_text() for text in columns]
+    assert [text.get_text() for text in rows] == list(plan.isolability.names)
 
 
 def test_impossible_plans_are_refused() -> None:

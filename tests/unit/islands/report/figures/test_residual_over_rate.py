@@ -42,6 +42,14 @@ def test_the_residual_without_friction_is_a_step_over_the_rate_and_with_it_none(
     assert (below.get_xlabel(), below.get_ylabel()) == ("rate of u (V/s)", "added (um)")
 
 
+def test_the_effect_is_named_in_plain_words() -> None:
+    figure = draw_residual_over_rate(diagnosis())
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == [
+        "without dry friction",
+        "with dry friction",
+    ]
+
+
 def test_a_cause_that_is_not_claimed_or_has_no_rate_has_no_figure() -> None:
     found = diagnosis()
     assert find_rate_effect(found).name == "coulomb-friction"

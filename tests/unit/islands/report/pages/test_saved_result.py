@@ -8,6 +8,7 @@ import pytest
 import islands
 from islands.errors import ModelError
 from islands.report.pages.saved_result import report_saved_result
+from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.identifications import record
 
 SETTINGS = {"library": "polynomial", "degree": 1, "max_terms": 2, "certificate": 0, "average": 1}
@@ -26,6 +27,19 @@ def test_report_of_a_folder_has_its_name_its_day_and_its_figures(folder):
     assert re.search(r'class="origin">\d{4}-\d\d-\d\d · islands ', page)
     assert page.count("<img ") == 1
     assert report_saved_result(folder / "result.json") == report_saved_result(folder)
+
+
+def test_report_of_several_outputs_has_the_equations_and_the_free_run_of_each(tmp_path):
+    data = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
+    result = islands.fit_coupled(data, **SETTINGS)
+    result.save(tmp_path, figures=())
+    (tmp_path / "figures").mkdir()
+    for number in (1, 2):
+        name = json.loads((tmp_path / "result.json").read_text())["outputs"][number - 1]["folder"]
+        (tmp_path / f"figures/free-run-{name.removeprefix('outputs/')}.svg").write_bytes(b"<svg/>")
+    page = report_saved_result(tmp_path).decode()
+    assert "The model of 2 outputs simulates" in page
+    assert page.count("<img ") == 2
 
 
 def test_a_new_result_removes_the_report_of_the_earlier_one(folder):

@@ -7,6 +7,7 @@ import pytest
 
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Site
+from islands.export.extension import export_extended
 from islands.records.dataset import Dataset
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.specification.equations import OdeSpec
@@ -120,3 +121,15 @@ def test_a_system_without_states_is_simulated(tmp_path):
     record = recorded(wave(SAMPLES), wave(SAMPLES))
     spec, expected = extend(make_simulator(OdeSpec.model_validate(document), record), record)
     compare(run_matlab([(spec, record)], tmp_path)[0], expected)
+
+
+def test_the_program_describes_itself():
+    simulator, record = make_case("second-order")
+    spec, _ = extend(simulator, record, [CATALOGUE["coulomb-friction"]])
+    text = export_extended(spec, "matlab")
+    assert text.isascii()
+    assert text.startswith("function y = extended_simulation(u, initial, p)\n")
+    assert "% Effect coulomb-friction: Dry friction: - F sign(x')." in text
+    assert "p.coulomb_friction_F = " in text
+    assert "; % N s^2/m" in text
+    assert max(map(len, text.splitlines())) <= 120
