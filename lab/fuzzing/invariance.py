@@ -9,8 +9,8 @@ the text explains, if only one of the two records is refused, or if the call rai
 error of `islands.errors`. ``--seed S --first N --cases 1`` repeats a case. The exit status is 1 if there is a
 defect.
 
-Offsets move the signals of both records to places where they do not reach zero: the zero of a signal that
-does is a fact about the system, which has another law about another point (decision 0043).
+Offsets move the signals of both records to places far from zero: a zero that a signal reaches, or nearly so,
+may be a fact about the system, which has another law about another point (decision 0043).
 """
 
 import argparse
@@ -165,9 +165,9 @@ def _factor(rng: Generator) -> float:
 
 
 def _shift(rng: Generator, table: Table) -> Table:
-    """Move the middle of each signal to 3 to 3000 ranges on either side of zero."""
+    """Move the mean of each signal to 30 to 3000 ranges on either side of zero."""
     signals = np.column_stack([table.y, table.u])
-    places = rng.choice((-1.0, 1.0), signals.shape[1]) * 10 ** rng.uniform(0.5, 3.5, signals.shape[1])
+    places = rng.choice((-1.0, 1.0), signals.shape[1]) * 10 ** rng.uniform(1.5, 3.5, signals.shape[1])
     signals = signals - signals.mean(axis=0) + places * np.ptp(signals, axis=0)
     return replace(table, u=signals[:, 1:], y=signals[:, 0])
 

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from islands.errors import RecordError, SettingsError, check_seed
 from islands.estimation.structure_selection.deviations import (
+    LARGE_OFFSET,
     SHIFTABLE,
     Offsets,
     find_offsets,
@@ -295,7 +296,7 @@ def _check_validation_length(validation: Dataset, settings: Settings) -> None:
 def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     # A function such as a square root of a deviation differs from that of the signal.
     is_shiftable = SHIFTABLE.issuperset(settings.primitives)
-    return find_offsets(record, settings.constraints) if is_shiftable else no_offsets(record)
+    return find_offsets(record, settings.constraints, LARGE_OFFSET) if is_shiftable else no_offsets(record)
 
 
 def _make_statistics(state: SearchState, hall_of_fame: HallOfFame, problem: Problem) -> SearchStatistics:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from typing import TypedDict
 
 from islands.available_cpus import count_cpus
@@ -20,8 +20,10 @@ from islands.estimation.forward_selection import (
 from islands.estimation.structure_selection.certificate import (
     Certificate,
     SubsetSearch,
+    combine_certificates,
 )
 from islands.estimation.structure_selection.deviations import (
+    LARGE_OFFSET,
     Offsets,
     add_offsets,
     find_offsets,
@@ -134,12 +136,12 @@ class LibraryFit:
         All models that were estimated.
     warm_up : int
         Number of samples before the first prediction.
-    search : SubsetSearch or None
-        Search for subsets of the library; None without exchanges.
-    subsets : tuple of Structure
-        Subsets of the search from which the fit started.
+    searches : tuple of SubsetSearch
+        Searches for subsets of the library, one for the signals as recorded and one for their deviations.
+    subsets : tuple of tuple of Structure
+        Subsets of each search from which the fit started.
     refit : callable
-        Fits the library again, with other subsets in place of those of the search.
+        Fits the library again, with other subsets in place of those of the searches.
     steps : Steps
         Steps of the fit, with those that were left out.
     """
@@ -148,9 +150,9 @@ class LibraryFit:
     average: int
     estimates: list[ValidatedModel[DynamicModel]]
     warm_up: int
-    search: SubsetSearch | None
-    subsets: Subsets
-    refit: Callable[[Subsets], "LibraryFit"]
+    searches: tuple[SubsetSearch, ...]
+    subsets: tuple[Subsets, ...]
+    refit: Callable[[Sequence[Subsets]], "LibraryFit"]
     steps: Steps
 
     @property
@@ -170,12 +172,14 @@ class LibraryFit:
         890 searches on 36 records. The library is then fitted again from these subsets.
         """
         settings, steps = self.found.settings, self.steps
-        certificates = steps.attempt(CERTIFICATES, self._certify) or ()
-        subsets = tuple(each.structure for each in certificates)
-        is_known = subsets == self.subsets[: len(subsets)]
-        fit = (None if is_known else steps.attempt(_REFIT, partial(self._fit_again, subsets))) or self
+        tables = steps.attempt(CERTIFICATES, self._certify) or []
+        subsets = [tuple(each.structure for each in table) for table in tables]
+        known = [each[: len(some)] for each, some in zip(self.subsets, subsets, strict=False)]
+        again = None if subsets == known else steps.attempt(_REFIT, partial(self._fit_again, subsets))
+        fit = again or self
+        certificates = {each.terms: each for each in (reduce(combine_certificates, tables) if tables else ())}
         found = state_steps(fit.found, fit.steps)
-        search = replace(found.search, certificates={each.terms: each for each in certificates})
+        search = replace(found.search, certificates=certificates)
         found = replace(found, search=search, settings=settings)
         delays = [delay // fit.average for delay in settings["delays"]]
         shooting = count_means(settings["shooting"], fit.average)
@@ -183,12 +187,12 @@ class LibraryFit:
         banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, steps)
         return with_average(banded, fit.average)
 
-    def _certify(self) -> tuple[Certificate, ...]:
-        if self.search is None:
-            return ()
-        return self.search.certify(self.found.settings["certificate"], partial(self.steps.skip, CERTIFICATES))
+    def _certify(self) -> list[tuple[Certificate, ...]]:
+        """Return the certificates of every search."""
+        skip = partial(self.steps.skip, CERTIFICATES)
+        return [each.certify(self.found.settings["certificate"], skip) for each in self.searches]
 
-    def _fit_again(self, subsets: Subsets) -> "LibraryFit":
+    def _fit_again(self, subsets: Sequence[Subsets]) -> "LibraryFit":
         """Return the fit of other subsets, unless a stop is requested before its end."""
         fit = self.refit(subsets)
         if fit.steps.left_out:
@@ -204,7 +208,7 @@ def fit_library(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-    subsets: Subsets = (),
+    subsets: Sequence[Subsets] = (),
 ) -> LibraryFit:
     """Fit models of increasing size from one library and rank them on the validation data.
 
@@ -223,8 +227,8 @@ def fit_library(
     stop : callable, optional
         Called between all steps. Once it returns true and structures are known, the best one of every size
         is estimated, and the other steps are left out; the result is marked as stopped and names them.
-    subsets : tuple of Structure
-        Subsets of the library; by default those that exchanges find.
+    subsets : sequence of tuple of Structure
+        Subsets for every search; by default those that exchanges find.
 
     Raises
     ------
@@ -246,14 +250,9 @@ def fit_library(
     split = select_feedthrough(split, settings.feedthrough, rated)
     interval = count_means(shooting, samples)
     swaps = rated.make_settings(settings.max_terms, interval)
-    offsets = find_offsets(split.estimation, swaps.constraints)
-    deviations = Split(*(subtract_offsets(part, offsets) for part in (split.estimation, split.validation)))
-    pool = rated.screen(deviations.estimation)
-    warm_up = max(item.maximum_lag for item in pool)
-    structures, subset_search, subsets = _select(
-        pool, deviations, swaps, bool(settings.certificate), subsets, steps
-    )
-    models, outcomes = _estimate(structures, offsets, split, settings, swaps, warm_up, steps)
+    exchange = bool(settings.certificate)
+    structures, searches, started, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
+    models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
     simulated = _fit_simulations(split, rated, settings, swaps, warm_up, steps)
     models += simulated
     outcomes["ok"] += len(simulated)
@@ -285,7 +284,7 @@ def fit_library(
         progress(text, None)  # the fraction never falls
 
     refit = partial(fit_library, record, start, library, settings, seed, report_again, stop)
-    return LibraryFit(result, samples, estimates, warm_up, subset_search, subsets, refit, steps)
+    return LibraryFit(result, samples, estimates, warm_up, searches, started, refit, steps)
 
 
 def _as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
@@ -294,8 +293,7 @@ def _as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
 
 
 def _estimate(
-    structures: Sequence[Structure],
-    offsets: Offsets,
+    structures: Sequence[tuple[Structure, Offsets]],
     split: Split,
     settings: FitSettings,
     swaps: Settings,
@@ -310,7 +308,7 @@ def _estimate(
     criterion = make_criterion(settings.selecting_estimator, interval)
     found: list[Assessment | EvaluationOutcome | None] = [None] * len(structures)
     by_size: dict[int, list[int]] = {}
-    for place, structure in enumerate(structures):
+    for place, (structure, _) in enumerate(structures):
         by_size.setdefault(len(structure), []).append(place)
 
     def estimate_size(size: int) -> None:
@@ -320,8 +318,8 @@ def _estimate(
             )
             if not is_needed and steps.skip("estimation of further structures"):
                 continue
-            structure = add_offsets(structures[place], offsets)
-            estimated = estimate(structure, split.estimation, constraints, warm_up)
+            structure, offsets = structures[place]
+            estimated = estimate(add_offsets(structure, offsets), split.estimation, constraints, warm_up)
             if not isinstance(estimated, EvaluationOutcome):
                 estimated = estimate_with(
                     settings.selecting_estimator, estimated, split.estimation, constraints, warm_up, interval
@@ -381,27 +379,43 @@ def _describe_outcomes(outcomes: Mapping[str, int]) -> str:
 
 
 def _select(
-    pool: Sequence[Regressor],
     split: Split,
+    library: TrialLibrary,
     settings: Settings,
     exchange: bool,
-    subsets: Subsets,
+    subsets: Sequence[Subsets],
     steps: Steps,
-) -> tuple[list[Structure], SubsetSearch | None, Subsets]:
-    """Return structures of a library, the search for subsets of it, and the subsets from which it started."""
-    steps(f"inner products of {len(pool)} candidates", 0.0)
-    problem = make_selection_problem(pool, split.estimation, settings.constraints)
-    if isinstance(problem, EvaluationOutcome):
-        raise SettingsError(f"nothing can be fitted with these settings: {problem}")
-    starts = list(select_forward(problem, settings.max_terms))
-    steps.report(f"best subsets of {len(pool)} candidates", 0.0)
-    search = SubsetSearch(problem, settings.max_terms) if exchange else None
-    if search:
-        subsets = subsets or search.structures
-        starts += subsets
-    exchanged = select_pool(pool, problem, settings.max_terms)
-    structures = [*starts, *_search_swaps(exchanged, starts, split, settings, steps)]
-    return list(dict.fromkeys(structures)), search, subsets
+) -> tuple[list[tuple[Structure, Offsets]], tuple[SubsetSearch, ...], tuple[Subsets, ...], int]:
+    """Return structures with the offsets of their signals, searches, their subsets, and the largest lag."""
+    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
+    # in deviations from it. The validation data tell which one holds.
+    record, constraints = split.estimation, settings.constraints
+    tried = [find_offsets(record, constraints, limit) for limit in (LARGE_OFFSET, 0.0)]
+    structures: list[tuple[Structure, Offsets]] = []
+    searches: list[SubsetSearch] = []
+    started: list[Subsets] = []
+    warm_up = 0
+    for offsets in dict.fromkeys(tried):
+        deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
+        pool = library.screen(deviations.estimation)
+        warm_up = max(item.maximum_lag for item in pool)
+        if structures and steps.skip("structures in deviations from the operating point"):
+            break
+        steps(f"inner products of {len(pool)} candidates", 0.0)
+        problem = make_selection_problem(pool, deviations.estimation, constraints)
+        if isinstance(problem, EvaluationOutcome):
+            raise SettingsError(f"nothing can be fitted with these settings: {problem}")
+        starts = list(select_forward(problem, settings.max_terms))
+        steps.report(f"best subsets of {len(pool)} candidates", 0.0)
+        if exchange:
+            searches.append(SubsetSearch(problem, settings.max_terms))
+            is_given = len(searches) <= len(subsets)
+            started.append(subsets[len(searches) - 1] if is_given else searches[-1].structures)
+            starts += started[-1]
+        exchanged = select_pool(pool, problem, settings.max_terms)
+        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
+        structures += [(structure, offsets) for structure in chosen]
+    return list(dict.fromkeys(structures)), tuple(searches), tuple(started), warm_up
 
 
 def _search_swaps(

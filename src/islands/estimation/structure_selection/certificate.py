@@ -7,7 +7,7 @@ rounding of the inner products: a candidate that depends on others except for ro
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from math import sqrt
 from threading import Event
@@ -152,6 +152,16 @@ class SubsetSearch:
     def _compose(self, positions: NDArray[np.int64]) -> Structure:
         """Return the structure of some positions."""
         return self._problem.compose([int(self._usable[each]) for each in positions if each >= 0])
+
+
+def combine_certificates(
+    one: tuple[Certificate, ...], other: tuple[Certificate, ...]
+) -> tuple[Certificate, ...]:
+    """Return certificates that hold for two libraries."""
+    return tuple(
+        replace(min(first, second, key=lambda each: each.bound), nodes=first.nodes + second.nodes)
+        for first, second in zip(one, other, strict=False)
+    )
 
 
 def _make_tree(gram: NDArray[np.float64]) -> tuple[NDArray[np.int64], Tree]:

@@ -1,6 +1,6 @@
 """Deviations of signals from their operating point, in which structures are selected.
 
-The zero of a unit is no fact about a system whose signals do not reach it: 20 degC is 293.15 K. Structures
+The zero of a unit says nothing about a system whose signals are far from it: 20 degC is 293.15 K. Structures
 are therefore selected in deviations from a value of the record, which is the same one in every unit. In the
 units of the record, the powers of a pressure of 101300 Pa that varies by 100 Pa are proportional to each
 other in floating point: their inner products have no digits left that distinguish them. A structure in
@@ -21,6 +21,9 @@ from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
 from islands.records.dataset import Dataset
 
+#: Median in standard deviations from which the powers of a signal are too similar for inner products.
+LARGE_OFFSET = 30.0
+
 #: Functions whose expressions keep their form in deviations: polynomials and differences of lags.
 SHIFTABLE = frozenset({"mul", "add", "sub", "phi1", "phi2", "square", "cube"})
 
@@ -35,17 +38,18 @@ def no_offsets(record: Dataset) -> Offsets:
     return (0.0,) * (1 + record.inputs)
 
 
-def find_offsets(record: Dataset, constraints: str = "none") -> Offsets:
+def find_offsets(record: Dataset, constraints: str = "none", least: float = 0.0) -> Offsets:
     """Return the medians of the signals that do not reach zero, and 0 for the others.
 
-    All offsets are 0 under constraints that state something about the signals themselves.
+    A signal is left as it is if its median is not larger than ``least`` standard deviations, and all are
+    under constraints that state something about the signals themselves.
     """
     if not constraint(constraints).allows_offsets:
         return no_offsets(record)
-    return tuple(map(_find_offset, (record.y[~np.isnan(record.y)], *record.u.T)))
+    return tuple(_find_offset(signal, least) for signal in (record.y[~np.isnan(record.y)], *record.u.T))
 
 
-def _find_offset(signal: NDArray[np.float64]) -> float:
+def _find_offset(signal: NDArray[np.float64], least: float) -> float:
     if signal.size < 2:
         return 0.0
     low, high = signal.min(), signal.max()
@@ -54,7 +58,8 @@ def _find_offset(signal: NDArray[np.float64]) -> float:
     beyond = (high - low) / (signal.size - 1)
     if low == high or low - beyond <= 0.0 <= high + beyond:
         return 0.0
-    return float(np.partition(signal, signal.size // 2)[signal.size // 2])
+    middle = float(np.partition(signal, signal.size // 2)[signal.size // 2])
+    return middle if abs(middle) > least * np.std(signal - middle) else 0.0
 
 
 def subtract_offsets(record: Dataset, offsets: Offsets) -> Dataset:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import islands
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import make_selection_problem, select_forward
-from islands.estimation.structure_selection.certificate import SubsetSearch
+from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.expressions.tree import Lagged
 from islands.models.candidate_library import candidates
 from islands.program.regressor_matrix import regressor_matrix
@@ -123,6 +123,19 @@ def test_gap_is_the_possible_reduction_of_the_error():
     assert certificate.gap(0.5 * certificate.bound) == 0.0
     assert not certificate.proves(1.001 * certificate.bound)
     assert SubsetSearch(problem, 2).certify(0) == ()
+
+
+def test_combined_certificates_hold_for_both_libraries():
+    record = measured()
+    small, large = (
+        SubsetSearch(make_selection_problem(candidates("polynomial", degree, LAGS, 1), record), 3).certify(
+            500
+        )
+        for degree in (1, 2)
+    )
+    for both, one, other in zip(combine_certificates(small, large), small, large, strict=True):
+        assert both.bound == min(one.bound, other.bound)
+        assert both.nodes == one.nodes + other.nodes
 
 
 def test_fit_reports_the_gap_of_every_model():
