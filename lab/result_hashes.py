@@ -28,7 +28,7 @@ import numpy as np
 Hashes = dict[str, str]
 
 COLUMNS = ("--input", "u_V", "--output", "y_um")
-SEARCH = ("--population", "40", "--generations", "40", "--islands", "3", "--seed", "3")
+SEARCH = ("--set", "population=40", "--generations", "40", "--islands", "3", "--seed", "3")
 PROGRAM = """
 import numpy as np
 
@@ -181,18 +181,16 @@ def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
             *COLUMNS,
             "--preset",
             "hysteresis",
-            "--topology",
-            "star",
-            "--character",
-            "plain",
-            "--character",
-            "explorer",
-            "--migrants",
-            "2",
-            "--emigrants",
-            "front",
-            "--replaced",
-            "random",
+            "--set",
+            "topology=star",
+            "--set",
+            "characters=plain,explorer",
+            "--set",
+            "migrants=2",
+            "--set",
+            "emigrants=front",
+            "--set",
+            "replaced=random",
         ),
         "narx": ("s1.csv", *of_s1, "--preset", "narx"),
     }

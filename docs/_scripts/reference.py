@@ -4,7 +4,7 @@ Every list comes from a table of the code. The other modules ``reference_*`` gen
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, asdict, fields
+from dataclasses import MISSING, asdict
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from islands.models.candidate_library import LIBRARIES
 from islands.models.latent import STRUCTURE_SUMMARIES
 from islands.records.reading import READERS
 from islands.report.figures.registry import FIGURES, SEARCH_FIGURES
+from islands.settings_schema import list_settings
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES
@@ -38,20 +39,14 @@ DOCS = Path(__file__).parents[1]
 
 def search_settings() -> str:
     """Return the page of presets and settings of a search."""
-    described = attributes(Settings)
-    rows = (
-        (code(field.name), code(field.type), code(_shown(field.default)), escape(described[field.name]))
-        for field in fields(Settings)
-    )
     return page(
-        "Settings of a search",
-        "Presets and settings of `islands identify`, `islands.identify` and `POST /v1/jobs`. A preset is a "
-        "set of settings; each setting can be changed in addition.",
+        "Settings",
+        "Presets and settings. A preset of a search is a set of settings; each can be changed, too: by "
+        "`--set NAME=VALUE`, by the argument of a function in Python, and in `settings` of `POST /v1/jobs`.",
         section("Presets", _presets()),
-        section(
-            "Settings",
-            "A default holds unless the preset has another value.",
-            table(("Setting", "Type", "Default", "Meaning"), rows),
+        *(
+            section(_title(cls), f"Of {codes(names)}.", _settings(cls))
+            for cls, names in reference_cli.settings().items()
         ),
         section("Gene structures", "Values of `structure`.", entries("Structure", STRUCTURES)),
         section(
@@ -65,6 +60,18 @@ def search_settings() -> str:
         section("Parameter constraints", "Values of `constraints`.", entries("Constraint", CONSTRAINTS)),
         section("Candidate libraries", "Values of `library`, and of `islands fit --library`.", _libraries()),
     )
+
+
+def _title(cls: type) -> str:
+    return str(cls.__doc__).partition(":")[0].partition(".")[0].replace("`", "")
+
+
+def _settings(cls: type) -> str:
+    rows = (
+        (code(name), values, code(_shown(info.default)), escape(str(info.description)))
+        for name, info, values in list_settings(cls)
+    )
+    return table(("Setting", "Values", "Default", "Meaning"), rows)
 
 
 def _presets() -> str:
@@ -140,7 +147,7 @@ def primitives() -> str:
     )
     return page(
         "Primitives",
-        "Functions that may occur in expressions, by names that `--primitive` and `islands.parse` take.",
+        "Functions that may occur in expressions, by names that `primitives` and `islands.parse` take.",
         table(("Primitive", "Call", "Value", "Parity", "Commutative"), rows),
         "`islands.primitive` defines further ones: see [expressions](expressions.md).\n",
     )

@@ -4,10 +4,10 @@ import inspect
 from collections.abc import Iterator
 from typing import Any, get_args
 
-from tables import attributes, code, escape, page, section, table
+from tables import code, escape, page, section, table
 from typer.main import get_command
 
-from islands.evolution.settings import Settings
+from islands.cli.settings_options import list_classes
 from islands_api.cli.app import app
 
 
@@ -25,6 +25,15 @@ def _walk(name: str, command: Any) -> Iterator[tuple[str, Any]]:
 def options(command: Any) -> list[Any]:
     """Return the options of a command that are shown in its help."""
     return [each for each in command.params if each.param_type_name == "option" and not each.hidden]
+
+
+def settings() -> dict[type, list[str]]:
+    """Return the classes of settings, with the commands that have them."""
+    found: dict[type, list[str]] = {}
+    for name, command in commands():
+        for cls in list_classes(command):
+            found.setdefault(cls, []).append(name)
+    return found
 
 
 def cli() -> str:
@@ -72,9 +81,9 @@ def _type(option: Any) -> str:
 
 
 def _meaning(option: Any) -> str:
-    """Return the help of an option, or the description of the setting of a search that it has the name of."""
+    """Return the help of an option."""
     # The command line escapes brackets, which are markup there.
-    return option.help.replace("\\[", "[") or attributes(Settings).get(option.name, "")
+    return str(option.help.replace("\\[", "["))
 
 
 def _default(option: Any) -> str:

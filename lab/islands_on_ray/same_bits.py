@@ -23,7 +23,7 @@ from islands.systems.catalogue import make_record
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import actors, eventually
 
-JOB = ("--preset", "paper-case1", "--population", "100", "--generations", "120", "--islands", "3")
+JOB = ("--preset", "paper-case1", "--set", "population=100", "--generations", "120", "--islands", "3")
 
 
 class Job:

@@ -277,7 +277,7 @@ ROWS: Mapping[str, Row] = {
     "case1": command(
         "case 1, 500 x 500, two islands",
         *("identify", "piezo.csv", *PIEZO, "--preset", "paper-case1", "--seed", "1"),
-        *("--population", "500", "--generations", "500", "--islands", "2"),
+        *("--set", "population=500", "--generations", "500", "--islands", "2"),
         out=True,
     ),
     "rate": rate(20_000),

@@ -1,7 +1,7 @@
 """Base classes of all deliberate errors. A message says what is wrong, where, and what to do."""
 
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 from math import isfinite, nan
@@ -80,9 +80,21 @@ class ExtrapolationWarning(UserWarning):
 
 
 @contextmanager
-def command_line_names() -> Iterator[None]:
-    """Let messages name options as on the command line, in this process."""
-    _names.append(name_flag)
+def command_line_names(settings: Container[str] = ()) -> Iterator[None]:
+    """Let messages name options as on the command line, in this process.
+
+    Parameters
+    ----------
+    settings : container of str
+        Names that no option but ``--set`` gives.
+    """
+
+    def name(option: str, value: object) -> str:
+        if option not in settings:
+            return name_flag(option, value)
+        return f"--set {option}=" if value is None else f"--set {shlex.quote(write_setting(option, value))}"
+
+    _names.append(name)
     try:
         yield
     finally:
@@ -90,7 +102,7 @@ def command_line_names() -> Iterator[None]:
 
 
 def name_option(name: str, value: object = None, example: object = None) -> AdvisedText:
-    """Return an option as the caller gives it: ``gaps="split"``, or ``--gaps split`` on the command line.
+    """Return an option as the caller gives it: ``dt=0.1``, or ``--dt 0.1`` on the command line.
 
     Parameters
     ----------
@@ -114,7 +126,7 @@ def name_option(name: str, value: object = None, example: object = None) -> Advi
 
 
 def name_without_value(name: str) -> str:
-    """Return an option as the subject of a sentence: ``gaps``, or ``--gaps`` on the command line."""
+    """Return an option as the subject of a sentence: ``dt``, or ``--dt`` on the command line."""
     return name_option(name).removesuffix("=")
 
 
@@ -130,12 +142,15 @@ def _format(value: object) -> str:
 
 
 def name_flag(name: str, value: object = None) -> str:
-    """Return an option of the command line: ``--time-unit d``, or ``--no-header`` for the value False."""
+    """Return an option of the command line: ``--dt 0.1``."""
     flag = f"--{name.replace('_', '-')}"
-    if value is False:
-        return f"--no-{flag[2:]}"
+    return flag if value is None else f"{flag} {shlex.quote(_format(value))}"
+
+
+def write_setting(name: str, value: object) -> str:
+    """Return a setting as a value of ``--set``: ``gaps=split``."""
     text = ",".join(map(str, value)) if isinstance(value, list | tuple) else _format(value)
-    return flag if value is None else f"{flag} {shlex.quote(text)}"
+    return f"{name}={text.lower() if isinstance(value, bool) else text}"
 
 
 #: Functions that name an option; the last one is used.
@@ -218,19 +233,6 @@ def check_integers(**values: object) -> None:
             raise SettingsError(f"{name} is an integer, got {abbreviate(value)}")
 
 
-def check_texts(**values: object) -> None:
-    """Check that settings, which are given by name, are texts or None.
-
-    Raises
-    ------
-    SettingsError
-        A value is not.
-    """
-    for name, value in values.items():
-        if value is not None and not isinstance(value, str):
-            raise SettingsError(f"{name} is a text, got {abbreviate(value)}")
-
-
 def check_sequences(**values: object) -> None:
     """Check that settings, which are given by name, are sequences and not texts.
 
@@ -302,17 +304,3 @@ def check_numbers(**values: object) -> None:
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, Real):
             raise SettingsError(f"{name} is a number, got {abbreviate(value)}")
-
-
-def check_probabilities(**values: float) -> None:
-    """Check that settings, which are given by name, lie between 0 and 1.
-
-    Raises
-    ------
-    SettingsError
-        A value is not a probability.
-    """
-    check_numbers(**values)
-    for name, value in values.items():
-        if not 0.0 <= value <= 1.0:
-            raise SettingsError(f"{name} lies between 0 and 1, got {value}")

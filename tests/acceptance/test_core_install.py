@@ -26,7 +26,18 @@ HIDDEN = (
 
 COLUMNS = ("--input", "u_V", "--output", "y_um")
 
-SEARCH = ("--population", 20, "--generations", 1, "--max-terms", 3, "--shooting", 50, "--islands", 2)
+SEARCH = (
+    "--set",
+    "population=20",
+    "--generations",
+    1,
+    "--max-terms",
+    3,
+    "--set",
+    "shooting=50",
+    "--islands",
+    2,
+)
 
 
 @pytest.fixture(scope="module")

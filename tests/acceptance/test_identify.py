@@ -79,7 +79,7 @@ def test_run_ended_by_its_budget_resumes_to_the_same_models(folder: Path) -> Non
     with undrawn_figures():
         succeed(
             *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
-            *("--max-evaluations", 90, "--test", 0.2, "--out", out),
+            *("--set", "max_evaluations=90", "--test", 0.2, "--out", out),
         )
         assert stored(out)["search"]["ended_by"] == "evaluations"
         assert stored(out)["search"]["generations"] < 6
@@ -143,5 +143,8 @@ def test_changed_record_is_rejected_on_resuming(folder: Path) -> None:
 
 def test_invalid_budget_is_rejected_in_one_line(folder: Path) -> None:
     base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
-    assert fail(*base, "--population", 0).strip() == "error: population is at least 1, got 0"
+    assert (
+        fail(*base, "--set", "population=0").strip()
+        == "error: population is an integer of at least 1, got '0'"
+    )
     assert not (folder / "never").exists()

@@ -9,9 +9,18 @@ from support.undrawn import undrawn_figures
 
 #: Options of three islands with a migration schedule.
 ISLANDS = (
-    *("--generations", 6, "--islands", 3, "--topology", "bidirectional-ring"),
-    *("--migrate-every", "2,4:1", "--migrants", 2, "--emigrants", "front", "--replaced", "random"),
-    *("--character", "plain", "--character", "explorer"),
+    *("--generations", 6, "--islands", 3, "--set", "topology=bidirectional-ring"),
+    *(
+        "--set",
+        "migrate_every=2,4:1",
+        "--set",
+        "migrants=2",
+        "--set",
+        "emigrants=front",
+        "--set",
+        "replaced=random",
+    ),
+    *("--set", "characters=plain,explorer"),
 )
 
 
@@ -53,7 +62,7 @@ def test_result_contains_the_settings_of_the_islands(folder: Path) -> None:
 @pytest.mark.nightly
 def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
     out = folder / "moved"
-    printed = identify(folder, "moved", *ISLANDS, "--max-evaluations", 250, "--engine", "ray")
+    printed = identify(folder, "moved", *ISLANDS, "--set", "max_evaluations=250", "--engine", "ray")
     assert "MAPE val. %" in printed
     # Three islands of thirty: generation 2 is the first end of an epoch after 250 individuals.
     assert stored(out)["search"]["ended_by"] == "evaluations"
@@ -71,12 +80,12 @@ def test_invalid_island_options_are_rejected_in_one_line(folder: Path) -> None:
     for options, message in (
         (("--islands", 0), "islands is at least 1, got 0"),
         (("--islands", 1_000_000), "at most 10000 islands"),
-        (("--topology", "spiral"), "unknown topology 'spiral': take one of isolated, ring"),
-        (("--islands", 3, "--topology", "0>7"), "does not join two of the islands 0 to 2"),
-        (("--migrate-every", "often"), "cannot read migrate_every 'often'"),
+        (("--set", "topology=spiral"), "unknown topology 'spiral': take one of isolated, ring"),
+        (("--islands", 3, "--set", "topology=0>7"), "does not join two of the islands 0 to 2"),
+        (("--set", "migrate_every=often"), "cannot read migrate_every 'often'"),
         (("--engine", "steam"), "unknown engine 'steam': take one of serial, ray"),
-        (("--character", "grumpy"), "unknown character 'grumpy'"),
-        (("--ray-address", "127.0.0.1:9"), "no Ray cluster answers at 127.0.0.1:9"),
+        (("--set", "characters=grumpy"), "unknown character 'grumpy'"),
+        (("--set", "ray_address=127.0.0.1:9"), "no Ray cluster answers at 127.0.0.1:9"),
     ):
         assert message in fail(*base, *options)
     assert not (folder / "never/result.json").exists()

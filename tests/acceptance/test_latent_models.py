@@ -84,7 +84,7 @@ def test_settings_of_narx_models_are_refused(folder):
 
 def test_constraints_of_an_option_hold_and_are_stated(folder, tmp_path):
     search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
-    budget = ("--preset", "latent", "--islands", "1", "--population", "6", "--generations", "1")
+    budget = ("--preset", "latent", "--islands", "1", "--set", "population=6", "--generations", "1")
     text = "fixed-point = 0, 0.3; gain = 0.564"
     succeed(*search, *budget, "--constraints", text, "--out", tmp_path / "out")
     found = islands.load(tmp_path / "out")
@@ -107,10 +107,10 @@ def test_constraints_of_an_option_hold_and_are_stated(folder, tmp_path):
 
 
 def test_a_structure_is_that_of_latent_models(folder):
-    columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused", "--structure")
-    text = fail("fit", folder / "spring.csv", *columns, "wiener")
+    columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused", "--set")
+    text = fail("fit", folder / "spring.csv", *columns, "structure=wiener")
     assert "a structure is a setting of latent models: leave it out, or --model latent" in text
-    text = fail("fit", folder / "spring.csv", *columns, "wienr", "--model", "latent")
+    text = fail("fit", folder / "spring.csv", *columns, "structure=wienr", "--model", "latent")
     assert "Did you mean 'wiener'?" in text
 
 
@@ -128,13 +128,13 @@ def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
         "latent",
         "--islands",
         "2",
-        "--population",
-        "6",
+        "--set",
+        "population=6",
         "--generations",
         "2",
-        "--structure",
+        "--set",
     )
-    succeed(*search, *budget, "wiener", "--out", tmp_path / "out")
+    succeed(*search, *budget, "structure=wiener", "--out", tmp_path / "out")
     found = islands.load(tmp_path / "out")
     assert found.settings["structure"] == "wiener"
     models = [entry.model for entry in found.models]
@@ -144,9 +144,9 @@ def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     assert "for 2 generations of 6 offspring" in method
     assert "no unit acts on the states" in method
     assert "full polynomial set" not in method
-    text = fail(*search, *budget, "phi", "--out", tmp_path / "refused")
+    text = fail(*search, *budget, "structure=phi", "--out", tmp_path / "refused")
     assert "unknown structure of latent models 'phi': take one of auto, wiener" in text
-    text = fail(*search, "--structure", "wiener", "--out", tmp_path / "refused")
+    text = fail(*search, "--set", "structure=wiener", "--out", tmp_path / "refused")
     assert "unknown structure of narx models 'wiener'" in text
 
 

@@ -107,7 +107,7 @@ def test_the_command_estimates_a_class_again_on_all_data(record, result, tmp_pat
     islands.write_record(record, tmp_path / "oven.csv")
     folder, columns = tmp_path / "out", ("--input", "u_V", "--output", "y_K", "--model", "gain-scheduled")
     with undrawn_figures():
-        text = succeed("fit", tmp_path / "oven.csv", *columns, "--refit", "all", "--out", folder)
+        text = succeed("fit", tmp_path / "oven.csv", *columns, "--set", "refit=all", "--out", folder)
     assert f"estimated again on all {record.samples} samples" in " ".join(text.split())
     found = islands.load(folder).best
     assert found.is_refitted

@@ -57,7 +57,7 @@ def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
     waits = "waiting for capacity: 0 of 2 island actors are ready, the others need a CPU each"
-    reason = "the record has a gap of 3 s after sample 400: give --gaps split"
+    reason = "the record has a gap of 3 s after sample 400: give --set gaps=split"
     job = desk.submit(500)
     page = quiet(desk.url).go()
     with stored(desk) as store:

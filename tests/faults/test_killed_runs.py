@@ -11,7 +11,7 @@ from support.command_line import BUDGET, COLUMNS, ISLANDS, found, stored, succee
 from support.processes import actors, alive, descendants, eventually, kill
 from support.undrawn import undrawn_figures
 
-JOB = (*COLUMNS, *BUDGET, "--islands", "2", "--migrate-every", "1")
+JOB = (*COLUMNS, *BUDGET, "--islands", "2", "--set", "migrate_every=1")
 
 
 @pytest.fixture(scope="module")

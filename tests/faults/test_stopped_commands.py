@@ -17,7 +17,7 @@ import pytest
 from support.command_line import ISLANDS, succeed, write_offset
 
 #: Options of an evolution that takes some seconds.
-SEARCH = ("--generations", "40", "--population", "60", "--max-terms", "6")
+SEARCH = ("--generations", "40", "--set", "population=60", "--max-terms", "6")
 
 PIEZO = ("piezo.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:1000")
 TWO = ("two.csv", "--input", "u_V", "--output", "x_V,y_V")

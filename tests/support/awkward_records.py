@@ -564,7 +564,7 @@ AWKWARD_RECORDS = (
         text(lambda m: table((), plain(m)[1:])),
         ("c1",),
         "c2",
-        given=("--no-header", "--dt", "0.1"),
+        given=("--set", "header=false", "--dt", "0.1"),
     ),
     AwkwardRecord(
         "properties in the first samples",
@@ -573,7 +573,7 @@ AWKWARD_RECORDS = (
         text(properties),
         ("c4",),
         "c5",
-        given=("--no-header", "--time", "c3"),
+        given=("--set", "header=false", "--set", "time=c3"),
     ),
     AwkwardRecord("fixed width", "square", "r.dat", text(fixed_width), ("Druck",), "Kraft"),
     AwkwardRecord(

@@ -17,7 +17,7 @@ COLUMNS = ("--input", "u_V", "--output", "y_um")
 
 #: Settings of a search on that record that takes a second.
 BUDGET = (
-    *("--preset", "hysteresis", "--population", "30", "--max-terms", "5", "--shooting", "200"),
+    *("--preset", "hysteresis", "--set", "population=30", "--max-terms", "5", "--set", "shooting=200"),
     *("--seed", "2"),
 )
 

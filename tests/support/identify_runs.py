@@ -9,19 +9,19 @@ from islands.records.dataset import Dataset
 SMALL = (
     "--preset",
     "hysteresis",
-    "--population",
-    "10",
+    "--set",
+    "population=10",
     "--generations",
     "3",
     "--max-terms",
     "3",
-    "--shooting",
-    "50",
-    "--max-height",
-    "3",
+    "--set",
+    "shooting=50",
+    "--set",
+    "max_height=3",
 )
 #: Options with one generation per epoch.
-STEPWISE = (*SMALL, "--migrate-every", "1")
+STEPWISE = (*SMALL, "--set", "migrate_every=1")
 #: Options with two islands in this process.
 TWO = (*STEPWISE, "--islands", "2", "--engine", "serial")
 #: Columns of the record.

@@ -54,7 +54,7 @@ EXCLUSIVE = (
     (r"Good for: no use that", r"no structure is left in the"),
     (r"one step ahead, no structure is left", r"error one step ahead is \S+ times the noise level"),
     (r"No model found", r"(As a simulation: (good|usable)|Recommended: model|no structure is left in the)"),
-    (r"No model found", r"Next: [^.]*(--estimator|estimator=|islands simulate)"),
+    (r"No model found", r"Next: [^.]*(estimator=|islands simulate)"),
     (r"drifts by [\d.e+]+ % of its range at constant input", r"Physics: .*Property 1 holds.* Fails at:"),
 )
 

@@ -1,9 +1,7 @@
 """Specifications of jobs: everything that determines the result, validated without the data."""
 
-import inspect
 import re
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -14,14 +12,14 @@ from pydantic import (
     Field,
     FiniteFloat,
     ValidationError,
-    create_model,
 )
 
 from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO, PRESET_NAMES
-from islands.evolution.settings import Settings, get_text_type
+from islands.evolution.settings import Settings
 from islands.persistence.models import MODEL_CLASSES, NARX
+from islands.settings_schema import make_changes_model
 from islands.simulators.specification.table import ColumnSpec, SimulationSpec, innermost
 from islands_service.domain.uploaded_fmu import UploadedFmuSpec
 
@@ -57,38 +55,16 @@ DatasetId = Annotated[
 MAX_RECORDINGS = 64
 
 
-def _read_descriptions() -> dict[str, str]:
-    """Return the description of every setting from the docstring of `Settings`."""
-    text = inspect.cleandoc(Settings.__doc__ or "").partition("----------\n")[2]
-    found = {}
-    for names, meaning in re.findall(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)+)", text, re.MULTILINE):
-        for name in names.split(", "):
-            found[name] = " ".join(meaning.split())
-    return found
-
-
-def _make_settings_model() -> type[BaseModel]:
-    described = _read_descriptions()
-    types: dict[str, Any] = {
-        each.name: (
-            get_text_type(each) | None,
-            Field(default=None, description=described[each.name]),
-        )
-        for each in fields(Settings)
-    }
-    return create_model(
-        "SettingsChanges",
-        __config__=ConfigDict(
-            extra="forbid",
-            frozen=True,
-            allow_inf_nan=False,  # JSON cannot represent them, so no response could contain the job
-            title="Settings that differ from the preset's",
-        ),
-        **types,
-    )
-
-
-SettingsChanges = _make_settings_model()
+SettingsChanges = make_changes_model(
+    Settings,
+    "SettingsChanges",
+    ConfigDict(
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,  # JSON cannot represent them, so no response could contain the job
+        title="Settings that differ from the preset's",
+    ),
+)
 
 
 class Part(BaseModel):

@@ -61,6 +61,7 @@ COMMANDS = make_commands(
         "changed.",
         "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
         "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
+        "settings": "List the settings that --set changes: name, default, values, meaning.",
         "examples": "Records to try the commands on: list them, copy them.",
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
         "systems": "Simulated systems: list them, make records of them.",
@@ -104,7 +105,7 @@ class Commands(TyperGroup):
         """Run the command. Report an error in one line; exit with code 2, or 130 or 143 after a signal."""
         try:
             try:
-                with command_line_names():
+                with command_line_names(_RareNames()):
                     return super().invoke(ctx)
             except ModuleNotFoundError as error:
                 raise explain_missing_package(error, str(ctx.invoked_subcommand)) from error
@@ -168,6 +169,24 @@ class Commands(TyperGroup):
             super().format_help(ctx, formatter)
         finally:
             self._is_listing = False
+
+
+class _RareNames:
+    """Names of the settings of searches and files that no option gives.
+
+    Their classes are imported when a message needs a name.
+    """
+
+    def __contains__(self, name: object) -> bool:
+        from islands.evolution.settings import Settings  # noqa: PLC0415
+        from islands.facade.fit_settings import FitSettings  # noqa: PLC0415
+        from islands.records.preprocessing_steps import PreprocessingSteps  # noqa: PLC0415
+        from islands.records.reading.options import ReadingOptions  # noqa: PLC0415
+        from islands.settings_schema import is_daily, list_settings  # noqa: PLC0415
+
+        classes = (Settings, FitSettings, ReadingOptions, PreprocessingSteps)
+        found = [is_daily(info) for cls in classes for each, info, _ in list_settings(cls) if each == name]
+        return bool(found) and not any(found)
 
 
 def explain_missing_package(error: ModuleNotFoundError, command: str) -> Exception:

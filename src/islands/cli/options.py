@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from islands.evolution.presets import PRESET_NAMES
 from islands.report.figures.names import ALL_FIGURES
 
 Record = Annotated[
@@ -49,6 +50,9 @@ ModelFile = Annotated[
         ":13, :14."
     ),
 ]
+
+Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESET_NAMES))]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
 
 Figures = Annotated[
     str,

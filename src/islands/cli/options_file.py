@@ -1,4 +1,4 @@
-"""Options of commands from a TOML file, such as ``islands.toml`` in the current folder."""
+"""Options and settings of commands from a TOML file, such as ``islands.toml`` in the current folder."""
 
 import tomllib
 from collections.abc import Mapping
@@ -35,37 +35,48 @@ def match_options(command: Any, table: Any, path: Path, title: str) -> dict[str,
     command : Command or Group
         Command of the command line. The table of a group has a table for each of its commands.
     table : mapping
-        Values by the names of the options without dashes: ``input``, ``max-terms``.
+        Values by the names of options and settings: ``input``, ``max_terms``.
     path, title
         File and table in messages.
 
     Raises
     ------
     SettingsError
-        The table has an entry that is no option of the command.
+        The table has an entry that is neither an option nor a setting of the command.
     """
+    from islands.cli.settings_options import GIVEN, list_names  # noqa: PLC0415 - pydantic
+
     if not isinstance(table, Mapping):
         raise SettingsError(f"{path}: write the options of a command as a table: [{title}]")
-    commands = getattr(command, "commands", None)
-    if commands is not None:
-        known: dict[str, Any] = dict(commands)
-    else:
-        known = {
-            option.removeprefix("--"): parameter
-            for parameter in command.params
-            for option in (*parameter.opts, *parameter.secondary_opts)
-            if option.startswith("--")
-        }
-    if unknown := [name for name in table if name not in known]:
-        raise SettingsError(
-            f"{path}, [{title}]: there is no option {unknown[0]!r}; it has {', '.join(sorted(known))}"
-            f"{suggest(unknown[0], known)}"
-        )
-    if commands is not None:
-        return {
-            name: match_options(known[name], value, path, f"{title}.{name}") for name, value in table.items()
-        }
-    return {known[name].name: _convert(known[name], value) for name, value in table.items()}
+    commands = getattr(command, "commands", {})
+    options = {} if commands else _list_options(command)
+    settings = list_names(command)
+    found: dict[str, Any] = {}
+    for given, value in table.items():
+        name = given.replace("-", "_")
+        if given in commands:
+            found[given] = match_options(commands[given], value, path, f"{title}.{given}")
+        elif name in settings:
+            text = ",".join(map(str, value)) if isinstance(value, list) else value
+            found.setdefault(GIVEN, []).append(f"{name}={text}")
+        elif name in options:
+            found[options[name].name] = _convert(options[name], value)
+        else:
+            raise SettingsError(
+                f"{path}, [{title}]: there is no {given!r}{suggest(name, [*commands, *options, *settings])}"
+                f"; islands {title.replace('.', ' ')} --help and islands settings list the names"
+            )
+    return found
+
+
+def _list_options(command: Any) -> dict[str, Any]:
+    """Return the parameters of a command by the names of its options."""
+    return {
+        option.removeprefix("--").replace("-", "_"): parameter
+        for parameter in command.params
+        for option in (*parameter.opts, *parameter.secondary_opts)
+        if option.startswith("--")
+    }
 
 
 def _convert(parameter: Any, value: Any) -> Any:

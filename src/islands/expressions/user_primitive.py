@@ -82,12 +82,10 @@ def primitive_table(entries: Iterable[str | Primitive]) -> Mapping[str, Primitiv
     Raises
     ------
     SettingsError
-        A name is unknown, an entry is a plain function, or two primitives have the same name.
+        A name is unknown, or two primitives have the same name.
     """
     table = dict(PRIMITIVES)
     for entry in entries:
-        if callable(entry):
-            raise SettingsError(f"{entry!r} is a function: pass islands.primitive(name, function)")
         if not isinstance(entry, Primitive):
             lookup(PRIMITIVES, entry, "primitive")
         elif table.setdefault(entry.name, entry).scalar is not entry.scalar:

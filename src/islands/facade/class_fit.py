@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from math import isfinite
 
-from islands.errors import SettingsError, lookup
+from islands.errors import SettingsError
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.refinement import refine
 from islands.evolution.presets import resolve_settings
@@ -18,13 +18,14 @@ from islands.evolution.search_result import (
 )
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import LATENT, Settings
+from islands.facade.fit_settings import FitSettings
 from islands.facade.identification_progress import SEARCH
 from islands.facade.latent_identification import complete_latent, search_latent
 from islands.facade.results.model_simulation import SHOOTING
 from islands.models.latent import LatentModel
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel
-from islands.persistence.models import MODEL_CLASSES, NARX
+from islands.persistence.models import MODEL_CLASSES
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.split import Split
@@ -43,9 +44,7 @@ _CRITERION = refinement_criterion(None)
 def fit_class(
     record: Dataset,
     split: Split,
-    kind: str,
-    structure: str,
-    constraints: str,
+    given: FitSettings,
     seed: int,
     steps: Steps,
     on_models: ResultCallback = ignore_result,
@@ -61,12 +60,8 @@ def fit_class(
         Record as passed by the user, which the result contains.
     split : Split
         Estimation data and validation data at the rate of the record.
-    kind : str
-        An entry of ``MODEL_CLASSES``.
-    structure : str
-        An entry of ``ZERO_BLOCKS``, which latent models have.
-    constraints : str
-        Statements about latent models.
+    given : FitSettings
+        Its model is an entry of ``MODEL_CLASSES``.
     seed : int
         Stored in the result, and seed of its prediction bands.
     steps : Steps
@@ -76,13 +71,15 @@ def fit_class(
     Raises
     ------
     SettingsError
-        There is no such class or structure, or no model has a free run that remains bounded.
+        No model has a free run that remains bounded.
     """
-    lookup(dict.fromkeys((NARX, *MODEL_CLASSES)), kind, "class of models")
+    kind = given.model
     entry = MODEL_CLASSES[kind]
     interval = min(SHOOTING, max(1, split.estimation.samples // 10))
     if issubclass(entry, LatentModel):
-        searched = resolve_settings(LATENT, {"structure": structure, "constraints": constraints})
+        searched = resolve_settings(
+            LATENT, {"structure": given.structure, "constraints": given.constraints or "none"}
+        )
 
         def report(state: SearchState, settings: Settings) -> None:
             done, whole = state.archipelago.generation, settings.generations

@@ -15,9 +15,9 @@ from islands.errors import (
     SettingsError,
     check_seconds,
     join_text,
-    name_flag,
     name_option,
     name_without_value,
+    write_setting,
 )
 from islands.records.channel_names import parse_unit
 from islands.records.dataset import Dataset
@@ -435,9 +435,7 @@ class _FileInspection:
             bounds = ("" if bound is None else str(bound) for bound in (self.rows.start, self.rows.stop))
             words += ["--rows", ":".join(bounds)]
         for name, value in reading.changes().items():
-            words.append(name_flag(name, value if name == "header" else None))
-            if name != "header":
-                words.append(",".join(value) if isinstance(value, list) else str(value))
+            words += ["--set", write_setting(name, value)]
         return shlex.join([*words, "--out", "result"])
 
 

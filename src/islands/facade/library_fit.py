@@ -4,12 +4,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
-from typing import TypedDict
 
 from islands.available_cpus import count_cpus
-from islands.errors import SettingsError, check_integers, lookup
+from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
-from islands.estimation.estimator_table import ESTIMATORS, REFITS, make_criterion
+from islands.estimation.estimator_table import make_criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
     Structure,
@@ -43,6 +42,7 @@ from islands.evolution.search_result import (
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
 from islands.facade.final_models import screen
+from islands.facade.fit_settings import FitSettings
 from islands.facade.free_run_refinement import REFINEMENT, refine_models
 from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.trials.feedthrough_selection import select_feedthrough
@@ -53,7 +53,7 @@ from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
 from islands.progress import ProgressCallback, Steps, Stop, StoppedError, ignore_progress, never_stop
-from islands.records.averaging import AUTO, count_means
+from islands.records.averaging import count_means
 from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
@@ -75,49 +75,11 @@ _SIMULATIONS = "linear models of the free run"
 #: Name of the step that fits a library again.
 _REFIT = "fit of better subsets"
 
+#: Settings of models of other classes.
+_OF_CLASSES = ("model", "structure")
+
 #: A structure for every number of terms.
 Subsets = tuple[Structure, ...]
-
-
-class FitChanges(TypedDict, total=False):
-    """Settings of `FitSettings` that differ from the defaults."""
-
-    max_terms: int
-    estimator: str
-    refit: str
-    average: int | str
-    feedthrough: str
-    shooting: int | None
-    certificate: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FitSettings:
-    """Settings of `fit_library`, as the parameters of `fit`."""
-
-    max_terms: int = 10
-    estimator: str = ""
-    refit: str = "none"
-    average: int | str = AUTO
-    feedthrough: str = AUTO
-    shooting: int | None = None
-    certificate: int = 10_000
-
-    def __post_init__(self) -> None:
-        lookup(ESTIMATORS, self.selecting_estimator, "estimator")
-        lookup(REFITS, self.refit, "refit")
-        check_integers(max_terms=self.max_terms, certificate=self.certificate, shooting=self.shooting)
-        if self.max_terms < 1:
-            raise SettingsError(f"a model has at least one term, got max_terms = {self.max_terms}")
-        if self.certificate < 0:
-            raise SettingsError(f"a search has at least 0 nodes, got certificate = {self.certificate}")
-        if self.shooting is not None and self.shooting < 1:
-            raise SettingsError(f"a shooting interval has at least 1 sample, got {self.shooting}")
-
-    @property
-    def selecting_estimator(self) -> str:
-        """Estimator of all structures; without a choice, the validation data decide on a refinement."""
-        return self.estimator or "least-squares"
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,12 +227,12 @@ def fit_library(
     )
     described = {
         "method": "fit",
+        **{name: value for name, value in asdict(settings).items() if name not in _OF_CLASSES},
         "library": library.name,
         "degree": library.degree,
         "lags": library.lags,
         "delays": library.delays,
         "constraints": library.constraints,
-        **asdict(settings),
         "shooting": shooting,
     }
     result = SearchResult(record, split, seed, described, search, keep_best_of_sizes(models))

@@ -339,7 +339,7 @@ class Block:
             samples = "sample" if self.warm_up == 1 else f"{self.warm_up} samples"
             text = (
                 f"The free run starts from the first {samples} of the measured output, as does "
-                f"`islands simulate --warm-up {self.warm_up}` unless it states that it estimated them."
+                f"`islands simulate --set warm_up={self.warm_up}` unless it states that it estimated them."
             )
         return textwrap.fill(text, 100, initial_indent=mark, subsequent_indent=mark)
 

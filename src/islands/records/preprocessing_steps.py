@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from math import isfinite
 from typing import Any
 
-from islands.errors import SettingsError, suggest
+from islands.settings_schema import Integer, setting, settings_class
 
 #: Values of ``detrend``.
 DETREND = ("none", "constant", "linear")
@@ -14,38 +13,21 @@ DETREND = ("none", "constant", "linear")
 _CUTOFF = 0.8
 
 
-@dataclass(frozen=True, slots=True)
+@settings_class
 class PreprocessingSteps:
-    """Steps before a search, in the order in which they are done.
+    """Steps before a search, in the order in which they are done."""
 
-    Attributes
-    ----------
-    lowpass : float or None
-        Cutoff in hertz of a zero-phase low-pass filter of all signals.
-    decimate : int
-        Every how many samples one is kept, behind a zero-phase low-pass filter.
-    detrend : str
-        ``constant`` subtracts the mean of every signal; ``linear`` also a straight line from the output.
-
-    Raises
-    ------
-    SettingsError
-        A value is out of range.
-    """
-
-    lowpass: float | None = None
-    decimate: int = 1
-    detrend: str = "none"
-
-    def __post_init__(self) -> None:
-        if self.lowpass is not None and not (isfinite(self.lowpass) and self.lowpass > 0.0):
-            raise SettingsError(f"lowpass is a frequency in hertz above 0, got {self.lowpass}")
-        if self.decimate < 1:
-            raise SettingsError(f"decimate is a number of samples from 1 on, got {self.decimate}")
-        if self.detrend not in DETREND:
-            raise SettingsError(
-                f"detrend is {' or '.join(DETREND)}, got {self.detrend!r}{suggest(self.detrend, DETREND)}"
-            )
+    lowpass: float | None = setting(
+        None, "Cutoff of a zero-phase low-pass filter of inputs and output.", gt=0, unit="Hz"
+    )
+    decimate: Integer = setting(
+        1, "Keep one of this number of samples, behind a zero-phase low-pass filter.", ge=1
+    )
+    detrend: str = setting(
+        "none",
+        "Subtract the mean of every signal, or also a straight line from the output.",
+        choices=DETREND,
+    )
 
     @property
     def is_none(self) -> bool:

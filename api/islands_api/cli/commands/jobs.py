@@ -10,12 +10,14 @@ import typer
 from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
-from islands.cli.record_options import with_reading_options
-from islands.cli.search_options import DEFAULTS, ModelClass, SearchOptions, Seed, with_search_options
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.errors import SettingsError
-from islands.persistence.models import NARX
+from islands.evolution.presets import AUTO
+from islands.evolution.settings import NARX, Settings
+from islands.persistence.models import MODEL_CLASSES
 from islands.records.coupled import join_columns
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
+from islands.settings_schema import setting, settings_class
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import parse_spec
 from islands_api.cli.service import job_views as views
@@ -25,7 +27,7 @@ from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.fmu_calls import name_uploaded
 from islands_api.client.recording_parts import make_part
 from islands_api.schemas import JobView
-from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, JobState
+from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, PRIORITIES, JobState
 
 jobs = typer.Typer(
     help="Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, stop, resume, result.",
@@ -37,35 +39,42 @@ Name = Annotated[str, typer.Option("--name", help="Name of the job, for display.
 Tags = Annotated[
     list[str] | None, typer.Option("--tag", help="Tag of the job, for the list; may be repeated.")
 ]
-Priority = Annotated[int, typer.Option("--priority", help="Of your own jobs, higher ones run first.")]
-IdempotencyKey = Annotated[
-    str | None,
-    typer.Option("--idempotency-key", help="Submitting again with the same key returns the same job."),
-]
 Watch = Annotated[bool, typer.Option("--watch", help="Wait for the job and print its result.")]
 Id = Annotated[str, typer.Argument(help="The job's id.")]
 
 
+@settings_class
+class SubmissionSettings:
+    """Settings of the submission of a job."""
+
+    priority: int = setting(
+        0, "Of your own jobs, higher ones run first.", ge=PRIORITIES.start, le=PRIORITIES.stop - 1
+    )
+    idempotency_key: str | None = setting(None, "Submitting again with the same key returns the same job.")
+
+
 @jobs.command()
-@with_reading_options
-@with_search_options
+@with_settings(reading=ReadingOptions, changes=Settings, submission=SubmissionSettings)
 def submit(
     records: options.Records,
     inputs: options.Inputs,
     output_columns: options.Outputs,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: Given = NONE,
     validation: Annotated[
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
     ] = None,
-    model: ModelClass = NARX,
-    search: SearchOptions = DEFAULTS,
+    model: Annotated[
+        str, typer.Option("--model", help=f"Class of the models: {', '.join((NARX, *MODEL_CLASSES))}.")
+    ] = NARX,
+    preset: options.Preset = AUTO,
+    changes: Given = NONE,
+    seed: options.Seed = 0,
     name: Name = "",
     tags: Tags = None,
-    priority: Priority = 0,
-    idempotency_key: IdempotencyKey = None,
+    submission: Given = NONE,
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Watch = False,
@@ -73,19 +82,18 @@ def submit(
 ) -> None:
     """Upload recordings and submit a job that identifies one model of them."""
     names, outputs = options.columns(inputs), options.columns(output_columns)
+    read = ReadingOptions(**reading).changes()
     _, output_column = join_columns(names, outputs)
     held_out = _parse_validation(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with open_client(url, key) as client:
         whole = output_column if rows is None else None
-        dataset, *others = (client.upload(record, names, whole, dt, reading.changes()) for record in records)
+        dataset, *others = (client.upload(record, names, whole, dt, read) for record in records)
         validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
-                validation_data = {
-                    "dataset": client.upload(held_out, names, output_column, dt, reading.changes()).id
-                }
+                validation_data = {"dataset": client.upload(held_out, names, output_column, dt, read).id}
             case str():
                 validation_data = {"dataset": dataset.id, "rows": held_out}
             case _:
@@ -95,23 +103,22 @@ def submit(
             names,
             outputs if len(outputs) > 1 else output_column,
             model=model,
-            preset=search.preset,
-            seed=search.seed,
+            preset=preset,
+            seed=seed,
             dt=dt,
             rows=rows,
             recordings=[make_part(other, rows) for other in others],
             validation=validation_data,
             name=_make_name(name, records),
             tags=tags or (),
-            priority=priority,
-            idempotency_key=idempotency_key,
-            **search.changes,
+            **submission,
+            **changes,
         )
     _follow(url, key, job, as_json, watch)
 
 
 @jobs.command()
-@with_reading_options
+@with_settings(reading=ReadingOptions, submission=SubmissionSettings)
 def diagnose(
     records: options.Records,
     inputs: options.Inputs,
@@ -123,12 +130,11 @@ def diagnose(
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
-    reading: ReadingOptions = DEFAULT_READING,
-    seed: Seed = 0,
+    reading: Given = NONE,
+    seed: options.Seed = 0,
     name: Name = "",
     tags: Tags = None,
-    priority: Priority = 0,
-    idempotency_key: IdempotencyKey = None,
+    submission: Given = NONE,
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Watch = False,
@@ -142,13 +148,14 @@ def diagnose(
     channel_names = options.columns(channels or [])
     spec = parse_spec(simulated)
     simulation = {} if isinstance(spec, FmuSpec) else parse_simulation(simulated)
-    read = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
+    columns = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
+    read = ReadingOptions(**reading).changes()
     with open_client(url, key) as client:
         if isinstance(spec, FmuSpec):
             simulation = name_uploaded(spec, client.upload_fmu(spec.file))
         whole = output_column if rows is None else None
-        dataset, *others = (client.upload(record, read, whole, dt, reading.changes()) for record in records)
-        held_out = validation and client.upload(validation, read, output_column, dt, reading.changes())
+        dataset, *others = (client.upload(record, columns, whole, dt, read) for record in records)
+        held_out = validation and client.upload(validation, columns, output_column, dt, read)
         job = client.diagnose(
             dataset,
             driving,
@@ -164,8 +171,7 @@ def diagnose(
             validation=held_out or None,
             name=_make_name(name, records),
             tags=tags or (),
-            priority=priority,
-            idempotency_key=idempotency_key,
+            **submission,
         )
     _follow(url, key, job, as_json, watch)
 

@@ -8,10 +8,10 @@ import typer
 
 from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
-from islands.cli.record_options import with_reading_options
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.cli.watched_folder import find_time, hash_file, order_of_recording
 from islands.errors import SettingsError
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.cli.service.job_views import print_json
 from islands_api.client import Client
@@ -87,11 +87,11 @@ def create(
 
 
 @monitors.command()
-@with_reading_options
+@with_settings(reading=ReadingOptions)
 def add(
     monitor: Id,
     records: options.Records,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: Given = NONE,
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Annotated[
@@ -108,7 +108,7 @@ def add(
         for path in sorted(records, key=order_of_recording):
             content = hash_file(path)
             if (path.name, content) not in known:
-                jobs.append(_add_file(client, monitor, path, content, reading))
+                jobs.append(_add_file(client, monitor, path, content, ReadingOptions(**reading)))
     if not watch:
         for job in jobs:
             output.print(f"job {job.id}: {job.name}", markup=False)

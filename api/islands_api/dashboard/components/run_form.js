@@ -8,12 +8,8 @@ const SAMPLING_TIME = "In seconds; only for a record that does not contain it.";
 
 const ABSENT = "Choose at least one input and the output in the table of columns.";
 
-/** Return an option of the command line, for example `--no-header` for the value false. */
-function makeFlag(name, value) {
-  const flag = name.replaceAll("_", "-");
-  if (typeof value === "boolean") return [value ? `--${flag}` : `--no-${flag}`];
-  return [`--${flag}`, quote([value].flat().join(","))];
-}
+/** Return a setting on the command line. */
+const makeSetting = ([name, value]) => ["--set", quote(`${name}=${[value].flat().join(",")}`)];
 
 /** Return the options of the command line; null if it cannot state the request. */
 function listOptions(request, reading) {
@@ -31,7 +27,7 @@ function listOptions(request, reading) {
     ...(preset === "auto" ? [] : ["--preset", preset]),
     ...(model && model !== "narx" ? ["--model", model] : []),
     ...(seed ? ["--seed", String(seed)] : []),
-    ...Object.entries({ ...reading, ...request.settings }).flatMap((each) => makeFlag(...each)),
+    ...Object.entries({ ...reading, ...request.settings }).flatMap(makeSetting),
   ];
 }
 

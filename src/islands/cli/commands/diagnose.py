@@ -15,7 +15,6 @@ from islands.cli.console import output
 from islands.cli.laboratory import import_laboratory
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import Display, compile_kernels, progress
-from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings
 from islands.cli.runs.diagnosis_fits import explain_continuation, keep_fits, say_to_continue, write_fits
 from islands.cli.runs.plan import (
@@ -23,9 +22,9 @@ from islands.cli.runs.plan import (
     PlanOptions,
     read_input,
     show_plan,
-    with_plan_options,
     write_plan,
 )
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.diagnosis.calibration.fit_journal import FitJournal
 from islands.diagnosis.detectability import SelfTest
@@ -49,7 +48,7 @@ from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, DiagnosisR
 from islands.processes.pool import process_pool
 from islands.progress import Steps, report_part
 from islands.records.dataset import Dataset
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands.records.split import hold_out
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.layout import wrap
@@ -67,12 +66,8 @@ SELF_TEST = "self-test"
 #: Module that computes it.
 SELF_TEST_MODULE = "lab.diagnosis.self_test"
 
-#: Options of a diagnosis.
-NO_PLAN = PlanOptions()
 
-
-@with_plan_options
-@with_reading_options
+@with_settings(reading=ReadingOptions, plan=PlanOptions)
 def diagnose(
     inputs: options.Inputs,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
@@ -90,7 +85,7 @@ def diagnose(
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: Given = NONE,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     tested: Annotated[
         bool,
@@ -99,7 +94,7 @@ def diagnose(
             help="Estimate which effects this record can reveal; in a checkout, and takes minutes.",
         ),
     ] = False,
-    planning: PlanOptions = NO_PLAN,
+    plan: Given = NONE,
     workers: Annotated[
         int | None,
         typer.Option("--workers", min=1, help="Largest number of processes; by default one for each core."),
@@ -107,16 +102,16 @@ def diagnose(
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
+    planning, file_options = PlanOptions(**plan), ReadingOptions(**reading)
     if planning.plan:
         _check_unused_by_plan(validation, noise_level)
         check_folder(out, force, PLAN)
         columns_of_input = [simulation_options.single_input(options.columns(inputs)), *(channels or [])]
-        data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
+        data = read_input(records or [], columns_of_input, output_column, dt, rows, file_options, planning)
         tolerances = simulation_options.tolerances(tolerance or [])
         compile_kernels()
         _plan(data, simulated, tolerances, planning, out, seed, workers)
         return
-    planning.check_unused()
     if not records or output_column is None:
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
     validate_noise_level(noise_level)
@@ -130,7 +125,7 @@ def diagnose(
         column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read_record(
             *(records, validation, options.columns(inputs), channels or [], column),
-            *(output_column, dt, rows, reading),
+            *(output_column, dt, rows, file_options),
         )
         if isinstance(inner, FmuSpec):
             inner.make_model()
@@ -172,7 +167,7 @@ def _check_unused_by_plan(validation: Path | None, noise_level: float | None) ->
     if validation:
         raise SettingsError("--validation is for a diagnosis: leave it out of a plan")
     if noise_level is not None:
-        raise SettingsError("--noise-level is for a diagnosis: a plan has --noise-std")
+        raise SettingsError("--noise-level is for a diagnosis: a plan has --set noise_std")
 
 
 def _plan(

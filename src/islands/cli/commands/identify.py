@@ -1,32 +1,31 @@
 """``islands identify``: search by MGGP/FROE, refinement, validation."""
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from islands.cli import options
-from islands.cli.engines import ENGINES
 from islands.cli.output_folder import check_folder
-from islands.cli.preprocessing_options import with_preprocessing_options
-from islands.cli.record_options import with_reading_options
-from islands.cli.runs.identify import RunOptions, load_run, run
-from islands.cli.search_options import DEFAULTS, SearchOptions, with_search_options
-from islands.errors import SettingsError, lookup
+from islands.cli.runs.identify import RunOptions, RunSettings, load_run, run
+from islands.cli.settings_options import GIVEN, NONE, Given, split_settings, with_settings
+from islands.errors import SettingsError
+from islands.evolution.presets import AUTO
+from islands.evolution.settings import Settings
 from islands.records.coupled import join_columns
-from islands.records.preprocessing_steps import NO_STEPS, PreprocessingSteps
+from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading import fingerprint
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands.report.figures.names import FREE_RUN, parse_figures
 
 #: Options of the run rather than of the search: allowed with ``--resume``.
-RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose", "figures")
+RUN_OPTIONS = ("resume", "figures", GIVEN, *(field.name for field in fields(RunSettings)))
 
 
-@with_reading_options
-@with_preprocessing_options
-@with_search_options
+@with_settings(
+    reading=ReadingOptions, preprocessing=PreprocessingSteps, changes=Settings, run_settings=RunSettings
+)
 def identify(
     context: typer.Context,
     records: options.RecordsOrNone = None,
@@ -38,8 +37,8 @@ def identify(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: ReadingOptions = DEFAULT_READING,
-    steps: PreprocessingSteps = NO_STEPS,
+    reading: Given = NONE,
+    preprocessing: Given = NONE,
     validation: Annotated[
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
@@ -50,37 +49,16 @@ def identify(
             "--test", help="FILE, FRACTION of the end, or START:STOP; used for the final test only."
         ),
     ] = None,
-    search: SearchOptions = DEFAULTS,
-    engine: Annotated[
-        str | None,
-        typer.Option(
-            "--engine", help=f"{' or '.join(ENGINES)}; by default ray for several islands, if installed."
-        ),
-    ] = None,
-    ray_address: Annotated[
-        str | None, typer.Option("--ray-address", help="HOST:PORT of a cluster; this machine by default.")
-    ] = None,
-    wall_time: Annotated[
-        float | None,
-        typer.Option(
-            "--wall-time", help="Stop after this number of seconds. Not reproducible: machines differ."
-        ),
-    ] = None,
+    preset: options.Preset = AUTO,
+    changes: Given = NONE,
+    seed: options.Seed = 0,
+    run_settings: Given = NONE,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
     resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to continue.")] = None,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", help="Also print the memory used by the caches.")
-    ] = False,
     figures: options.Figures = FREE_RUN,
 ) -> None:
     """Identify recordings of a system by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
-    if engine is not None:
-        lookup(dict.fromkeys(ENGINES), engine, "engine")
-    if wall_time is not None and not wall_time > 0.0:
-        raise SettingsError(f"--wall-time is a number of seconds above 0, got {wall_time}")
-    if ray_address is not None and engine == "serial":
-        raise SettingsError("--ray-address requires --engine ray: the serial engine runs in this process")
-    run_options = RunOptions(engine, ray_address, wall_time, verbose, parse_figures(figures))
+    run_options = RunOptions(RunSettings(**run_settings), parse_figures(figures))
     if resume is not None:
         _check_resume(context)
         run(run_options, resume, *load_run(resume))
@@ -106,18 +84,19 @@ def identify(
             **({"outputs": len(outputs)} if several else {}),
             "dt": dt,
             "rows": rows,
-            "reading": reading.changes(),
-            "preprocessing": asdict(steps),
-            "preset": search.preset,
-            "seed": search.seed,
-            "changes": dict(search.changes),
+            "reading": ReadingOptions(**reading).changes(),
+            "preprocessing": asdict(PreprocessingSteps(**preprocessing)),
+            "preset": preset,
+            "seed": seed,
+            "changes": changes,
         }
         run(run_options, out, job)
 
 
 def _check_resume(context: typer.Context) -> None:
     """Check that only options of the run are given with ``--resume``."""
-    for name in context.params:
+    given = [*context.params, *split_settings(context.params[GIVEN] or [])]
+    for name in given:
         source = context.get_parameter_source(name)
-        if name not in RUN_OPTIONS and source is not None and source.name == "COMMANDLINE":
+        if name not in RUN_OPTIONS and (source is None or source.name == "COMMANDLINE"):
             raise SettingsError("--resume uses the record and the settings of the run: do not give others")

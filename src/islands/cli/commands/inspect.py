@@ -8,14 +8,14 @@ import typer
 
 from islands.cli import options
 from islands.cli.console import errors
-from islands.cli.record_options import with_reading_options
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.facade.inspect_record import inspect_record
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
 from islands.report.text.inspection import format_inspection
 
 
-@with_reading_options
+@with_settings(reading=ReadingOptions)
 def inspect(
     record: options.Record,
     inputs: Annotated[
@@ -27,7 +27,7 @@ def inspect(
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: Given = NONE,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON document (schema islands.records.inspection/1).")
     ] = False,
@@ -38,7 +38,8 @@ def inspect(
 ) -> None:
     """Describe a record: columns, sampling, dead time, noise, excitation, and the next command."""
     found = inspect_record(
-        record, options.columns(inputs or []), output_column, dt, parse_rows(rows), reading
+        *(record, options.columns(inputs or []), output_column, dt, parse_rows(rows)),
+        ReadingOptions(**reading),
     )
     document = json.dumps(found.as_document(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     text = format_inspection(found)

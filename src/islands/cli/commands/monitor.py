@@ -13,8 +13,8 @@ from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import compile_kernels
-from islands.cli.record_options import with_reading_options
 from islands.cli.recordings import Recordings
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.cli.watched_folder import WatchedFolder, find_time, hash_file
 from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE
 from islands.diagnosis.monitoring.record_follower import TRAINING
@@ -26,7 +26,7 @@ from islands.facade.record_monitor import (
     reject_record,
 )
 from islands.records.dataset import Dataset
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands.report.documents.monitor_json import monitor_json
 from islands.report.documents.monitor_state import (
     RejectedRecord,
@@ -56,7 +56,7 @@ ALARM_EXIT = 3
 POLL = 1.0
 
 
-@with_reading_options
+@with_settings(reading=ReadingOptions)
 def monitor(
     folder: Annotated[Path, typer.Argument(help="Folder into which records are written, one file each.")],
     out: Annotated[Path, typer.Option("--out", help="Folder for states, alarms and figure.")],
@@ -101,7 +101,7 @@ def monitor(
         typer.Option("--settle", min=0.0, help="Seconds without a change after which a file is complete."),
     ] = 2.0,
     dt: options.SamplingTime = None,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: Given = NONE,
     force: Annotated[bool, typer.Option("--force", help="Start again, without the states in --out.")] = False,
 ) -> None:
     """Follow a simulation over the records of a folder, and raise an alarm when an effect has changed.
@@ -119,7 +119,7 @@ def monitor(
         raise SettingsError("a new monitor needs --simulation: extended.json or the folder of a diagnosis")
     driving = [*options.columns(inputs or []), *(channels or [])]
     columns = _find_columns(spec, known, driving, output_column)
-    reader = _Reader(*columns, spec, dt, reading)
+    reader = _Reader(*columns, spec, dt, ReadingOptions(**reading))
     settings = {
         "false_alarms": false_alarms,
         "interval": interval or watched.interval,

@@ -7,20 +7,20 @@ import typer
 
 import islands
 from islands.cli import options
-from islands.cli.record_options import with_reading_options
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
 from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
 from islands.persistence.saved_documents import open_document, read_saved_model
 from islands.records.reading import read_dataset
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
 from islands.report.figures.names import MODEL_FIGURES
 from islands.report.text.layout import term_table, wrap
 
 
-@with_reading_options
+@with_settings(reading=ReadingOptions)
 def show(
     model: options.ModelFile,
     kind: Annotated[
@@ -44,7 +44,7 @@ def show(
     record: Annotated[Path | None, typer.Option("--record", help="Record of --figure.")] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: Given = NONE,
 ) -> None:
     """Show or write a model as an equation, a program, a block for a simulator, or JSON.
 
@@ -54,7 +54,7 @@ def show(
     model, a model of several outputs as one program or block.
     """
     if figure is not None:
-        _draw(model, figure, record, out, dt, parse_rows(rows), reading)
+        _draw(model, figure, record, out, dt, parse_rows(rows), ReadingOptions(**reading))
         return
     if record is not None:
         raise SettingsError("--record is for --figure: name one")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
-from islands.cli.record_options import with_reading_options
+from islands.cli.settings_options import NONE, Given, with_settings
 from islands.errors import ExtrapolationWarning, RecordError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
@@ -33,12 +33,13 @@ from islands.records.preprocessing_steps import DETREND
 from islands.records.reading import read_columns, read_dataset
 from islands.records.reading.column_names import find_column
 from islands.records.reading.open_table import read_table
-from islands.records.reading.options import DEFAULT_READING, ReadingOptions
+from islands.records.reading.options import ReadingOptions
 from islands.records.reading.reader import open_record
 from islands.records.reading.row_range import parse_rows
 from islands.records.signal_map import map_signals, match_rate
 from islands.records.split import compare_input_ranges, measure_input_ranges
 from islands.records.writer import write_coupled_simulation, write_simulation
+from islands.settings_schema import Integer, setting, settings_class
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.simulation.initial_states import find_first_states
 from islands.validation.metrics import metrics
@@ -49,6 +50,21 @@ _LEAST_KNOWN = 10
 
 #: Ranges of the inputs of a model without its result.
 _NO_RANGES: Mapping[str, Sequence[Sequence[float]]] = MappingProxyType({})
+
+
+@settings_class
+class SimulationSettings:
+    """Settings of a simulation."""
+
+    detrend: str = setting(
+        "none", "Subtract means or a line; for models that state no preprocessing.", choices=DETREND
+    )
+    shooting: Integer | None = setting(
+        None, f"Steps of the model in a shooting interval; by default those of the result, or {SHOOTING}."
+    )
+    warm_up: Integer | None = setting(
+        None, "Samples before the first prediction; by default those of the result, or the largest lag."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +79,7 @@ class _Request:
     dt: float | None
     rows: slice | None
     reading: ReadingOptions
-    detrend: str
-    shooting: int | None
-    warm_up: int | None
+    settings: SimulationSettings
     bands: float | None
 
     def read(
@@ -96,12 +110,12 @@ class _Request:
             ) from error
 
     def refuse_detrend(self, model: str) -> None:
-        """Refuse ``--detrend`` for a model that states its signals."""
-        if self.detrend != "none":
-            raise SettingsError(f"{model} reads the record as measured: leave out --detrend")
+        """Refuse ``detrend`` for a model that states its signals."""
+        if self.settings.detrend != "none":
+            raise SettingsError(f"{model} reads the record as measured: leave out --set detrend")
 
 
-@with_reading_options
+@with_settings(reading=ReadingOptions, settings=SimulationSettings)
 def simulate(
     model: options.ModelFile,
     record: options.Record,
@@ -119,28 +133,8 @@ def simulate(
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: ReadingOptions = DEFAULT_READING,
-    detrend: Annotated[
-        str,
-        typer.Option(
-            "--detrend",
-            help=f"{', '.join(DETREND)}: subtract means or a line; for models that state no preprocessing.",
-        ),
-    ] = "none",
-    shooting: Annotated[
-        int | None,
-        typer.Option(
-            "--shooting",
-            help=f"Steps of the model in a shooting interval; by default those of the result, or {SHOOTING}.",
-        ),
-    ] = None,
-    warm_up: Annotated[
-        int | None,
-        typer.Option(
-            "--warm-up",
-            help="Samples before the first prediction; by default those of the result, or the largest lag.",
-        ),
-    ] = None,
+    reading: Given = NONE,
+    settings: Given = NONE,
     bands: Annotated[
         float | None,
         typer.Option(
@@ -155,7 +149,7 @@ def simulate(
     """
     request = _Request(
         *(record, mode, out, options.columns(inputs or []), options.columns(output_columns or []), dt),
-        *(parse_rows(rows), reading, detrend, shooting, warm_up, bands),
+        *(parse_rows(rows), ReadingOptions(**reading), SimulationSettings(**settings), bands),
     )
     match load(model):
         case Result() as result:
@@ -182,16 +176,16 @@ def _simulate_model(
         output.print(step, markup=False)
     if model.preprocessing is not None:
         request.refuse_detrend("a model that states its preprocessing")
-    prepared = preprocess(recorded, detrend=request.detrend)
+    prepared = preprocess(recorded, detrend=request.settings.detrend)
     data = match_rate(model, prepared)
     if statement := named_signals(model):
         output.print(_describe_preparation(model, data, data is prepared, statement), markup=False)
     if "estimation" in ranges:
         _print_extrapolation(model, data, ranges["estimation"])
     compile_kernels()
-    first = found.warm_up if request.warm_up is None else request.warm_up
+    first = found.warm_up if request.settings.warm_up is None else request.settings.warm_up
     band = None if request.bands is None else found.bands(data, request.bands, first)
-    simulation = found.simulate(data, mode, first, request.shooting)
+    simulation = found.simulate(data, mode, first, request.settings.shooting)
     if mode == "free-run":
         if has_estimated_start(model, data, first):
             output.print(ESTIMATED_START, markup=False)
@@ -247,7 +241,7 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
     if statement := coupled_signals(model):
         output.print(f"as in the model, {statement}", markup=False)
     compile_kernels()
-    first = found.warm_up if request.warm_up is None else request.warm_up
+    first = found.warm_up if request.settings.warm_up is None else request.settings.warm_up
     simulation = found.simulate(data, first)
     bands = () if request.bands is None else found.bands(data, request.bands, first)
     if request.out is not None:

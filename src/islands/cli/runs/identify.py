@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
 from time import monotonic, perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import islands
 from islands.cli.console import errors, output, print_message
-from islands.cli.engines import check_engine, start_engine
+from islands.cli.engines import ENGINES, check_engine, start_engine
 from islands.cli.output_folder import keep_models, print_failures, show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
@@ -47,6 +46,7 @@ from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading import fingerprint
 from islands.records.reading.options import ReadingOptions
 from islands.records.split import share_samples, split_data
+from islands.settings_schema import setting, settings_class
 
 #: File of the search state.
 CHECKPOINT = "checkpoint.json"
@@ -61,28 +61,32 @@ CHECKPOINT_SECONDS = 10.0
 CHECKPOINT_FRACTION = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class RunOptions:
-    """Options of a run that do not change its result, except for ``wall_time``.
+@settings_class
+class RunSettings:
+    """Settings of a run. They do not change its result, except for `wall_time`."""
 
-    Attributes
-    ----------
-    engine : str, optional
-        Name of an engine; the default is that of `start_engine`.
-    address : str, optional
-        Address of a Ray cluster.
-    wall_time : float, optional
-        Seconds after which the search stops.
-    verbose : bool
-        Whether the memory used by the caches is printed.
-    figures : tuple of str
-        Names of the figures to draw.
-    """
+    engine: str | None = setting(
+        None, "serial or ray; by default ray for several islands, if installed.", choices=ENGINES, daily=True
+    )
+    ray_address: str | None = setting(None, "HOST:PORT of a cluster; this machine by default.")
+    wall_time: float | None = setting(
+        None,
+        "Stop after this time. Such a result is not reproducible: machines differ.",
+        gt=0,
+        unit="s",
+        daily=True,
+    )
+    verbose: bool = setting(False, "Also print the memory used by the caches.")
 
-    engine: str | None
-    address: str | None
-    wall_time: float | None
-    verbose: bool
+    def __post_init__(self) -> None:
+        if self.ray_address is not None and self.engine == "serial":
+            raise SettingsError("ray_address requires --engine ray: the serial engine runs in this process")
+
+
+class RunOptions(NamedTuple):
+    """Settings of a run, and names of the figures to draw."""
+
+    settings: RunSettings
     figures: tuple[str, ...]
 
 
@@ -106,7 +110,8 @@ def run(
     """
     possible = _resolve_possible(job)
     data, held_out, test_data = _read_data(job, max(each.maximum_lag for each in possible))
-    chosen = run_options.engine, run_options.address
+    settings = run_options.settings
+    chosen = settings.engine, settings.ray_address
     check_engine(*chosen)
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
@@ -118,7 +123,7 @@ def run(
             # After the start of Ray, which installs a handler for SIGTERM, and until the command ends: a
             # signal that arrives while Ray ends does not discard the result.
             stop = handlers.enter_context(stop_requests())
-            until = inf if run_options.wall_time is None else monotonic() + run_options.wall_time
+            until = inf if settings.wall_time is None else monotonic() + settings.wall_time
             engine = TimedEngine(started, until, job.get("outputs", 1))
             if state is None:
                 # Delete the files of an earlier run.
@@ -191,12 +196,12 @@ def _show_run(
     searches = [each.search_result.search for each in results]
     if not stop() and any(each.ended_by == "stopped" for each in searches):
         errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
-        if options.wall_time is not None:
+        if options.settings.wall_time is not None:
             errors.print(
                 "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
             )
     show_result(result, folder)
-    if options.verbose:
+    if options.settings.verbose:
         for each in searches:
             for name, (size, limit) in each.caches.items():
                 output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)

@@ -1,15 +1,10 @@
 """Run of ``islands diagnose --plan``: what an experiment could tell apart, and the decisive experiment."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
 
 import numpy as np
-import typer
 
 from islands.cli.console import output
-from islands.cli.option_groups import group_options, make_option
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.planned_input import InputForm, InputLimits, PlannedInput
 from islands.errors import SettingsError, lookup
@@ -22,32 +17,44 @@ from islands.records.writer import write_input
 from islands.report.documents.diagnosis_json import as_json
 from islands.report.documents.plan_json import plan_document
 from islands.report.text.plan import plan_text
+from islands.settings_schema import list_changes, setting, settings_class
 
 #: Files of a plan.
 PLAN, MATRIX, EXPERIMENT = "plan.json", "plan.svg", "experiment.csv"
 
 
-@dataclass(frozen=True, slots=True)
+@settings_class
 class PlanOptions:
-    """Options of a plan; the names are those of the options, without the prefix ``plan_``.
+    """Settings of an experiment that is planned."""
 
-    Attributes
-    ----------
-    plan : bool
-        Whether an experiment is planned.
-    noise_std : float or None
-    separate : str or None
-    excitation : str or None
-    amplitude, rate, duration : float or None
-    """
+    plan: bool = setting(False, "Before any data: which causes this input could tell apart.", daily=True)
+    noise_std: float | None = setting(
+        None, "White noise of the output in its unit; by default estimated, with its colour.", gt=0
+    )
+    separate: str | None = setting(
+        None, "CAUSE,CAUSE: two causes that the plan separates; by default all that it can."
+    )
+    excitation: str | None = setting(
+        None,
+        "Input, if no record: multisine:LOW:HIGH, sweep:LOW:HIGH, sine:FREQUENCY, triangle:FREQUENCY (Hz), "
+        "steps:HOLD (s).",
+    )
+    amplitude: float | None = setting(
+        None, "Half of the range of inputs; by default that of the given input.", gt=0
+    )
+    rate: float | None = setting(
+        None, "Largest rate of inputs, per second; by default that of the given input.", gt=0
+    )
+    duration: float | None = setting(
+        None,
+        "Duration of the decisive experiment; by default that of the given input.",
+        gt=0,
+        unit="s",
+    )
 
-    plan: bool = False
-    noise_std: float | None = None
-    separate: str | None = None
-    excitation: str | None = None
-    amplitude: float | None = None
-    rate: float | None = None
-    duration: float | None = None
+    def __post_init__(self) -> None:
+        if not self.plan and (given := list(list_changes(self))):
+            raise SettingsError(f"{given[0]} is a setting of plans: add --plan")
 
     @property
     def pair(self) -> tuple[str, ...]:
@@ -58,40 +65,6 @@ class PlanOptions:
     def limits(self) -> DecisiveLimits:
         """Limits of the decisive experiment."""
         return DecisiveLimits(self.amplitude, self.rate, self.duration)
-
-    def check_unused(self) -> None:
-        """Raise `SettingsError` if an option of a plan is given without ``--plan``."""
-        for option in fields(self)[1:]:
-            if getattr(self, option.name) is not None:
-                raise SettingsError(f"--{option.name.replace('_', '-')} is for plans: add --plan")
-
-
-_HELP = {
-    "noise_std": "White noise of the output in its unit, for --plan; by default estimated, with its colour.",
-    "separate": "CAUSE,CAUSE: two causes that --plan separates; by default all that it can.",
-    "excitation": "Input for --plan, if no record: multisine:LOW:HIGH, sweep:LOW:HIGH, sine:FREQUENCY, "
-    "triangle:FREQUENCY (Hz), steps:HOLD (s).",
-    "amplitude": "Half of the range of inputs for --plan; by default that of the given input.",
-    "rate": "Largest rate of inputs for --plan, per second; by default that of the given input.",
-    "duration": "Duration of the decisive experiment in seconds; by default that of the given input.",
-}
-
-_TYPES: dict[str, Any] = {"separate": str | None, "excitation": str | None}
-
-
-def with_plan_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Replace the parameter ``planning`` of a command by the options of a plan."""
-    flag = typer.Option("--plan", help="Before any data: which causes this input could tell apart.")
-    declared = [make_option("plan_plan", Annotated[bool, flag], default=False)]
-    for name, text in _HELP.items():
-        option = typer.Option(f"--{name.replace('_', '-')}", help=text)
-        declared.append(make_option(f"plan_{name}", Annotated[_TYPES.get(name, float | None), option]))
-    return group_options(
-        command,
-        "planning",
-        declared,
-        lambda values: PlanOptions(**{name.removeprefix("plan_"): value for name, value in values.items()}),
-    )
 
 
 def read_input(
@@ -112,8 +85,8 @@ def read_input(
     """
     if len(records) + (planning.excitation is not None) != 1:
         raise SettingsError(
-            "a plan needs one input: give a file with an input column, or --excitation with --amplitude, "
-            "--duration and --dt"
+            "a plan needs one input: give a file with an input column, or the settings excitation, amplitude "
+            "and duration, and --dt"
         )
     if records:
         return read_dataset(
@@ -126,9 +99,9 @@ def _make_described(
     inputs: list[str], output_column: str, dt: float | None, planning: PlanOptions
 ) -> Dataset:
     if dt is None or planning.amplitude is None or planning.duration is None:
-        raise SettingsError("--excitation also needs --amplitude, --duration and --dt")
+        raise SettingsError("excitation also needs the settings amplitude and duration, and --dt")
     if len(inputs) != 1:
-        raise SettingsError("--excitation describes the input alone: channels need a record")
+        raise SettingsError("excitation describes the input alone: channels need a record")
     limits = InputLimits(-planning.amplitude, planning.amplitude, planning.rate or np.inf)
     samples = round(planning.duration / dt)
     u = parse_excitation(planning.excitation or "").make(limits, dt, samples)
@@ -169,7 +142,7 @@ def parse_excitation(text: str) -> PlannedInput:
     except ValueError:
         pass
     raise SettingsError(
-        f"--excitation {text}: write multisine:LOW:HIGH, sweep:LOW:HIGH, sine:FREQUENCY or "
+        f"excitation {text}: write multisine:LOW:HIGH, sweep:LOW:HIGH, sine:FREQUENCY or "
         "triangle:FREQUENCY in Hz, or steps:HOLD in s, with positive numbers"
     )
 

@@ -1,29 +1,22 @@
 """Dead times of a candidate library: lags of inputs that start after a number of samples."""
 
 from collections.abc import Iterable, Sequence
+from typing import Annotated
 
-from islands.errors import SettingsError, check_integers, check_sequences
+from pydantic import Field
+
+from islands.errors import SettingsError
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor, regressor
+from islands.settings_schema import AS_INTEGER, AS_TUPLE
 
 #: Largest dead time in samples. Every lag of an input costs a sample at the start of each recording.
 LARGEST_DELAY = 1000
 
 
-def check_delays(delays: Sequence[int]) -> None:
-    """Check that no dead time is negative or too large.
-
-    Raises
-    ------
-    SettingsError
-        A dead time is out of range, or no integer.
-    """
-    check_sequences(delays=delays)
-    for delay in delays:
-        check_integers(delays=delay)
-    if any(not 0 <= delay <= LARGEST_DELAY for delay in delays):
-        raise SettingsError(f"dead times lie between 0 and {LARGEST_DELAY} samples, got {list(delays)}")
+#: Dead times, in samples.
+Delays = Annotated[tuple[Annotated[int, Field(ge=0, le=LARGEST_DELAY), AS_INTEGER], ...], AS_TUPLE]
 
 
 def expand_delays(delays: Sequence[int], inputs: int) -> tuple[int, ...]:

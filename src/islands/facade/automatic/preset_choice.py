@@ -1,19 +1,18 @@
 """Choices of the preset ``auto`` for `identify` and of the library ``auto`` for `fit`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from islands.errors import ModelError, RecordError, SettingsError, check_texts, lookup
+from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.structure_selection.input_delays import check_delays
 from islands.evolution.presets import AUTO, resolve_kinds, resolve_latent, with_tuples
 from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
-from islands.facade.library_fit import FitSettings, LibraryFit, fit_library
+from islands.facade.fit_settings import FitSettings
+from islands.facade.library_fit import LibraryFit, fit_library
 from islands.facade.trials.library import make_trial_library, take_library
-from islands.models.candidate_library import LIBRARIES
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import Split, split_data
@@ -76,11 +75,6 @@ def choose_preset(
 def fit_chosen_library(
     record: Dataset,
     split: Split,
-    library: str,
-    degree: int | None,
-    lags: int | None,
-    constraints: str | None,
-    delays: Sequence[int] | None,
     settings: FitSettings,
     seed: int,
     progress: ProgressCallback,
@@ -88,23 +82,20 @@ def fit_chosen_library(
 ) -> LibraryFit:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
 
-    Values that are None are chosen, or have the default of the library.
+    Settings that are None are chosen, or have the default of the library.
 
     Raises
     ------
     SettingsError, RecordError
         As in `islands.fit`.
     """
-    check_delays(delays or ())
-    check_texts(constraints=constraints)
+    degree, lags, constraints = settings.degree, settings.lags, settings.constraints
     constraint(constraints or "none").check_inputs(record.inputs)
     fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress, stop=stop)
-    if library != AUTO:
-        # The message about another name lists auto, too.
-        lookup(dict.fromkeys((AUTO, *LIBRARIES)), library, "library")
-        return fit_one(take_library(library, degree, lags, constraints, delays or ()))
+    if settings.library != AUTO:
+        return fit_one(take_library(settings.library, degree, lags, constraints, settings.delays or ()))
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
-    choice, fits = choose_kind(split.estimation, libraries, delays, fit_one, Steps(progress, stop))
+    choice, fits = choose_kind(split.estimation, libraries, settings.delays, fit_one, Steps(progress, stop))
     chosen = fits.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
     return chosen.with_settings(choice=choice.to_document())

@@ -28,8 +28,8 @@ from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
 from islands.facade.evolution_run import SearchCallback
 from islands.facade.fit import fit_record
+from islands.facade.fit_settings import FitChanges
 from islands.facade.identify import identify_record
-from islands.facade.library_fit import FitChanges
 from islands.facade.results.identification import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
@@ -78,17 +78,6 @@ class StoppedCouplingError(StoppedError):
         self.outputs, self.found = tuple(outputs), tuple(found)
 
 
-class FitOptions(FitChanges, total=False):
-    """Options of `fit` for every output; `fit` describes each of them."""
-
-    model: str
-    structure: str
-    library: str
-    degree: int | None
-    lags: int | None
-    constraints: str | None
-
-
 def fit_coupled(
     record: "CoupledRecord | FrameLike",
     *,
@@ -101,7 +90,7 @@ def fit_coupled(
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
     reading: "ReadingLike" = DEFAULT_READING,
-    **options: Unpack[FitOptions],
+    **options: Unpack[FitChanges],
 ) -> CoupledResult:
     """Fit one equation per output by subset selection, for a simulation of all outputs together.
 
@@ -173,7 +162,7 @@ def fit_coupled_data(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-    **options: Unpack[FitOptions],
+    **options: Unpack[FitChanges],
 ) -> CoupledResult:
     """Fit one equation per output as `fit_coupled` does, for a caller that states an extrapolation itself.
 

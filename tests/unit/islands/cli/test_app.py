@@ -173,8 +173,8 @@ def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(ru
     shutil.copyfile("out/models/01.json", "model.json")
     lag = read_model("model.json").maximum_lag
     assert f"after a warm-up of {lag} samples" in run("simulate", "model.json", "r.csv")[1]
-    assert "after a warm-up of 9 samples" in run("simulate", "out", "r.csv", "--warm-up", "9")[1]
-    assert "the warm-up has 0" in run("simulate", "out", "r.csv", "--warm-up", "0")[2]
+    assert "after a warm-up of 9 samples" in run("simulate", "out", "r.csv", "--set", "warm_up=9")[1]
+    assert "the warm-up has 0" in run("simulate", "out", "r.csv", "--set", "warm_up=0")[2]
     Path("out/result.json").write_text("{}")
     code, _, error = run("simulate", "out", "r.csv")
     assert (code, "result.json holds no model" in error) == (2, True)
@@ -214,7 +214,7 @@ def test_simulate_rejects_another_sampling_time(run):
     code, _, err = run("simulate", "published:12", "slow.csv")
     assert code == 2
     assert "the model has a sampling time of 0.001 s, the record of 0.0011 s: resample the record" in err
-    assert "--resample 0.001" in err
+    assert "--set resample=0.001" in err
 
 
 def test_systems_make_writes_into_a_folder_with_brackets(run):

@@ -244,14 +244,14 @@ def test_structures_without_estimates_are_counted_by_outcome():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"library": "wavelets"}, "unknown library 'wavelets': take one of auto, phi-polynomial, polynomial"),
-        ({"estimator": "kalman"}, "unknown estimator 'kalman': take one of least-squares, extended-"),
+        ({"library": "wavelets"}, "library is one of auto, phi-polynomial, polynomial"),
+        ({"estimator": "kalman"}, "estimator is one of least-squares, extended-"),
         ({"constraints": "passive"}, "unknown constraints 'passive': take one of none, hysteresis"),
-        ({"max_terms": 0}, "a model has at least one term, got max_terms = 0"),
+        ({"max_terms": 0}, "max_terms is an integer of at least 1, got 0"),
         ({"degree": 0}, "degree and lags are at least 1, got 0 and 3"),
         ({"lags": 1}, "phi-polynomial needs lags of at least 2"),
         ({"library": "polynomial", "degree": 5, "lags": 11}, "80730 candidates are more than a library"),
-        ({"shooting": 0}, "a shooting interval has at least 1 sample, got 0"),
+        ({"shooting": 0}, "shooting is an integer of at least 1, got 0"),
         ({"validation": 1.0}, "the validation fraction lies between 0 and 1, got 1.0"),
         ({"validation": 0.0001}, "leaves a part empty"),
     ],

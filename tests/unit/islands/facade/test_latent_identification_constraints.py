@@ -127,5 +127,5 @@ def test_a_statement_refers_to_inputs_of_the_record():
 
 
 def test_other_classes_have_no_constraints():
-    with pytest.raises(SettingsError, match="are settings of NARX models, not for the model gain-scheduled"):
+    with pytest.raises(SettingsError, match="model is one of narx, latent"):
         islands.fit(spring_record(100), model="gain-scheduled", constraints="gain = 1")

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from islands.facade.library_fit import FitSettings, fit_library
+from islands.facade.fit_settings import FitSettings
+from islands.facade.library_fit import fit_library
 from islands.facade.trials.library import take_library
 from islands.records.split import split_data
 from support.portfolio_records import KINDS

@@ -18,12 +18,12 @@ from support.simulated_records import EQUATIONS
 from support.undrawn import undrawn_figures
 
 COLUMNS = ("--input", "u_V", "--output", "y_um")
-LINEAR = ("--library", "polynomial", "--degree", "1", "--certificate", "0")
+LINEAR = ("--library", "polynomial", "--degree", "1", "--set", "certificate=0")
 SEARCH = (
     "--preset",
     "narx",
-    "--population",
-    "20",
+    "--set",
+    "population=20",
     "--generations",
     "2",
     "--islands",
@@ -68,8 +68,8 @@ def bands_of(found, record, level):
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("fit", ("--detrend", "constant", *LINEAR, "--max-terms", "3")),
-        ("fit", ("--decimate", "4", "--feedthrough", "yes", *LINEAR, "--max-terms", "3")),
+        ("fit", ("--set", "detrend=constant", *LINEAR, "--max-terms", "3")),
+        ("fit", ("--set", "decimate=4", "--set", "feedthrough=yes", *LINEAR, "--max-terms", "3")),
         ("identify", SEARCH),
     ],
 )

@@ -216,9 +216,9 @@ def test_a_stop_leaves_the_refit_out():
 
 def test_a_refit_is_all_or_none_and_of_one_output():
     record = make_noisy_record("output", 13, 200)
-    with pytest.raises(SettingsError, match="unknown refit 'every': take one of none, all"):
+    with pytest.raises(SettingsError, match="refit is one of none, all, got 'every'"):
         fit_law(record, "every")
-    with pytest.raises(SettingsError, match="unknown refit 'every'"):
+    with pytest.raises(SettingsError, match="refit is one of none, all"):
         islands.identify(record, preset="narx", refit="every")
     frame = {"u": record.u[:, 0], "y": record.y, "z": record.y}
     with pytest.raises(SettingsError, match="refit is 'none' with several outputs"):

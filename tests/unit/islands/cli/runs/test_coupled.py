@@ -16,7 +16,7 @@ from support.parsed_files import list_parsed
 from support.undrawn import undrawn_figures
 
 #: A search that takes a second.
-SMALL = ("--lags", "2", "--degree", "1", "--max-terms", "4", "--certificate", "0", "--average", "1")
+SMALL = ("--lags", "2", "--degree", "1", "--max-terms", "4", "--set", "certificate=0", "--set", "average=1")
 COLUMNS = ("--input", "u", "--output", "y1,y2")
 
 
@@ -62,7 +62,18 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
 @pytest.mark.ci
 def test_an_identified_model_has_its_errors_on_test_data(record, tmp_path) -> None:
     folder = tmp_path / "result"
-    small = ("--generations", 1, "--population", 10, "--islands", 1, "--max-terms", 4, "--max-height", 2)
+    small = (
+        "--generations",
+        1,
+        "--set",
+        "population=10",
+        "--islands",
+        1,
+        "--max-terms",
+        4,
+        "--set",
+        "max_height=2",
+    )
     printed = succeed("identify", record, *COLUMNS, *small, "--test", 0.2, "--out", folder)
     found = json.loads((folder / "test.json").read_text())
     assert [entry["name"] for entry in found["outputs"]] == ["y1", "y2"]
@@ -77,7 +88,18 @@ def test_an_identified_model_has_its_errors_on_test_data(record, tmp_path) -> No
 def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> None:
     folder, out = tmp_path / "result", tmp_path / "simulated.csv"
     with undrawn_figures():
-        succeed("fit", record, *COLUMNS, *SMALL, "--detrend", "constant", "--lowpass", "1", "--out", folder)
+        succeed(
+            "fit",
+            record,
+            *COLUMNS,
+            *SMALL,
+            "--set",
+            "detrend=constant",
+            "--set",
+            "lowpass=1",
+            "--out",
+            folder,
+        )
     printed = " ".join(succeed("simulate", folder, record, "--out", out).split())
     assert "y1 is the deviation from" in printed
     assert "behind a zero-phase low-pass filter of 1 Hz" in printed
@@ -96,7 +118,7 @@ def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> Non
 @pytest.mark.ci
 def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(record, tmp_path) -> None:
     # Without a library there are no seeds, which take most of the time.
-    settings = ("--preset", "paper-appendix", "--population", 20, "--generations", 1, "--max-terms", 3)
+    settings = ("--preset", "paper-appendix", "--set", "population=20", "--generations", 1, "--max-terms", 3)
     whole, part = tmp_path / "whole", tmp_path / "part"
     with undrawn_figures():
         assert "2 outputs" in succeed("identify", record, *COLUMNS, *settings, "--out", whole)
@@ -116,7 +138,7 @@ def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(recor
         ("fit", ("--output", "y1", "--output", "y1"), "y1 is given twice"),
         ("fit", ("--output", "y1", "--output", "u"), "u is an input and an output"),
         ("fit", ("--output", "y1,y2", "--constraints", "gain = 2"), "are for one output"),
-        ("fit", ("--output", "y1,y2", "--feedthrough", "yes"), "as u+1"),
+        ("fit", ("--output", "y1,y2", "--set", "feedthrough=yes"), "as u+1"),
         ("fit", ("--output", "y1,y2", "--model", "latent", "--lags", "3"), "are settings of NARX models"),
         ("identify", ("--output", "y1,y2", "--test", "120:150"), "other samples for estimation"),
         ("identify", ("--output", "y1,y1"), "y1 is given twice"),

@@ -35,8 +35,8 @@ def _few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_plan_of_an_input_file_writes_the_decisive_input(command_line: CommandLine, tmp_path: Path) -> None:
     (tmp_path / "amplifier.py").write_text(AMPLIFIER)
     write_input(wave((0.25,)), DT, "u_V", tmp_path / "input.csv")
-    options = ("--simulation", "python:amplifier.py:amplify", "--noise-std", 0.2, "--rate", 40)
-    code, printed, _ = command_line(*COMMAND, "input.csv", *options, "--separate", "delay,sensor-lag")
+    options = ("--simulation", "python:amplifier.py:amplify", "--set", "noise_std=0.2", "--set", "rate=40")
+    code, printed, _ = command_line(*COMMAND, "input.csv", *options, "--set", "separate=delay,sensor-lag")
     assert code == 0
     assert "delay or sensor-lag at 1 sigma" in printed
     document = json.loads((tmp_path / "plan/plan.json").read_text())
@@ -56,12 +56,12 @@ def test_a_plan_of_an_input_file_writes_the_decisive_input(command_line: Command
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--plan", "--noise-std", 1), "a plan needs one input"),
+        (("--plan", "--set", "noise_std=1"), "a plan needs one input"),
         (
-            ("--plan", "--excitation", "sine:1", "--amplitude", 1),
-            "also needs --amplitude, --duration and --dt",
+            ("--plan", "--set", "excitation=sine:1", "--set", "amplitude=1"),
+            "also needs the settings amplitude and duration, and --dt",
         ),
-        (("--noise-std", 1), "--noise-std is for plans: add --plan"),
+        (("--set", "noise_std=1"), "noise_std is a setting of plans: add --plan"),
         ((), "needs a record and --output"),
     ],
 )

@@ -1,9 +1,10 @@
 """Dead times of a candidate library: inputs are read later, and the output is not."""
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from islands.errors import SettingsError
-from islands.estimation.structure_selection.input_delays import check_delays, delay_inputs, expand_delays
+from islands.estimation.structure_selection.input_delays import Delays, delay_inputs, expand_delays
 from islands.models.candidate_library import LIBRARIES, candidates
 
 
@@ -33,5 +34,5 @@ def test_one_dead_time_applies_to_all_inputs():
 
 @pytest.mark.parametrize("delay", [-1, 1001])
 def test_dead_times_out_of_range_are_refused(delay):
-    with pytest.raises(SettingsError, match="between 0 and 1000 samples"):
-        check_delays([delay])
+    with pytest.raises(ValidationError, match="than or equal to"):
+        TypeAdapter(Delays).validate_python([delay])

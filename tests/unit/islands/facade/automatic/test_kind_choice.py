@@ -16,7 +16,7 @@ from islands.facade.automatic.kind_choice import (
     measure_share,
 )
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
-from islands.facade.library_fit import FitSettings
+from islands.facade.fit_settings import FitSettings
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import take_library
 from islands.progress import ignore_progress, never_stop

@@ -129,7 +129,7 @@ UNUSUAL = [
     (lambda: islands.join((FRAME, FRAME)), "join takes Datasets, got a DataFrame"),
     (lambda: islands.as_record(FRAME, dt="0.04", **CHOICE), "dt must be a positive number .* got '0.04'"),
     (lambda: islands.as_record(FRAME, dt=True, **CHOICE), "dt must be a positive number .* got True"),
-    (lambda: islands.fit(RECORD, max_terms="3"), "max_terms is an integer, got '3'"),
+    (lambda: islands.fit(RECORD, max_terms="3"), "max_terms is an integer of at least 1, got '3'"),
     (lambda: islands.as_record(None, RECORD.y, 0.04), "no record is given"),
     (lambda: islands.as_record(3.0, RECORD.y, 0.04), "an array of numbers, got float"),
     (lambda: islands.inspect_record(FRAME), "takes a file or a Dataset, got a DataFrame"),
@@ -244,8 +244,8 @@ def test_options_of_reading_are_those_of_a_file(tmp_path, frame, options):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"gap": "split"}, "without an option gap: .* Did you mean 'gaps'"),
-        ({"gaps": "cut"}, "gaps is split or interpolate, got 'cut'"),
+        ({"gap": "split"}, "there is no setting 'gap'. Did you mean 'gaps'"),
+        ({"gaps": "cut"}, "gaps is one of split, interpolate, got 'cut'"),
         ({"decimal": "comma"}, "the record is not a table of text: leave decimal out"),
         ({"timezone": "Europe/Berlin"}, "the record is not a table of text: leave timezone out"),
     ],

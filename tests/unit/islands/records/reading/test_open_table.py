@@ -84,7 +84,7 @@ def test_an_inspection_measures_facts_without_gross_errors_and_warns(tmp_path, v
     assert found.notes[0].rows == (150, 151, 700)
     kept = islands.inspect_record(file, ["u"], "y", reading=ReadingOptions(outliers="keep"))
     assert 'are used (outliers="exclude" leaves them out)' in kept.warnings[0]
-    assert "--outliers keep" in kept.command
+    assert "--set outliers=keep" in kept.command
 
 
 @pytest.mark.ci

@@ -370,7 +370,7 @@ def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
     ("given", "words"),
     [
         ({"dt": "0.1"}, "the sampling time dt must be a positive number of seconds, got '0.1'"),
-        ({"resample": "0.1"}, "resample must be a positive number of seconds, got '0.1'"),
+        ({"resample": "0.1"}, "resample is a number above 0 s, got '0.1'"),
         ({"rows": (0, 30)}, r"rows is a slice such as slice\(0, 50\), got \(0, 30\)"),
     ],
 )

@@ -223,14 +223,14 @@ def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
         ("--preset", "narx"),
         ("--force",),
         ("--islands", "2"),
-        ("--topology", "ring"),
-        ("--migrate-every", "5"),
-        ("--migrants", "2"),
-        ("--emigrants", "front"),
-        ("--replaced", "random"),
-        ("--character", "plain"),
-        ("--max-evaluations", "100"),
-        ("--target-error", "0.5"),
+        ("--set", "topology=ring"),
+        ("--set", "migrate_every=5"),
+        ("--set", "migrants=2"),
+        ("--set", "emigrants=front"),
+        ("--set", "replaced=random"),
+        ("--set", "characters=plain"),
+        ("--set", "max_evaluations=100"),
+        ("--set", "target_error=0.5"),
     ],
 )
 def test_resume_rejects_record_and_settings(run, more):
@@ -247,7 +247,7 @@ def test_resume_rejects_record_and_settings(run, more):
         (2, (), (None, None, 2)),
         (2, ("--engine", "serial"), ("serial", None, 2)),
         pytest.param(1, ("--engine", "ray"), ("ray", None, 1), marks=pytest.mark.nightly),
-        (1, ("--ray-address", "there:6379"), (None, "there:6379", 1)),
+        (1, ("--set", "ray_address=there:6379"), (None, "there:6379", 1)),
     ],
 )
 def test_engine_is_chosen_by_the_options_and_the_number_of_islands(run, engines, number, words, expected):
@@ -266,7 +266,16 @@ def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
     interrupted(1)
     assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 130
     interrupted(None)
-    words = ("--engine", "ray", "--ray-address", "there:6379", "--wall-time", "1e9", "--verbose")
+    words = (
+        "--engine",
+        "ray",
+        "--set",
+        "ray_address=there:6379",
+        "--wall-time",
+        "1e9",
+        "--set",
+        "verbose=true",
+    )
     code, out, _ = run("--resume", "out", *words)
     assert code == 0
     assert "cache of structures: " in out

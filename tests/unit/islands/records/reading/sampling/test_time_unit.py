@@ -187,7 +187,7 @@ def test_a_unit_without_a_time_column_is_refused(tmp_path):
 
 
 def test_an_unknown_unit_is_refused(tmp_path):
-    with pytest.raises(SettingsError, match="time_unit is s or ms or us or ns or min or h or d, got 'days'"):
+    with pytest.raises(SettingsError, match="time_unit is one of s, ms, us, ns, min, h, d, got 'days'"):
         read(tmp_path, "t", K, time_unit="days")
     with pytest.raises(RecordError, match="time= and time_unit="):
         read(tmp_path, "t_weeks", K)

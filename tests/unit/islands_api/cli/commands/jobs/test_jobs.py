@@ -72,7 +72,7 @@ def test_job_is_submitted_watched_and_shown(
         service.store.leases.finish(lease, found)
 
     in_background(run_job)
-    code, out, err = run("submit", "r.csv", *COLUMNS, "--priority", 100, "--watch")
+    code, out, err = run("submit", "r.csv", *COLUMNS, "--set", "priority=100", "--watch")
     assert code == 0, err
     assert err.splitlines()[0] == f"job {service.store.jobs.page(owner).jobs[0].id}"
     assert "\ny_um(k) = " in out

@@ -3,14 +3,13 @@
 import hashlib
 import json
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
-from islands.cli.search_options import SETTINGS
-from islands_api.cli.commands import jobs as command
+from islands.evolution.settings import Settings
 from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome, JobState, Submission
 from islands_service.domain.job_spec import Identification
 from islands_service.store.blobs import Blobs
@@ -21,50 +20,56 @@ from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
 
-#: For every option that is a setting: values on the command line, none for a flag, and the value in the job.
-VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
-    "population": (("40",), 40),
-    "generations": (("7",), 7),
-    "elite": (("0.2",), 0.2),
-    "crossover": (("0.7",), 0.7),
-    "mutation": (("0.3",), 0.3),
-    "prune": (("0.4",), 0.4),
-    "prune_copies": ((), True),
-    "tolerance": (("1e-4",), 1e-4),
-    "err_target": (("increment",), "increment"),
-    "shifts": (("1", "2"), [1, 2]),
-    "tournament": (("2",), 2),
-    "overlong": (("parent",), "parent"),
-    "distinct": ((), True),
-    "niches": ((), True),
-    "select": (("fitness",), "fitness"),
-    "max_terms": (("6",), 6),
-    "max_height": (("4",), 4),
-    "shooting": (("50",), 50),
-    "library_delays": (("3",), [3]),
-    "primitives": (("mul", "phi1"), ["mul", "phi1"]),
-    "constraints": (("none",), "none"),
-    "estimator": (("free-run",), "free-run"),
-    "refit": (("all",), "all"),
-    "average": (("20",), "20"),
-    "feedthrough": (("no",), "no"),
-    "islands": (("3",), 3),
-    "topology": (("ring",), "ring"),
-    "migrate_every": (("2,5:3",), "2,5:3"),
-    "migrants": (("2",), "2"),
-    "emigrants": (("front",), "front"),
-    "replaced": (("random",), "random"),
-    "characters": (("plain", "explorer"), ["plain", "explorer"]),
-    "max_evaluations": (("100000",), 100_000),
-    "target_error": (("0.001",), 0.001),
-    "structure": (("free",), "free"),
+#: A value of every setting on the command line, and in the job.
+VALUES: dict[str, tuple[str, Any]] = {
+    "population": ("40", 40),
+    "generations": ("7", 7),
+    "elite": ("0.2", 0.2),
+    "crossover": ("0.7", 0.7),
+    "mutation": ("0.3", 0.3),
+    "prune": ("0.4", 0.4),
+    "prune_copies": ("true", True),
+    "tolerance": ("1e-4", 1e-4),
+    "err_target": ("increment", "increment"),
+    "shifts": ("1,2", [1, 2]),
+    "tournament": ("2", 2),
+    "overlong": ("parent", "parent"),
+    "distinct": ("true", True),
+    "niches": ("true", True),
+    "select": ("fitness", "fitness"),
+    "max_terms": ("6", 6),
+    "max_height": ("4", 4),
+    "shooting": ("50", 50),
+    "library_delays": ("3", [3]),
+    "primitives": ("mul,phi1", ["mul", "phi1"]),
+    "constraints": ("none", "none"),
+    "estimator": ("free-run", "free-run"),
+    "refit": ("all", "all"),
+    "average": ("20", "20"),
+    "feedthrough": ("no", "no"),
+    "islands": ("3", 3),
+    "topology": ("ring", "ring"),
+    "migrate_every": ("2,5:3", "2,5:3"),
+    "migrants": ("2", "2"),
+    "emigrants": ("front", "front"),
+    "replaced": ("random", "random"),
+    "characters": ("plain,explorer", ["plain", "explorer"]),
+    "max_evaluations": ("100000", 100_000),
+    "target_error": ("0.001", 0.001),
+    "structure": ("free", "free"),
+    "fitness": ("shooting", "shooting"),
+    "high_level": ("0.4", 0.4),
+    "outer": ("0.6", 0.6),
+    "initial_terms": ("2,5", [2, 5]),
+    "initial_height": ("2", 2),
+    "library": ("polynomial", "polynomial"),
+    "library_degree": ("2", 2),
+    "library_lags": ("4", 4),
+    "swap_search": ("false", False),
+    "from_library": ("0.5", 0.5),
+    "refine": ("no", False),
+    "model_class": ("narx", "narx"),
 }
-
-
-def option(name: str) -> str:
-    """Return the option of a parameter of ``submit``."""
-    made = typer.main.get_command(command.jobs)
-    return next(each.opts[0] for each in made.commands["submit"].params if each.name == name)  # type: ignore[attr-defined]
 
 
 # Submit.
@@ -92,16 +97,15 @@ def test_submitted_job_is_stored_and_printed_as_json(run: Run, service: Service,
 
 @pytest.mark.ci
 def test_all_settings_reach_the_job(run: Run, service: Service, owner: str) -> None:
-    assert set(VALUES) == set(SETTINGS)
-    given = [word for name, (texts, _) in VALUES.items() for text in texts for word in (option(name), text)]
-    given += [option(name) for name, (texts, _) in VALUES.items() if not texts]
+    assert set(VALUES) == {each.name for each in fields(Settings)}
+    given = [word for name, (text, _) in VALUES.items() for word in ("--set", f"{name}={text}")]
     words = ("--seed", 9, "--dt", 0.01, "--rows", "0:150", "--json")
     code, out, err = run("submit", "r.csv", *COLUMNS, *given, *words)
     assert code == 0, err
     spec = json.loads(out)["spec"]
     assert {name: spec[name] for name in ("seed", "dt", "rows")} == {"seed": 9, "dt": 0.01, "rows": "0:150"}
     assert spec["settings"] == {name: value for name, (_, value) in VALUES.items()}
-    assert Identification.model_validate(spec).changes.keys() == set(SETTINGS)
+    assert Identification.model_validate(spec).changes.keys() == set(VALUES)
 
 
 # Discrepancy jobs.
@@ -127,7 +131,7 @@ def diagnosed(service: Service, owner: str) -> str:
 
 @pytest.mark.ci
 def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: str) -> None:
-    words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--priority", 5)
+    words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--set", "priority=5")
     code, out, err = run("diagnose", "r.csv", *COLUMNS, *words, "--rows", "0:150", "--json")
     assert (code, err) == (0, "")
     job = json.loads(out)

@@ -45,7 +45,16 @@ def folder(tmp_path_factory):
         "--lags",
         "2",
     )
-    steps = ("--decimate", "4", "--detrend", "constant", "--average", "1", "--feedthrough", "no")
+    steps = (
+        "--set",
+        "decimate=4",
+        "--set",
+        "detrend=constant",
+        "--set",
+        "average=1",
+        "--set",
+        "feedthrough=no",
+    )
     with undrawn_figures():
         succeed("fit", record, *columns, *steps, "--max-terms", "4", "--out", folder / "out")
     return folder
@@ -114,17 +123,20 @@ def test_a_model_without_steps_may_read_a_record_less_its_means(folder, tmp_path
     terms = ((parse("y(k-1)"), 0.98), (parse("u(k-1)"), 0.04))
     islands.write_model(make_model(terms, ("u_V",), "y_um", 0.01), free)
     simulated = []
-    for name, path, options in (("a", record, ("--detrend", "constant")), ("b", deviations, ())):
+    for name, path, options in (("a", record, ("--set", "detrend=constant")), ("b", deviations, ())):
         succeed("simulate", free, path, *options, "--out", tmp_path / f"{name}.csv")
         simulated.append(np.genfromtxt(tmp_path / f"{name}.csv", delimiter=",", skip_header=1)[:, 1])
     np.testing.assert_allclose(*simulated, atol=1e-9)
-    message = fail("simulate", folder / "out", record, "--detrend", "constant")
+    message = fail("simulate", folder / "out", record, "--set", "detrend=constant")
     assert "a model that states its preprocessing reads the record as measured" in message
 
 
 def test_wrong_values_are_errors_of_one_line(tmp_path):
     record = write(tmp_path / "r.csv", 0)
-    for option, value, words in (("--detrend", "square", "detrend is"), ("--decimate", "0", "decimate is")):
+    for option, value, words in (
+        ("--set", "detrend=square", "detrend is"),
+        ("--set", "decimate=0", "decimate is"),
+    ):
         message = fail(
             "fit", record, "--input", "u_V", "--output", "y_um", option, value, "--out", tmp_path / "out"
         )

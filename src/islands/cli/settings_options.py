@@ -1,0 +1,125 @@
+"""Settings on the command line: options for those of daily work, and ``--set NAME=VALUE`` for all."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from inspect import Parameter, signature
+from types import MappingProxyType
+from typing import Annotated, Any
+
+import typer
+from pydantic.fields import FieldInfo
+
+from islands.errors import SettingsError, suggest
+from islands.settings_schema import is_daily, list_settings, parse_setting
+
+#: Parameter with the values of ``--set``.
+GIVEN = "given_settings"
+
+#: Settings that a command receives, by name, and its default for a parameter that is replaced.
+Given = Mapping[str, Any]
+NONE: Given = MappingProxyType({})
+
+_SET = typer.Option("--set", metavar="NAME=VALUE", help="Change a setting; islands settings lists them.")
+
+
+def with_settings(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Replace parameters of a command by options of their classes of settings.
+
+    Each of these parameters receives the settings that were given, by name. Those of the command line take
+    precedence over those of a file.
+    """
+    owners = {name: (group, cls) for group, cls in groups.items() for name, _, _ in list_settings(cls)}
+    options = {
+        group: [_make_option(*each) for each in list_settings(cls) if is_daily(each[1])]
+        for group, cls in groups.items()
+    }
+    daily = {option.name for listed in options.values() for option in listed}
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        declared = signature(command)
+
+        @wraps(command)
+        def run(context: typer.Context, **given: Any) -> None:
+            texts = given.pop(GIVEN) or []
+            from_file = context.lookup_default(GIVEN) or []
+            values: dict[str, Any] = {**split_settings(from_file)}
+            values |= {name: given[name] for name in daily if given[name] not in (None, False)}
+            values |= split_settings(() if texts == from_file else texts)
+            found: dict[str, dict[str, Any]] = {group: {} for group in groups}
+            for name, value in values.items():
+                if name not in owners:
+                    raise SettingsError(
+                        f"--set {name}: there is no such setting here{suggest(name, owners)}"
+                        "; islands settings lists them"
+                    )
+                group, cls = owners[name]
+                found[group][name] = parse_setting(cls, name, value)
+            if "context" in declared.parameters:
+                given["context"] = context
+            command(**found, **{name: value for name, value in given.items() if name not in daily})
+
+        shown = [
+            parameter
+            for each in declared.parameters.values()
+            for parameter in options.get(each.name, [each])
+            if parameter.name != "context"
+        ]
+        context = Parameter("context", Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
+        last = Parameter(
+            GIVEN,
+            Parameter.POSITIONAL_OR_KEYWORD,
+            default=None,
+            annotation=Annotated[list[str] | None, _SET],
+        )
+        run.__signature__ = declared.replace(parameters=[context, *shown, last])  # type: ignore[attr-defined]
+        run.settings = tuple(groups.values())  # type: ignore[attr-defined]
+        return run
+
+    return decorate
+
+
+def list_classes(command: Any) -> tuple[type, ...]:
+    """Return the classes of settings of a command; none of a group."""
+    classes: tuple[type, ...] = getattr(command.callback, "settings", ())
+    return classes
+
+
+def list_names(command: Any) -> list[str]:
+    """Return the names of the settings of a command."""
+    return [name for cls in list_classes(command) for name, _, _ in list_settings(cls)]
+
+
+def split_settings(texts: Iterable[str]) -> dict[str, str]:
+    """Return the names and the texts of ``NAME=VALUE``; a dash of a name is an underscore.
+
+    Raises
+    ------
+    SettingsError
+        A text has no equals sign.
+    """
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise SettingsError(f"--set {text}: write NAME=VALUE, for example --set {name}=1")
+        found[name.strip().replace("-", "_")] = value
+    return found
+
+
+def _make_option(name: str, info: FieldInfo, values: str) -> Parameter:
+    """Return the option of a setting: a flag for a Boolean one, else a text."""
+    is_flag = info.annotation is bool
+    first = str(info.description).partition(". ")[0].removesuffix(".")
+    option = typer.Option(
+        f"--{name.replace('_', '-')}",
+        help=f"{first}." if is_flag else f"{first}: {values}.",
+        metavar=None if is_flag else "VALUE",
+        show_default=False,
+    )
+    kind: Any = bool if is_flag else str | None
+    return Parameter(
+        name,
+        Parameter.POSITIONAL_OR_KEYWORD,
+        default=False if is_flag else None,
+        annotation=Annotated[kind, option],
+    )

@@ -1,0 +1,259 @@
+"""Schema of settings: each one is declared once, for the library, the command line, REST and the page.
+
+A class of settings is a data class whose fields `setting` makes; `settings_class` lets it check its values.
+"""
+
+from collections.abc import Iterable, Mapping
+from copy import copy
+from functools import wraps
+from numbers import Integral
+from reprlib import repr as abbreviate
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, cast, dataclass_transform, get_args, get_origin
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+)
+from pydantic.dataclasses import dataclass
+from pydantic.fields import FieldInfo
+from pydantic_core import ArgsKwargs
+
+from islands.errors import SettingsError, suggest
+
+T = TypeVar("T")
+
+
+def _as_integer(value: Any) -> Any:
+    return int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, Iterable) and not isinstance(value, str | Mapping) else value
+
+
+#: Lets an integer of NumPy be one, and any sequence a tuple.
+AS_INTEGER, AS_TUPLE = BeforeValidator(_as_integer), BeforeValidator(_as_tuple)
+Integer = Annotated[int, AS_INTEGER]
+
+#: What the values of a type are, one or several.
+_NOUNS = {
+    int: ("an integer", "integers"),
+    float: ("a number", "numbers"),
+    str: ("a text", "texts"),
+    bool: ("true or false", ""),
+}
+
+
+def setting(
+    default: Any,
+    meaning: str,
+    *,
+    choices: Iterable[str] = (),
+    unit: str = "",
+    daily: bool = False,
+    **bounds: Any,
+) -> Any:
+    """Declare a setting: a field of a class of settings.
+
+    Parameters
+    ----------
+    default
+    meaning : str
+        Its first sentence is the help of the command line.
+    choices : iterable of str
+        Permitted texts, besides the default; by default every text.
+    unit : str
+        Unit of the value.
+    daily : bool
+        Whether commands have an option for it. All settings can be given by ``--set NAME=VALUE``.
+    **bounds
+        ``ge``, ``gt``, ``le``, ``lt`` of pydantic.
+    """
+    names = list(choices)
+    extra: dict[str, Any] = {"daily": daily, "unit": unit, "choices": names}
+    info = Field(
+        default,
+        description=meaning,
+        json_schema_extra={name: value for name, value in extra.items() if value},
+        **bounds,
+    )
+    if names:
+        info.metadata.append(AfterValidator(_Choice(default, choices)))
+    if isinstance(default, tuple):
+        info.metadata.append(AS_TUPLE)
+    return info
+
+
+class _Choice:
+    """Check that a value is one of some names."""
+
+    def __init__(self, default: Any, names: Iterable[str]) -> None:
+        self._default, self._names = default, names
+
+    @property
+    def names(self) -> tuple[Any, ...]:
+        """The default first; a table may have got further entries."""
+        return tuple(dict.fromkeys((self._default, *self._names)))
+
+    def __call__(self, value: Any, info: ValidationInfo) -> Any:
+        if value not in self.names:
+            raise ValueError(
+                f"{info.field_name} is {self}, got {abbreviate(value)}{suggest(value, map(str, self.names))}"
+            )
+        return value
+
+    def __str__(self) -> str:
+        return f"one of {', '.join(str(name) for name in self.names if name)}"
+
+
+def setting_of(cls: type, name: str, default: Any) -> Any:
+    """Declare a setting that another class declares, with another default."""
+    info = copy(_fields(cls)[name])
+    info.default = default
+    return info
+
+
+@dataclass_transform(frozen_default=True)
+def settings_class(cls: type[T]) -> type[T]:
+    """Return a class of settings as a frozen data class that checks its values, and describes them.
+
+    An invalid value and an unknown name raise `SettingsError`.
+    """
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
+    made: Any = dataclass(frozen=True, slots=True, config=config)(cls)
+
+    @wraps(made.__init__)
+    def check(self: Any, *args: Any, **given: Any) -> None:
+        try:
+            # Strict, unlike a document, whose dates and classes are texts and objects.
+            made.__pydantic_validator__.validate_python(
+                ArgsKwargs(args, given), self_instance=self, strict=True
+            )
+        except ValidationError as error:
+            raise SettingsError(_explain(error, made)) from None
+
+    made.__init__ = check
+    described = "\n".join(
+        f"{name} : {values}\n    {info.description}" for name, info, values in list_settings(made)
+    )
+    made.__doc__ = f"{made.__doc__}\n\nAttributes\n----------\n{described}\n"
+    return cast("type[T]", made)
+
+
+def _fields(cls: type) -> dict[str, FieldInfo]:
+    found: dict[str, FieldInfo] = cls.__pydantic_fields__  # type: ignore[attr-defined]
+    return found
+
+
+def list_settings(cls: type) -> list[tuple[str, FieldInfo, str]]:
+    """Return the settings of a class: name, declaration, and which values it takes."""
+    return [(name, info, _describe_values(info)) for name, info in _fields(cls).items()]
+
+
+def list_changes(settings: Any) -> dict[str, Any]:
+    """Return the settings that differ from their defaults, by name."""
+    given = {name: getattr(settings, name) for name in _fields(type(settings))}
+    return {name: value for name, value in given.items() if value != _fields(type(settings))[name].default}
+
+
+def is_daily(info: FieldInfo) -> bool:
+    """Return whether commands have an option for a setting."""
+    assert isinstance(info.json_schema_extra, dict)
+    return bool(info.json_schema_extra.get("daily"))
+
+
+def _describe_values(info: FieldInfo) -> str:
+    for each in info.metadata:
+        if isinstance(each, AfterValidator) and isinstance(each.func, _Choice):
+            return str(each.func)
+    unit = info.json_schema_extra.get("unit", "") if isinstance(info.json_schema_extra, dict) else ""
+    return f"{_describe_type(info.annotation, info.metadata)} {unit}".rstrip()
+
+
+def _describe_type(kind: Any, metadata: Iterable[Any] = (), place: int = 0) -> str:
+    """Return what the values of a type are, with their bounds; ``place`` 1 for several of them."""
+    origin, args = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        metadata = (*args[1:], *metadata)
+        return _describe_type(
+            args[0], [part for each in metadata for part in getattr(each, "metadata", [each])], place
+        )
+    if origin in (Union, UnionType):
+        return " or ".join(_describe_type(each, metadata, place) for each in args if each is not type(None))
+    if origin is tuple:
+        return f"a list of {_describe_type(args[0], metadata, 1)}"
+    bounds = {
+        name: getattr(each, name)
+        for each in metadata
+        for name in ("ge", "gt", "le", "lt")
+        if hasattr(each, name)
+    }
+    noun = _NOUNS.get(kind, ("", ""))[place] or kind.__name__
+    match bounds:
+        case {"ge": low, "le": high}:
+            return f"{noun} from {low:g} to {high:g}"
+        case {"ge": low}:
+            return f"{noun} of at least {low:g}"
+        case {"gt": low}:
+            return f"{noun} above {low:g}"
+    return noun
+
+
+def _explain(error: ValidationError, cls: type) -> str:
+    """Return the message of the first problem, or of an unknown name, which may explain it."""
+    problems = error.errors(include_url=False)
+    unknown = [each for each in problems if each["type"] == "unexpected_keyword_argument"]
+    problem = (unknown or problems)[0]
+    place = problem["loc"][0]
+    name = list(_fields(cls))[place] if isinstance(place, int) else place
+    if unknown:
+        return f"there is no setting {name!r}{suggest(name, _fields(cls))}"
+    if problem["type"] == "value_error":
+        return problem["msg"].removeprefix("Value error, ")
+    return f"{name} is {_describe_values(_fields(cls)[name])}, got {abbreviate(problem['input'])}"
+
+
+def parse_setting(cls: type, name: str, value: object) -> Any:
+    """Return the value of a setting from a text or from a value of TOML; a text has commas between items.
+
+    Raises
+    ------
+    SettingsError
+        It is none of the setting.
+    """
+    info = _fields(cls)[name]
+    given: Any = value
+    if isinstance(value, str) and _has_list(info.annotation):
+        given = [word.strip() for word in value.split(",")]
+    try:
+        return TypeAdapter(_type(info)).validate_python(given)
+    except ValidationError:
+        raise SettingsError(f"{name} is {_describe_values(info)}, got {abbreviate(value)}") from None
+
+
+def _has_list(kind: Any) -> bool:
+    return get_origin(kind) is tuple or any(_has_list(each) for each in get_args(kind))
+
+
+def _type(info: FieldInfo) -> Any:
+    return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
+
+
+def make_changes_model(cls: type, name: str, config: ConfigDict) -> type[BaseModel]:
+    """Return the model of a document that has some of the settings of a class."""
+    types: dict[str, Any] = {
+        key: (
+            _type(info) | None,
+            Field(None, description=info.description, json_schema_extra=info.json_schema_extra),
+        )
+        for key, info in _fields(cls).items()
+    }
+    return create_model(name, __config__=config, **types)
