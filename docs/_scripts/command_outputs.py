@@ -116,7 +116,7 @@ def main() -> None:
         return outputs[command]
 
     with TemporaryDirectory() as folder, chdir(folder):
-        run("examples copy")
+        run("examples .")
         for page in PAGES:
             page.write_text(update(page.read_text("utf-8"), run), encoding="utf-8")
         draw_gallery({name: load_result(name) for name in EXAMPLE_RECORDS})

@@ -13,7 +13,7 @@ PICTURES = Path(__file__).parents[1] / "pictures"
 
 #: Commands of the page, without the name of the program.
 COMMANDS = (
-    "examples copy",
+    "examples .",
     "fit motor.csv --input drive_V --output speed_rad_s --out motor --figures all",
 )
 

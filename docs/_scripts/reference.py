@@ -165,7 +165,7 @@ def systems() -> str:
     )
     return page(
         "Systems and published models",
-        "Simulated systems of `islands systems make`, and models that the paper publishes.",
+        "Simulated systems of `islands systems`, and models that the paper publishes.",
         section("Systems", table(("System", "Meaning", "Variants", "Parts"), rows)),
         section(
             "Published models",

@@ -41,7 +41,7 @@ QUICK = [command for command in LIMITS if not command.startswith(("simulate", "d
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
     folder = tmp_path_factory.mktemp("examples")
-    done = subprocess.run([sys.executable, "-m", "islands", "examples", "copy", folder], check=False)
+    done = subprocess.run([sys.executable, "-m", "islands", "examples", folder], check=False)
     assert done.returncode == 0
     write_model(get_published_model("13").model, folder / "model.json")
     return folder / "piezo.csv"

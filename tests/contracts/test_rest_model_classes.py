@@ -53,7 +53,7 @@ def test_a_job_of_a_class_has_the_model_and_its_exports(service, dataset):
         figures = service.client.get(f"/v1/jobs/{job.id}/figures").json()["items"]
         assert figures == ["record", "front"]
         assert {f"{name}.svg" for name in figures} <= made.keys()
-        assert "slope = -0." in succeed("jobs", "watch", job.id, "--url", service.url)
+        assert "slope = -0." in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
         # The model is a simulation of a diagnosis.
         simulation = {"kind": "model", "model": document}
         assert client.diagnose(dataset, "u_V", "y_K", simulation).state == JobState.QUEUED

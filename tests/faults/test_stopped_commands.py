@@ -63,7 +63,7 @@ LIMIT = 2.0
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Records of all commands; the kernels are compiled."""
     base = tmp_path_factory.mktemp("stopped")
-    succeed("examples", "copy", base)
+    succeed("examples", base)
     write_two_outputs(base / "two.csv")
     (base / "records").mkdir()
     for day in range(1, 30):

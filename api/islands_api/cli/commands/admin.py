@@ -25,8 +25,8 @@ admin = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
 )
-admin.add_typer(owners, name="owners")
-admin.add_typer(jobs, name="jobs")
+admin.command()(owners)
+admin.command()(jobs)
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the backup.")]
 
@@ -66,22 +66,22 @@ def audit(
 
 
 @admin.command()
-def backup(folder: Folder, data_dir: DataDir = None, database: Database = None) -> None:
+def backup(
+    folder: Folder,
+    verify: Annotated[bool, typer.Option("--verify", help="Read a whole backup and check it.")] = False,
+    data_dir: DataDir = None,
+    database: Database = None,
+) -> None:
     """Write a backup of database and files into a new folder. The service may run meanwhile."""
-    from islands_service.backup import create_backup  # noqa: PLC0415
+    from islands_service.backup import create_backup, verify_backup  # noqa: PLC0415
 
+    if verify:
+        _print_manifest("complete", folder, verify_backup(folder, _report))
+        return
     settings = service_settings(data_dir=data_dir, database=database)
     with open_store(data_dir, database) as store:
         manifest = create_backup(store.database, open_blobs(settings), folder, _report)
     _print_manifest("written", folder, manifest)
-
-
-@admin.command()
-def verify(folder: Folder) -> None:
-    """Read a whole backup and check it."""
-    from islands_service.backup import verify_backup  # noqa: PLC0415
-
-    _print_manifest("complete", folder, verify_backup(folder, _report))
 
 
 @admin.command()

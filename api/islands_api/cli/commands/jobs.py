@@ -30,7 +30,7 @@ from islands_api.schemas import JobView
 from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, PRIORITIES, JobState
 
 jobs = typer.Typer(
-    help="Jobs of a service: submit, diagnose, list, show, watch, rename, tag, cancel, stop, resume, result.",
+    help="Jobs of a service: submit, diagnose, list, show, label, stop, resume, result.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -201,60 +201,41 @@ def list_jobs(
 
 
 @jobs.command()
-def show(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Show the current state of a job."""
-    with open_client(url, key) as client:
-        views.show_job(client.job(job), as_json)
-
-
-@jobs.command()
-def watch(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Follow a job until it has ended, and print its result. Ctrl-C stops watching, not the job."""
+def show(job: Id, url: Url = LOCAL, key: ApiKey = None, watch: Watch = False, as_json: Json = False) -> None:
+    """Show a job. With --watch follow it until it has ended; Ctrl-C stops watching, not the job."""
     with open_client(url, key) as client:
         now = client.job(job)
-    _follow(url, key, now, as_json)
+    _follow(url, key, now, as_json, watch)
 
 
 @jobs.command()
-def rename(
+def label(
     job: Id,
-    name: Annotated[str, typer.Argument(help="The new name; an empty one for none.")],
-    url: Url = LOCAL,
-    key: ApiKey = None,
-    as_json: Json = False,
-) -> None:
-    """Change the name of a job."""
-    with open_client(url, key) as client:
-        views.show_labels(client.label(job, name), as_json)
-
-
-@jobs.command()
-def tag(
-    job: Id,
+    name: Annotated[str | None, typer.Option("--name", help="The new name; an empty one for none.")] = None,
     tags: Annotated[
-        list[str] | None, typer.Argument(help="The new tags; without any, all are removed.")
+        list[str] | None, typer.Option("--tag", help="A new tag, instead of the present ones; '' for none.")
     ] = None,
     url: Url = LOCAL,
     key: ApiKey = None,
     as_json: Json = False,
 ) -> None:
-    """Replace the tags of a job."""
+    """Change the name or the tags of a job."""
+    new = None if tags is None else [tag for tag in tags if tag]
     with open_client(url, key) as client:
-        views.show_labels(client.label(job, tags=tags or []), as_json)
+        views.show_labels(client.label(job, name, tags=new), as_json)
 
 
 @jobs.command()
-def cancel(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Cancel a job; it can be resumed."""
+def stop(
+    job: Id,
+    cancel: Annotated[bool, typer.Option("--cancel", help="Cancel the job; it can be resumed.")] = False,
+    url: Url = LOCAL,
+    key: ApiKey = None,
+    as_json: Json = False,
+) -> None:
+    """Stop the search of a job, which then succeeds with the best models found so far, or cancel it."""
     with open_client(url, key) as client:
-        views.show_job(client.cancel(job), as_json)
-
-
-@jobs.command()
-def stop(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Stop the search of a job, which then succeeds with the best models found so far."""
-    with open_client(url, key) as client:
-        views.show_job(client.stop(job), as_json)
+        views.show_job(client.cancel(job) if cancel else client.stop(job), as_json)
 
 
 @jobs.command()
@@ -339,7 +320,9 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool 
                     job = current
                     update(job)
         except KeyboardInterrupt:
-            errors.print(f"the job continues: 'islands jobs watch {job.id}' follows it again", markup=False)
+            errors.print(
+                f"the job continues: 'islands jobs show {job.id} --watch' follows it again", markup=False
+            )
             raise
         if as_json:
             views.show_job(job, as_json)

@@ -20,7 +20,7 @@ from islands_api.schemas import JobView
 from islands_service.domain.job import TERMINAL
 
 monitors = typer.Typer(
-    help="Monitors of a service: create, add records, list, show, delete.",
+    help="Monitors of a service: create, add records, show, delete.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -151,29 +151,12 @@ def _await_record(client: Client, job: JobView) -> int:
     return 0
 
 
-@monitors.command("list")
-def list_monitors(
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of monitors to list.")] = 50,
-    url: Url = LOCAL,
-    key: ApiKey = None,
-    as_json: Json = False,
-) -> None:
-    """List the monitors, newest first."""
-    with open_client(url, key) as client:
-        found = read_pages(client.monitors, limit)
-    if as_json:
-        print_json({"items": [each.model_dump(mode="json") for each in found]})
-        return
-    # Not a table: it would truncate the ids in a narrow terminal or a pipe.
-    output.print(_LINE.format("monitor", "status", "records", "alarms", "pending", "name"), markup=False)
-    for each in found:
-        line = _LINE.format(each.id, each.status, each.records, each.alarms, each.pending, each.name)
-        output.print(line, markup=False)
-
-
 @monitors.command()
 def show(
-    monitor: Id,
+    monitor: Annotated[
+        str | None, typer.Argument(help="The monitor's id; without one, monitors are listed, newest first.")
+    ] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of monitors to list.")] = 50,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for states, alarms and figure, as of islands monitor."),
@@ -182,13 +165,16 @@ def show(
     key: ApiKey = None,
     as_json: Json = False,
 ) -> None:
-    """Show the last record and the alarms of a monitor, and download its states.
+    """List the monitors, or show the last record and the alarms of one and download its states.
 
     Raises
     ------
     SettingsError
         There is nothing to download before the first record.
     """
+    if monitor is None:
+        _list(url, key, limit, as_json)
+        return
     with open_client(url, key) as client:
         found = client.monitor(monitor)
         if found.result is None and out is not None:
@@ -223,3 +209,16 @@ def _show_status(monitor: MonitorView, as_json: bool) -> None:
     counts = f"records {monitor.records}, alarms {monitor.alarms}"
     waiting = f", records to analyse {monitor.pending}" if monitor.pending else ""
     output.print(f"monitor {monitor.id}{named}: {monitor.status}, {counts}{waiting}", markup=False)
+
+
+def _list(url: str, key: str | None, limit: int, as_json: bool) -> None:
+    with open_client(url, key) as client:
+        found = read_pages(client.monitors, limit)
+    if as_json:
+        print_json({"items": [each.model_dump(mode="json") for each in found]})
+        return
+    # Not a table: it would truncate the ids in a narrow terminal or a pipe.
+    output.print(_LINE.format("monitor", "status", "records", "alarms", "pending", "name"), markup=False)
+    for each in found:
+        line = _LINE.format(each.id, each.status, each.records, each.alarms, each.pending, each.name)
+        output.print(line, markup=False)

@@ -1,5 +1,6 @@
 """``islands admin jobs``: the jobs of all owners, in the database of a service."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,18 +12,22 @@ from islands.errors import lookup
 from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
 from islands_service.domain.job import JobState
 
-jobs = typer.Typer(help="Jobs of all owners: list, cancel.", no_args_is_help=True, add_completion=False)
 
-
-@jobs.command("list")
-def list_jobs(
+def jobs(
+    cancel: Annotated[
+        str | None,
+        typer.Option("--cancel", metavar="JOB", help="Cancel this job; the audit trail records it."),
+    ] = None,
     owner: Annotated[str | None, typer.Option("--owner", help="Only jobs of this owner.")] = None,
     state: Annotated[str | None, typer.Option("--state", help=", ".join(JobState))] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, max=200, help="Largest number of jobs.")] = 50,
     data_dir: DataDir = None,
     database: Database = None,
 ) -> None:
-    """List the jobs of all owners, newest first."""
+    """List the jobs of all owners, newest first, or cancel one."""
+    if cancel is not None:
+        _cancel(cancel, data_dir, database)
+        return
     wanted = None if state is None else lookup({str(each): each for each in JobState}, state, "state")
     with open_store(data_dir, database) as store:
         found = store.jobs.page(owner, wanted, None, limit).jobs
@@ -36,13 +41,7 @@ def list_jobs(
     output.print(table)
 
 
-@jobs.command()
-def cancel(
-    job: Annotated[str, typer.Argument(help="The job's id, from the list.")],
-    data_dir: DataDir = None,
-    database: Database = None,
-) -> None:
-    """Cancel a job of any owner; the audit trail records it."""
+def _cancel(job: str, data_dir: Path | None, database: str | None) -> None:
     with open_store(data_dir, database) as store:
         cancelled = store.jobs.cancel(None, job, COMMAND_LINE)
     done = "is cancelled" if cancelled.state == JobState.CANCELLED else "is being cancelled"

@@ -53,7 +53,7 @@ function makeWelcomeCard() {
       "p",
       {},
       "Without a record, ",
-      el("code", {}, "islands examples copy"),
+      el("code", {}, "islands examples ."),
       " writes four. From a program, for the columns ",
       el("code", {}, "u_V"),
       " and ",

@@ -97,7 +97,7 @@ def _read_owner(connection: Connection, name: str) -> Owner:
     found = _read_owners(connection, name)
     if not found:
         raise OwnerNotFoundError(
-            f"there is no owner {name!r}: list them with 'islands admin owners list', or create a key of it"
+            f"there is no owner {name!r}: list them with 'islands admin owners', or create a key of it"
         )
     return found[0]
 

@@ -10,26 +10,18 @@ from islands.errors import SettingsError
 from islands.records.writer import write_record
 from islands.systems.example_records import EXAMPLE_RECORDS
 
-examples = typer.Typer(
-    help="Records to try the commands on: list them, copy them.", no_args_is_help=True, add_completion=False
-)
 
-
-@examples.command("list")
-def list_examples() -> None:
-    """List the records."""
-    for name, example in EXAMPLE_RECORDS.items():
-        output.print(f"{name}.csv  {example.description}", markup=False)
-
-
-@examples.command()
-def copy(
+def examples(
     folder: Annotated[
-        Path, typer.Argument(help="Folder for the files; the current one by default.")
-    ] = Path(),
+        Path | None, typer.Argument(help="Folder for the files; without one, the records are listed.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
 ) -> None:
-    """Write the records as CSV into a folder."""
+    """List records to try the commands on, or write them as CSV into a folder."""
+    if folder is None:
+        for name, example in EXAMPLE_RECORDS.items():
+            output.print(f"{name}.csv  {example.description}", markup=False)
+        return
     paths = {name: folder / f"{name}.csv" for name in EXAMPLE_RECORDS}
     if not force and (present := [path for path in paths.values() if path.exists()]):
         raise SettingsError(f"{present[0]} exists: give another folder, or --force to replace it")

@@ -67,19 +67,19 @@ def test_audit_lists_changes_newest_first(run: Run, subjects: list[str]) -> None
 
 def test_owners_are_listed_and_changed(run: Run, subjects: list[str], command_line: Run) -> None:
     owners = partial(command_line, "admin", "owners")
-    assert owners("set", "bob", "--weight", 200, "--max-running", 2, "--max-islands", 8) == (
+    assert owners("bob", "--set", "weight=200", "--set", "max_running=2", "--set", "max-islands=8") == (
         0,
         "owner bob: weight 200, max_running 2, max_islands 8\n",
         "",
     )
-    code, out, _ = owners("list", "--json")
+    code, out, _ = owners("--json")
     listed = {each["name"]: each for each in map(json.loads, out.splitlines())}
     assert (code, set(listed)) == (0, {"bob"})
     assert (listed["bob"]["weight"], listed["bob"]["quotas"]["max_running"]) == (200, 2)
-    assert "200" in owners("list")[1]
-    assert owners("set", "bob", "--unset", "max-running", "--unset", "max-islands", "--unset", "weight")[
-        1
-    ] == ("owner bob: weight 100, default quotas\n")
+    assert "200" in owners()[1]
+    assert owners("bob", "--unset", "max-running", "--unset", "max_islands", "--unset", "weight")[1] == (
+        "owner bob: weight 100, default quotas\n"
+    )
     restored, changed = read(run, "--limit", "2")
     assert (changed["action"], changed["owner"], changed["address"]) == (
         "change-owner",
@@ -93,9 +93,10 @@ def test_owners_are_listed_and_changed(run: Run, subjects: list[str], command_li
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("unknown", "--weight", 2), "there is no owner 'unknown'"),
-        (("bob", "--weight", 0), "weight is an integer from 1 to 10000, got 0"),
-        (("bob", "--max-stored", -1), "max_stored is an integer of at least 0, got -1"),
+        (("unknown", "--set", "weight=2"), "there is no owner 'unknown'"),
+        (("bob", "--set", "weight=0"), "weight is an integer from 1 to 10000, got 0"),
+        (("bob", "--set", "max_stored=-1"), "max_stored is an integer of at least 0, got -1"),
+        (("bob", "--set", "weight=much"), "weight is an integer, got 'much'"),
         (("bob", "--unset", "size"), "size is no quota: take one of max_active"),
     ],
 )
@@ -103,7 +104,7 @@ def test_invalid_change_of_an_owner_is_refused(
     run: Run, subjects: list[str], command_line: Run, words: tuple[object, ...], message: str
 ) -> None:
     before = read(run)
-    code, out, err = command_line("admin", "owners", "set", *words)
+    code, out, err = command_line("admin", "owners", *words)
     assert (code, out) == (2, "")
     assert message in " ".join(err.split())
     assert read(run) == before
@@ -137,19 +138,19 @@ def test_operator_lists_and_cancels_jobs_of_all_owners(folder: Path, command_lin
         first = submitted(store, "alice")
         store.leases.renew(claimed(store), 60.0, ran=71.4)
         second = submitted(store, "[bob]")
-        code, out, err = admin("list")
+        code, out, err = admin()
         assert (code, err) == (0, "")
         rows = [line.split() for line in out.splitlines() if first.id in line or second.id in line]
         assert [row[1:-1:2] for row in rows] == [
             [second.id, "[bob]", "queued", "0"],
             [first.id, "alice", "running", "71"],
         ]
-        assert second.id not in admin("list", "--owner", "alice")[1]
-        assert first.id not in admin("list", "--state", "queued")[1]
-        assert admin("list", "--state", "asleep")[:2] == (2, "")
-        assert admin("cancel", first.id)[1] == f"job {first.id} of owner alice is being cancelled\n"
-        assert admin("cancel", second.id)[1] == f"job {second.id} of owner [bob] is cancelled\n"
-        code, _, err = admin("cancel", second.id)
+        assert second.id not in admin("--owner", "alice")[1]
+        assert first.id not in admin("--state", "queued")[1]
+        assert admin("--state", "asleep")[:2] == (2, "")
+        assert admin("--cancel", first.id)[1] == f"job {first.id} of owner alice is being cancelled\n"
+        assert admin("--cancel", second.id)[1] == f"job {second.id} of owner [bob] is cancelled\n"
+        code, _, err = admin("--cancel", second.id)
         assert code == 2
         assert "there is nothing to cancel" in err
         assert store.jobs.get("[bob]", second.id).state == JobState.CANCELLED

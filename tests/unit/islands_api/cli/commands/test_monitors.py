@@ -43,7 +43,7 @@ def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
     code, shown, _ = run(*CREATE, "--false-alarms", "1 per 720 records", "--name", "press 4", "--json")
     made = json.loads(shown)
     assert (code, made["spec"]["false_alarms"]) == (0, "1 per 720 records")
-    assert made["id"] in run("list")[1]
+    assert made["id"] in run("show")[1]
     assert run("show", made["id"])[1] == f"monitor {made['id']} (press 4): waiting, records 0, alarms 0\n"
     code, _, complaint = run("show", made["id"], "--out", "states")
     assert code == 2

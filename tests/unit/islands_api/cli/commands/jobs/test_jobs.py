@@ -48,10 +48,10 @@ def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: s
     job = ahead(service, owner, spec=spec(kept(service.store, owner)))
     waits = re.compile(rf"job {job}: queued\nnumber \d+ in the queue\n")
     assert waits.fullmatch(run("show", job)[1])
-    assert run("cancel", job)[:2] == (0, f"job {job}: cancelled\n")
+    assert run("stop", job, "--cancel")[:2] == (0, f"job {job}: cancelled\n")
     assert waits.fullmatch(run("resume", job)[1])
-    for name in ("show", "cancel", "resume"):
-        printed = json.loads(run(name, job, "--json")[1])
+    for words in (("show", job), ("stop", job, "--cancel"), ("resume", job)):
+        printed = json.loads(run(*words, "--json")[1])
         assert printed["id"] == job
     service.store.leases.finish(taken(service.store, job), FAILED)
     assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
@@ -82,10 +82,10 @@ def test_job_is_submitted_watched_and_shown(
 def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, owner: str) -> None:
     job = ahead(service, owner)
     service.store.leases.finish(taken(service.store, job), FAILED)
-    code, out, err = run("watch", job)
+    code, out, err = run("show", job, "--watch")
     assert (code, out) == (2, "")
     assert err.splitlines() == [f"job {job}", f"error: job {job} failed: it broke"]
-    code, out, _ = run("watch", job, "--json")
+    code, out, _ = run("show", job, "--watch", "--json")
     assert code == 2
     assert json.loads(out)["problem"]["detail"] == "it broke"
 
@@ -95,7 +95,7 @@ def test_interrupting_watch_does_not_cancel_the_job(service: Service, owner: str
     job = ahead(service, owner)
     taken(service.store, job)
     with subprocess.Popen(
-        [ISLANDS, "jobs", "watch", job],
+        [ISLANDS, "jobs", "show", job, "--watch"],
         env={**os.environ},
         stderr=subprocess.PIPE,
         text=True,
@@ -108,7 +108,7 @@ def test_interrupting_watch_does_not_cancel_the_job(service: Service, owner: str
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert f"the job continues: 'islands jobs watch {job}' follows it again" in err
+    assert f"the job continues: 'islands jobs show {job} --watch' follows it again" in err
     assert "Traceback" not in err
     now = service.store.jobs.get(owner, job)
     assert (now.state, now.cancel_requested) == ("running", False)
@@ -158,14 +158,17 @@ def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) 
 @pytest.mark.ci
 def test_jobs_are_renamed_tagged_and_found(run: Run, service: Service, owner: str) -> None:
     job, other = ahead(service, owner, name="one"), ahead(service, owner, name="two")
-    assert run("rename", job, "[red] stage")[1] == f"job {job}: [red] stage, no tags\n"
-    assert run("tag", job, "rig 2", "cold")[1] == f"job {job}: [red] stage, tags: rig 2, cold\n"
+    assert run("label", job, "--name", "[red] stage")[1] == f"job {job}: [red] stage, no tags\n"
+    assert (
+        run("label", job, "--tag", "rig 2", "--tag", "cold")[1]
+        == f"job {job}: [red] stage, tags: rig 2, cold\n"
+    )
     for filters in (["--tag", "cold"], ["--search", "STAGE rig"]):
         out = run("list", "--kind", "identification", *filters)[1]
         assert job in out
         assert "[red] stage [rig 2] [cold]" in out
         assert other not in out
-    assert run("tag", job)[1] == f"job {job}: [red] stage, no tags\n"
+    assert run("label", job, "--tag", "")[1] == f"job {job}: [red] stage, no tags\n"
     code, _, err = run("list", "--tag", "a,b")
     assert code == 2
     assert "tag" in err
@@ -187,7 +190,7 @@ def test_jobs_are_renamed_tagged_and_found(run: Run, service: Service, owner: st
         (("list", "--url", "here"), "'here' is not the address of a service"),
         (("list", "--url", "http://127.0.0.1:9"), "the service at http://127.0.0.1:9 does not answer"),
         (
-            ("watch", "x", "--url", "http://127.0.0.1:9"),
+            ("show", "x", "--watch", "--url", "http://127.0.0.1:9"),
             "does not answer (Connection refused): check that it runs",
         ),
         (("list", "--key", "islands_wrong"), "the key is unknown"),

@@ -193,7 +193,7 @@ def test_invalid_diagnosis_is_rejected_in_one_line(run: Run, arguments: Any, mes
 
 def test_diagnosis_is_watched_listed_and_shown_as_text(run: Run, diagnosed: str) -> None:
     words = "It lacks something.\n  thermal-drift\n"
-    assert run("watch", diagnosed)[1] == words
+    assert run("show", diagnosed, "--watch")[1] == words
     assert run("show", diagnosed)[1] == f"job {diagnosed}: succeeded\n{words}"
     assert run("result", diagnosed)[1] == words
     first, second = run("list")[1].splitlines()[2:4]
