@@ -3,9 +3,10 @@
 A class of settings is a data class whose fields `setting` makes; `settings_class` lets it check its values.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from functools import wraps
+from inspect import Parameter, cleandoc, signature
 from numbers import Integral
 from reprlib import repr as abbreviate
 from types import UnionType
@@ -29,6 +30,7 @@ from pydantic_core import ArgsKwargs
 from islands.errors import SettingsError, suggest
 
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _as_integer(value: Any) -> Any:
@@ -141,11 +143,34 @@ def settings_class(cls: type[T]) -> type[T]:
             raise SettingsError(_explain(error, made)) from None
 
     made.__init__ = check
-    described = "\n".join(
-        f"{name} : {values}\n    {info.description}" for name, info, values in list_settings(made)
-    )
-    made.__doc__ = f"{made.__doc__}\n\nAttributes\n----------\n{described}\n"
+    made.__doc__ = f"{cleandoc(made.__doc__ or '')}\n\nAttributes\n----------\n{_describe(made)}\n"
     return cast("type[T]", made)
+
+
+def document_settings(cls: type, name: str) -> Callable[[F], F]:
+    """Let the signature and the docstring of a function list settings in place of ``**name``."""
+
+    def decorate(function: F) -> F:
+        declared = signature(function)
+        own = [each for each in declared.parameters.values() if each.name != name]
+        listed = [
+            Parameter(each, Parameter.KEYWORD_ONLY, default=info.default)
+            for each, info, _ in list_settings(cls)
+        ]
+        function.__signature__ = declared.replace(parameters=[*own, *listed])  # type: ignore[attr-defined]
+        function.__doc__ = str(function.__doc__).replace(
+            f"**{name}\n", _describe(cls, "    ").lstrip() + "\n"
+        )
+        return function
+
+    return decorate
+
+
+def _describe(cls: type, indent: str = "") -> str:
+    return "\n".join(
+        f"{indent}{name} : {values}\n{indent}    {info.description}"
+        for name, info, values in list_settings(cls)
+    )
 
 
 def _fields(cls: type) -> dict[str, FieldInfo]:

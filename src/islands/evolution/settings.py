@@ -64,7 +64,10 @@ _Primitive = Annotated[
 
 @settings_class
 class Settings:
-    """Settings of an evolution: the parameters of section 5 of the paper, and those it leaves open."""
+    """Settings of an evolution: the parameters of section 5 of the paper, and those it leaves open.
+
+    A default holds unless the preset has another value.
+    """
 
     population: Integer = setting(500, "Offspring of each generation: individuals of an island.", ge=1)
     generations: Integer = setting(500, "Generations of a search, at most.", ge=0, daily=True)

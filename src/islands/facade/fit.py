@@ -27,6 +27,7 @@ from islands.records.reading.data_frames import read_data
 from islands.records.reading.options import DEFAULT_READING
 from islands.records.split import split_data, warn_of_extrapolation
 from islands.report.documents.result_folder import record_document
+from islands.settings_schema import document_settings
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from islands.records.reading.data_frames import ReadingLike, RecordLike
 
 
+@document_settings(FitSettings, "settings")
 def fit(
     record: "RecordLike",
     y: "ArrayLike | IntoSeries | None" = None,
@@ -74,7 +76,6 @@ def fit(
         Called before each step. Once it returns true, the fit ends with the models so far, without prediction
         bands; ``search.ended_by`` of the result is ``stopped``.
     **settings
-        Settings that differ from those of `FitSettings`, such as ``library="narx", max_terms=6``.
 
     Returns
     -------

@@ -7,7 +7,7 @@ import typer
 
 from islands.cli.console import output
 from islands.cli.settings_options import list_classes
-from islands.errors import SettingsError, suggest
+from islands.errors import SettingsError
 from islands.report.text.layout import wrap
 from islands.settings_schema import list_settings
 
@@ -23,26 +23,30 @@ def settings(
     Change them by --set NAME=VALUE, or in islands.toml: a table for each command, as [fit].
     """
     assert context.parent is not None
-    commands = dict(_walk(context.parent.command, context.parent))
-    if command and command not in commands:
-        raise SettingsError(f"{command!r} is no command with settings{suggest(command, commands)}")
+    first, _, _ = command.partition(" ")
     users: dict[type, list[str]] = {}
-    for name, each in commands.items():
+    for name, each in _walk(context.parent.command, context.parent, only=first):
         if command in ("", name):
             for cls in list_classes(each):
                 users.setdefault(cls, []).append(name)
+    if not users:
+        raise SettingsError(
+            f"there is no command {command!r} with settings: islands --help lists the commands"
+        )
     for cls, names in users.items():
-        title = str(cls.__doc__).partition("\n")[0]
-        output.print(f"[bold]{title}[/] Of {', '.join(names)}.", markup=True)
+        text = str(cls.__doc__).partition("\n\nAttributes")[0]
+        output.print(f"{' '.join(text.split())} Of {', '.join(names)}.", markup=False)
         for name, info, values in list_settings(cls):
             output.print(f"  {name} = {_write(info.default)}: {values}", markup=False)
             output.print("\n".join(wrap(f"      {info.description}", "      ")), markup=False)
         output.print()
 
 
-def _walk(group: Any, context: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the commands that have settings, by their names."""
+def _walk(group: Any, context: Any, prefix: str = "", only: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the commands that have settings, by their names; import one of them only if it is given."""
     for name in group.list_commands(context):
+        if only and name != only:
+            continue
         command = group.get_command(context, name)
         if hasattr(command, "commands"):
             yield from _walk(command, context, f"{name} ")
