@@ -4,11 +4,9 @@ from collections.abc import Sequence
 
 from islands.report.text.diagnosis_facts import DiagnosisFacts
 from islands.report.text.facts import (
-    BEFORE_REFIT,
     Document,
     ResultFacts,
     is_refitted,
-    write_amount,
 )
 from islands.report.text.templates import write
 
@@ -21,15 +19,7 @@ def write_headline(document: Document) -> str:
     document : mapping
         Content of ``result.json``.
     """
-    facts = ResultFacts(document)
-    size, output = facts.model["size"], facts.record["names"]["output"]
-    counted = "parameter" if facts.has_named_parameters else "term"
-    terms = f"{size} {counted}{'s' * (size != 1)}"
-    error = facts.error()
-    if error["rmse"] is None:
-        return f"The free run of a model of {terms} diverges on the validation data of {output}"
-    stated = _state_error(error, facts.unit) + _add_refit(facts.model)
-    return f"A model of {terms} simulates {output} with a {stated}"
+    return "".join(write("headlines.txt", "result", f=ResultFacts(document)))
 
 
 def write_coupled_headline(outputs: Sequence[Document]) -> str:
@@ -40,15 +30,8 @@ def write_coupled_headline(outputs: Sequence[Document]) -> str:
     outputs : sequence of mapping
         Entries of ``outputs`` in ``result.json``.
     """
-    errors = [each["metrics"]["validation"]["free_run"] for each in outputs]
-    names = " and ".join(each["name"] for each in outputs)
-    if any(each["rmse"] is None for each in errors):
-        return f"The free run of the model of {names} diverges on the validation data"
-    stated = [
-        f"{each['name']} with a {_state_error(error, each['unit'])}"
-        for each, error in zip(outputs, errors, strict=True)
-    ]
-    return f"The model of {len(outputs)} outputs simulates {' and '.join(stated)}"
+    diverges = any(each["metrics"]["validation"]["free_run"]["rmse"] is None for each in outputs)
+    return "".join(write("headlines.txt", "coupled", outputs=outputs, diverges=diverges))
 
 
 def write_comparison_headline(
@@ -66,15 +49,13 @@ def write_comparison_headline(
     outputs = " and ".join(dict.fromkeys(output for _, (output, _), _ in models))
     errors = [entry["metrics"]["validation"]["free_run"] for _, _, entry in models]
     known = [at for at, error in enumerate(errors) if error["rmse"] is not None]
-    if not is_comparable:
-        return f"{len(models)} models of {outputs}"
-    if not known:
-        return f"The free runs of {len(models)} models of {outputs} diverge on the validation data"
     # The error that is stated is the least one; it is undefined for a constant output.
     stated = "rmse" if any(errors[at]["mape"] is None for at in known) else "mape"
-    name, (_, unit), _ = models[best := min(known, key=lambda at: float(errors[at][stated]))]
-    error = _state_error(errors[best], unit) + _add_refit(models[best][2])
-    return f"Of {len(models)} models, {name} simulates {outputs} best, with a {error}"
+    best = min(known, key=lambda at: float(errors[at][stated]), default=0)
+    name, (_, unit), entry = models[best]
+    values = {"name": name, "unit": unit, "error": errors[best], "is_refitted": is_refitted(entry)}
+    values |= {"count": len(models), "outputs": outputs, "is_comparable": is_comparable}
+    return "".join(write("headlines.txt", "comparison", diverges=not known, **values))
 
 
 def write_diagnosis_headline(document: Document) -> str:
@@ -91,14 +72,3 @@ def write_diagnosis_headline(document: Document) -> str:
         Empty if the errors are unknown.
     """
     return "".join(write("diagnosis.txt", "headline", f=DiagnosisFacts(document)))
-
-
-def _state_error(error: Document, unit: str) -> str:
-    # The error relative to the range is undefined for a constant output.
-    if error["mape"] is None:
-        return f"free-run error (RMSE) of {write_amount(error['rmse'], unit)}"
-    return f"mean absolute error of {error['mape']:.3g} % of its range"
-
-
-def _add_refit(entry: Document) -> str:
-    return f", {BEFORE_REFIT}" if is_refitted(entry) else ""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from islands.errors import name_option
 from islands.progress import Failure, attempt
-from islands.report.text.facts import CERTAIN, write_amount
+from islands.report.text.facts import BEFORE_REFIT, CERTAIN, write_amount
 from islands.validation.predictable_residual import LARGEST_SHARE
 from islands.validation.prediction_bands import LEVEL
 
@@ -73,6 +73,7 @@ def _load() -> "Environment":
     )
     environment.filters |= {
         "amount": write_amount,
+        "counted": lambda count, noun: f"{count} {noun}{'s' * (count != 1)}",
         "digits": lambda value, count: float(f"{value:.{count}g}"),
         "effect_label": lambda effect, facts: facts.label_effect(effect),
         "form": format,
@@ -83,6 +84,7 @@ def _load() -> "Environment":
         "round_down": lambda share: f"{floor(100 * share) / 100:.2f}",
     }
     environment.globals |= {
+        "BEFORE_REFIT": BEFORE_REFIT,
         "BAND": f"{100 * LEVEL:g} %",
         "CERTAIN": CERTAIN,
         "LARGEST_SHARE": LARGEST_SHARE,
