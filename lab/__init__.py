@@ -1,7 +1,6 @@
 """Laboratory: measurements of the project, which a checkout has and the package does not.
 
-``python -m lab`` lists the commands of the laboratory. Every other measurement is a module that states its
-call: ``python -m lab.service.load store``. They use the records and processes of ``tests/support``.
+``README.md`` lists them. They use the records and processes of ``tests/support``.
 """
 
 import sys

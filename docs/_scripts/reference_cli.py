@@ -7,6 +7,7 @@ from typing import Any, get_args
 from tables import code, escape, page, section, table
 from typer.main import get_command
 
+from islands.cli.app import MEASUREMENTS
 from islands.cli.settings_options import list_classes
 from islands_api.cli.app import app
 
@@ -40,7 +41,8 @@ def cli() -> str:
     """Return the page of the command line."""
     return page(
         "Command line",
-        "Every command of `islands` with its arguments and options. `islands COMMAND --help` shows the same.",
+        "Every command of `islands` with its arguments and options. `islands COMMAND --help` shows the same. "
+        f"{codes(MEASUREMENTS)} need a checkout of the repository.",
         *(_command(name, command) for name, command in commands() if name != "islands"),
     )
 

@@ -21,7 +21,7 @@ def test_short_form_of_case_2_prints_and_writes_its_tables(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The tasks run in this process, and the figures are not laid out."""
-    monkeypatch.setattr("islands.cli.engines.has_ray", lambda: False)
+    monkeypatch.setattr("lab.parallel_map.has_ray", lambda: False)
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
     with undrawn_figures():
         printed = succeed("reproduce", "case2", "--quick", "--out", tmp_path)
