@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("src", "services", "measurements", "api")
+PACKAGES = ("src", "services", "api")
 
 #: Results of executed examples, by a hash of the example and of the packages. Git ignores ``build/``.
 CACHE = ROOT / "build" / "tutorials"
