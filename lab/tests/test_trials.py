@@ -48,6 +48,7 @@ def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.Mo
     assert (tmp_path / "confusion.svg").exists()
 
 
+@pytest.mark.timeout(900)
 def test_unusual_causes_are_scored_on_fresh_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The trials run in this process, one after the other."""
     pool = "islands_service.runtime.parallel_map.ray_pool"
