@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Iterator
 from typing import Any, get_args
 
-from tables import code, escape, page, section, table
+from tables import code, codes, escape, page, section, table
 from typer.main import get_command
 
 from islands.cli.app import MEASUREMENTS
