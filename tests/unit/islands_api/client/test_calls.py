@@ -73,6 +73,16 @@ def test_unreadable_record_raises_the_error_of_its_file(client: Any, path: str) 
         client.upload(path)
 
 
+def test_data_set_can_be_deleted_when_no_job_needs_it(client: Any, me: Any) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    with pytest.raises(ServiceError) as caught:
+        client.delete_dataset(me.dataset)
+    assert caught.value.type == "/problems/dataset-in-use"
+    client.cancel(job)
+    assert client.delete_dataset(me.dataset) is None
+    assert client.datasets().items == ()
+
+
 # Jobs.
 
 
@@ -308,3 +318,20 @@ def test_calls_declare_whether_they_are_repeatable() -> None:
 
 
 # Administration.
+
+
+def test_administrators_list_and_cancel_the_jobs_of_all_owners(
+    client: Any, service: Service, administrator: Any
+) -> None:
+    with pytest.raises(ServiceError, match="admin"):
+        client.admin_jobs()
+    jobs = {queued(service.store, owner).id: owner for owner in ("first lab", "second lab")}
+    listed = administrator.admin_jobs(limit=2)
+    assert {job.id: job.owner for job in listed.items} == jobs
+    (job,) = administrator.admin_jobs("first lab", "queued").items
+    assert (job.owner, job.state) == ("first lab", "queued")
+    assert administrator.admin_jobs(limit=1, cursor=administrator.admin_jobs(limit=1).next).items[0] == job
+    cancelled = administrator.admin_cancel(job)
+    assert (cancelled.id, cancelled.owner, cancelled.state) == (job.id, "first lab", "cancelled")
+    with pytest.raises(ServiceError, match="cancelled"):
+        administrator.admin_cancel(job.id)

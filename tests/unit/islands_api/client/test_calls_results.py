@@ -4,6 +4,7 @@ The job is run by the function of the coordinator, with the serial engine.
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -86,6 +87,20 @@ def test_each_model_can_be_exported_in_each_form(reader: Any, job: str, form: st
     assert reader.export(job) == reader.export(job, 1, "python")
 
 
+def test_figures_are_listed_and_fetched(reader: Any, service: Service, job: str, tmp_path: Path) -> None:
+    names = reader.figures(job)
+    of_search = ("record", "front", "convergence", "islands")
+    rank = next(model.rank for model in reader.models(job) if model.recommended)
+    assert names == (
+        *((name, None) for name in of_search),
+        *((name, rank) for name in ("free-run", "loop", "hold", "residuals")),
+    )
+    # Stored beforehand, so that the test does not wait for matplotlib; tests/acceptance draws them.
+    blobs = Blobs(service.settings.blobs)
+    service.store.results.keep(job, {"front.svg": blobs.write(b"<svg>front</svg>")})
+    assert reader.figure(job, "front", None) == b"<svg>front</svg>"
+
+
 @pytest.mark.parametrize(
     ("call", "status"),
     [
@@ -100,3 +115,15 @@ def test_missing_item_of_a_result_raises_a_problem(reader: Any, job: str, call: 
     with pytest.raises(ServiceError) as caught:
         call(reader, job)
     assert caught.value.status == status
+
+
+def test_queued_job_has_no_result(client: Any, me: Any) -> None:
+    waiting = client.submit(me.dataset, ["u_V"], "y_um")
+    assert client.models(waiting) == ()
+    assert client.history(waiting).items == ()
+    for call in (client.result, client.figures, client.export):
+        with pytest.raises(
+            ServiceError, match="is queued and has no result: wait until it has succeeded"
+        ) as caught:
+            call(waiting)
+        assert (caught.value.status, caught.value.type) == (409, "/problems/not-finished")

@@ -62,6 +62,23 @@ def test_lost_answer_to_a_cancellation_is_not_an_error(client: Any, connect: Any
     assert client.job(job).version == 2  # cancelled once
 
 
+def test_non_idempotent_call_is_not_repeated(client: Any, connect: Any, me: Any, wire: Any) -> None:
+    job = client.cancel(client.submit(me.dataset, **SPEC))
+    for call in ("resume", "delete"):
+        wire.cuts, before = [0], wire.connections
+        with pytest.raises(
+            ServiceUnreachableError,
+            match=r"closed the connection before it answered .*: the call may have been carried out",
+        ):
+            getattr(connect(wire.url, me.secret), call)(job)
+        assert wire.connections == before + 1
+        if call == "resume":
+            assert client.job(job).state == JobState.QUEUED
+            client.cancel(job)
+    with pytest.raises(ServiceError, match="there is no job"):
+        client.job(job)
+
+
 def test_call_with_unknown_outcome_is_not_repeated(
     client: Any, connect: Any, me: Any, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:

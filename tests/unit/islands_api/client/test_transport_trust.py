@@ -60,6 +60,19 @@ def format_error(error: BaseException) -> str:
 
 
 @pytest.mark.parametrize(
+    ("key", "message"), [(None, "this service needs a key"), (SECRET, "the key is unknown")]
+)
+def test_missing_or_unknown_key_is_rejected(
+    connect: Any, guarded: Service, key: str | None, message: str
+) -> None:
+    with pytest.raises(ServiceError, match=message) as caught:
+        connect(guarded.url, key).jobs()
+    assert (caught.value.status, caught.value.type) == (401, "/problems/no-key")
+    with pytest.raises(ServiceError, match=message):
+        list(connect(guarded.url, key).events("0"))
+
+
+@pytest.mark.parametrize(
     "key", ["", "  ", f"{SECRET}\nX-Other: 1", f"{SECRET} {SECRET}", f"{SECRET}ü", f"\0{SECRET}"]
 )
 def test_malformed_key_is_rejected_without_showing_the_key(connect: Any, key: str) -> None:

@@ -58,6 +58,18 @@ def test_report_of_a_job_is_that_of_the_service(
     assert asked == [("http://there", "secret")]
 
 
+def test_several_jobs_are_compared_by_the_recommended_model_or_that_of_a_rank(
+    command_line: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(command, "open_client", lambda *_: Answering())
+    code, out, _ = command_line("report", JOB, f"{JOB}:12")
+    assert (code, out.strip()) == (0, "comparison.html")
+    assert (tmp_path / "comparison.html").read_text() == repr([JOB, (JOB, 12)])
+    code, _, err = command_line("report", JOB, "result")
+    assert code == 2
+    assert "result is no job: a comparison has ids of jobs, JOB or JOB:RANK" in err
+
+
 def test_neither_folder_nor_job_is_an_error_with_advice(command_line: Run) -> None:
     code, _, err = command_line("report", "nothing")
     assert code == 2

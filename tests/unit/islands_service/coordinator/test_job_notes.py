@@ -1,0 +1,69 @@
+"""`JobNotes`: the owner of a job sees why no epoch is computed."""
+
+import pytest
+
+from islands_service.coordinator import job_notes
+from islands_service.coordinator.job_notes import JobNotes
+from islands_service.domain.job import ProgressReport
+from islands_service.runtime import actor_pool
+from islands_service.runtime.actor_pool import IslandActorPool
+from support.stores import ALICE, claimed, submitted
+
+WAITING = "waiting for capacity: 0 of 2 island actors are ready, the others need a CPU each"
+LOST = "an actor was lost: its islands continue from their last epoch"
+
+
+@pytest.fixture
+def lease(store):
+    submitted(store)
+    return claimed(store)
+
+
+def progress_of(store, lease):
+    return store.jobs.get(ALICE, lease.job.id).progress
+
+
+def test_search_that_waits_for_cpus_has_this_phase(store, lease):
+    JobNotes(lease, store).add(WAITING)
+    assert progress_of(store, lease) == {"phase": "waiting for capacity", "note": WAITING}
+
+
+def test_phase_before_the_first_report_is_stored_at_once(store, lease):
+    JobNotes(lease, store).add(LOST)
+    store.leases.release(lease)
+    again = claimed(store)
+    JobNotes(again, store).begin("reading the record")
+    assert progress_of(store, again) == {"phase": "reading the record"}
+
+
+def test_running_search_keeps_its_figures_and_the_message_for_a_while(store, lease, monkeypatch):
+    notes, figures = JobNotes(lease, store), {"phase": "search", "generation": 7}
+    store.leases.report(lease, ProgressReport(notes.complete(figures)))
+    assert progress_of(store, lease) == figures
+    notes.add(LOST)
+    assert progress_of(store, lease) == {**figures, "note": LOST}
+    assert notes.complete({"generation": 8}) == {"generation": 8, "note": LOST}
+    shown_until = job_notes.monotonic() + job_notes.SHOWN_SECONDS
+    monkeypatch.setattr(job_notes, "monotonic", lambda: shown_until + 1.0)
+    assert notes.complete({"generation": 9}) == {"generation": 9}
+
+
+def test_a_change_between_two_reports_keeps_the_fraction_and_no_old_time_left(store, lease):
+    notes = JobNotes(lease, store)
+    notes.complete({"phase": "screening", "fraction": 0.1, "seconds_left": 20.0})
+    notes.report({"phase": "starting", "note": "waiting for Ray"})
+    assert progress_of(store, lease) == {"phase": "starting", "note": "waiting for Ray", "fraction": 0.1}
+
+
+def test_message_about_waiting_is_repeated_while_the_progress_shows_it(monkeypatch):
+    """Otherwise the owner would no longer see it after a minute."""
+    assert actor_pool.WAITING_NOTICE_EVERY < job_notes.SHOWN_SECONDS
+    said = []
+    monkeypatch.setattr(actor_pool, "put_problem", lambda problem: problem)
+    pool = IslandActorPool(None, 2, said.append)
+    pool._size, pool._joining = 2, {0: None, 1: None}
+    begin = pool._waiting_since
+    for seconds in range(100):
+        pool._report_waiting(begin + seconds)
+    assert said == [WAITING] * 4
+    assert said[0].startswith(job_notes.WAITING)
