@@ -60,7 +60,7 @@ def setting(
     *,
     choices: Iterable[str] = (),
     unit: str = "",
-    daily: bool = False,
+    daily: bool | str = False,
     **bounds: Any,
 ) -> Any:
     """Declare a setting: a field of a class of settings.
@@ -74,8 +74,9 @@ def setting(
         Permitted texts, besides the default; by default every text.
     unit : str
         Unit of the value.
-    daily : bool
-        Whether commands have an option for it. All settings can be given by ``--set NAME=VALUE``.
+    daily : bool or str
+        Whether commands have an option for it, or what its help states as the default. All settings can be
+        given by ``--set NAME=VALUE``.
     **bounds
         ``ge``, ``gt``, ``le``, ``lt`` of pydantic.
     """
@@ -116,10 +117,11 @@ class _Choice:
         return f"one of {', '.join(str(name) for name in self.names if name)}"
 
 
-def setting_of(cls: type, name: str, default: Any) -> Any:
+def setting_of(cls: type, name: str, default: Any, daily: bool | str = False) -> Any:
     """Declare a setting that another class declares, with another default."""
     info = copy(_fields(cls)[name])
-    info.default = default
+    assert isinstance(info.json_schema_extra, dict)
+    info.default, info.json_schema_extra = default, {**info.json_schema_extra, "daily": daily}
     return info
 
 
@@ -189,6 +191,15 @@ def list_changes(settings: Any) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value != _fields(type(settings))[name].default}
 
 
+def state_default(info: FieldInfo) -> bool | str:
+    """Return what the help of an option states as the default; False for nothing."""
+    assert isinstance(info.json_schema_extra, dict)
+    stated = info.json_schema_extra.get("daily")
+    if isinstance(stated, str):
+        return stated
+    return False if info.default in (None, False, "") else str(info.default)
+
+
 def is_daily(info: FieldInfo) -> bool:
     """Return whether commands have an option for a setting."""
     assert isinstance(info.json_schema_extra, dict)
@@ -243,7 +254,9 @@ def _explain(error: ValidationError, cls: type) -> str:
         return f"there is no setting {name!r}{suggest(name, _fields(cls))}"
     if problem["type"] == "value_error":
         return problem["msg"].removeprefix("Value error, ")
-    return f"{name} is {_describe_values(_fields(cls)[name])}, got {abbreviate(problem['input'])}"
+    given = abbreviate(problem["input"])
+    advice = f": write [{given}]" if problem["type"] == "tuple_type" else ""
+    return f"{name} is {_describe_values(_fields(cls)[name])}, got {given}{advice}"
 
 
 def parse_setting(cls: type, name: str, value: object) -> Any:

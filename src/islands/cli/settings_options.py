@@ -10,7 +10,7 @@ import typer
 from pydantic.fields import FieldInfo
 
 from islands.errors import SettingsError, suggest
-from islands.settings_schema import is_daily, list_settings, parse_setting
+from islands.settings_schema import is_daily, list_settings, parse_setting, state_default
 
 #: Parameter with the values of ``--set``.
 GIVEN = "given_settings"
@@ -114,7 +114,7 @@ def _make_option(name: str, info: FieldInfo, values: str) -> Parameter:
         f"--{name.replace('_', '-')}",
         help=f"{first}." if is_flag else f"{first}: {values}.",
         metavar=None if is_flag else "VALUE",
-        show_default=False,
+        show_default=state_default(info),
     )
     kind: Any = bool if is_flag else str | None
     return Parameter(

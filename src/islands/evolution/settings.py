@@ -49,6 +49,9 @@ NARX, LATENT = "narx", LatentModel.kind
 #: Values of the setting ``structure`` of each class.
 STRUCTURES_OF: Mapping[str, Mapping[str, Any]] = MappingProxyType({NARX: STRUCTURES, LATENT: ZERO_BLOCKS})
 
+#: Default of an option in the help.
+_OF_PRESET = "that of the preset"
+
 
 def _refuse_function(entry: Any) -> Any:
     if callable(entry):
@@ -70,7 +73,7 @@ class Settings:
     """
 
     population: Integer = setting(500, "Offspring of each generation: individuals of an island.", ge=1)
-    generations: Integer = setting(500, "Generations of a search, at most.", ge=0, daily=True)
+    generations: Integer = setting(500, "Generations of a search, at most.", ge=0, daily=_OF_PRESET)
     elite: float = setting(0.1, "Fraction of the population that is kept as elite.", ge=0, le=1)
     crossover: float = setting(0.8, "CXPB: probability that a pair recombines.", ge=0, le=1)
     mutation: float = setting(
@@ -91,7 +94,7 @@ class Settings:
         "orthogonalise.",
         choices=ERR_TARGETS,
     )
-    max_terms: Integer = setting(10, "Terms of the largest model.", ge=1, daily=True)
+    max_terms: Integer = setting(10, "Terms of the largest model.", ge=1, daily=_OF_PRESET)
     max_height: Integer = setting(
         5,
         "Height of an expression tree, at most. It is the number of edges from the root of a gene to a leaf, "
@@ -115,7 +118,7 @@ class Settings:
         "hysteresis",
         f"Constraints on the parameters: {', '.join(CONSTRAINTS)}, or statements with semicolons between "
         f"them: {'; '.join(FORMS)}. Latent models have gain, fixed-point and odd.",
-        daily=True,
+        daily=_OF_PRESET,
     )
     fitness: str = setting("shooting", "Error that a search minimises.", choices=FITNESSES)
     shooting: Integer = setting(
@@ -222,7 +225,7 @@ class Settings:
         "Number of islands that evolve in parallel, each with a separate population.",
         ge=1,
         le=MOST_ISLANDS,
-        daily=True,
+        daily=_OF_PRESET,
     )
     topology: str = setting(
         "isolated",

@@ -65,7 +65,7 @@ class FitSettings:
         "Dead times in samples of the record: one, or one for each input. By default they are estimated with "
         "the library auto, and none with others.",
     )
-    constraints: str | None = setting_of(Settings, "constraints", None)
+    constraints: str | None = setting_of(Settings, "constraints", None, "that of the library")
     max_terms: Integer = setting(
         10, "Terms of the largest model, apart from a constant that an offset requires.", ge=1, daily=True
     )
