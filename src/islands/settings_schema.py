@@ -21,6 +21,8 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     create_model,
 )
 from pydantic.dataclasses import dataclass
@@ -93,6 +95,12 @@ def setting(
     if isinstance(default, tuple):
         info.metadata.append(AS_TUPLE)
     return info
+
+
+#: Types of the problems of a value that has the type of a setting.
+_OUT_OF_RANGE = frozenset(
+    {"greater_than_equal", "greater_than", "less_than_equal", "less_than", "value_error"}
+)
 
 
 class _Choice:
@@ -254,9 +262,12 @@ def _explain(error: ValidationError, cls: type) -> str:
         return f"there is no setting {name!r}{suggest(name, _fields(cls))}"
     if problem["type"] == "value_error":
         return problem["msg"].removeprefix("Value error, ")
-    given = abbreviate(problem["input"])
-    advice = f": write [{given}]" if problem["type"] == "tuple_type" else ""
-    return f"{name} is {_describe_values(_fields(cls)[name])}, got {given}{advice}"
+    advice = f": write [{abbreviate(problem['input'])}]" if problem["type"] == "tuple_type" else ""
+    return _refuse(cls, name, problem["input"]) + advice
+
+
+def _refuse(cls: type, name: str, value: object) -> str:
+    return f"{name} is {_describe_values(_fields(cls)[name])}, got {abbreviate(value)}"
 
 
 def parse_setting(cls: type, name: str, value: object) -> Any:
@@ -274,7 +285,7 @@ def parse_setting(cls: type, name: str, value: object) -> Any:
     try:
         return TypeAdapter(_type(info)).validate_python(given)
     except ValidationError:
-        raise SettingsError(f"{name} is {_describe_values(info)}, got {abbreviate(value)}") from None
+        raise SettingsError(_refuse(cls, name, value)) from None
 
 
 def _has_list(kind: Any) -> bool:
@@ -286,10 +297,23 @@ def _type(info: FieldInfo) -> Any:
 
 
 def make_changes_model(cls: type, name: str, config: ConfigDict) -> type[BaseModel]:
-    """Return the model of a document that has some of the settings of a class."""
+    """Return the model of a document that has some of the settings of a class.
+
+    A value out of range raises `SettingsError`, as it does in the class; one of another type is a problem of
+    the document.
+    """
+
+    def check(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        try:
+            return handler(value)
+        except ValidationError as error:
+            if _OUT_OF_RANGE.isdisjoint(each["type"] for each in error.errors()):
+                raise
+            raise SettingsError(_refuse(cls, str(info.field_name), value)) from None
+
     types: dict[str, Any] = {
         key: (
-            _type(info) | None,
+            Annotated[_type(info) | None, WrapValidator(check)],
             Field(None, description=info.description, json_schema_extra=info.json_schema_extra),
         )
         for key, info in _fields(cls).items()

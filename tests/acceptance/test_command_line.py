@@ -110,7 +110,7 @@ def test_errors_say_what_to_do_and_keep_existing_results(folder: Path) -> None:
     record, out = folder / "sine.csv", folder / "never"
     base = ["fit", record, "--output", "y_um", "--out", out]
     assert "u_mV" in fail(*base, "--input", "u_mV")
-    assert "unknown library" in fail(*base, "--input", "u_V", "--library", "fourier")
+    assert "library is one of" in fail(*base, "--input", "u_V", "--library", "fourier")
     assert "unknown constraints" in fail(*base, "--input", "u_V", "--constraints", "physics")
     assert "fewer lags" in fail(
         *base, "--input", "u_V", "--library", "polynomial", "--degree", 5, "--lags", 11

@@ -78,8 +78,8 @@ def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
 def test_invalid_island_options_are_rejected_in_one_line(folder: Path) -> None:
     base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
     for options, message in (
-        (("--islands", 0), "islands is at least 1, got 0"),
-        (("--islands", 1_000_000), "at most 10000 islands"),
+        (("--islands", 0), "islands is an integer from 1 to 10000, got '0'"),
+        (("--islands", 1_000_000), "islands is an integer from 1 to 10000"),
         (("--set", "topology=spiral"), "unknown topology 'spiral': take one of isolated, ring"),
         (("--islands", 3, "--set", "topology=0>7"), "does not join two of the islands 0 to 2"),
         (("--set", "migrate_every=often"), "cannot read migrate_every 'often'"),

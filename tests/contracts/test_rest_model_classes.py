@@ -91,7 +91,7 @@ def test_a_latent_model_has_the_constraints_of_its_job(service, tmp_path):
     [
         ({"model": "gain"}, "unknown class of models"),
         ({"model": "gain-scheduled", "settings": {"generations": 3}}, "leave them out"),
-        ({"model": "gain-scheduled", "settings": {"refit": "every"}}, "unknown refit"),
+        ({"model": "gain-scheduled", "settings": {"refit": "every"}}, "refit is one of none, all"),
     ],
 )
 def test_an_unknown_class_and_settings_of_a_search_are_refused(service, dataset, given, message):

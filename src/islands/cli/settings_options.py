@@ -112,7 +112,7 @@ def _make_option(name: str, info: FieldInfo, values: str) -> Parameter:
     first = str(info.description).partition(". ")[0].removesuffix(".")
     option = typer.Option(
         f"--{name.replace('_', '-')}",
-        help=f"{first}." if is_flag else f"{first}: {values}.",
+        help=f"{first}." if is_flag or values == "a text" else f"{first}: {values}.",
         metavar=None if is_flag else "VALUE",
         show_default=state_default(info),
     )

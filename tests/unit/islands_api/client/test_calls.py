@@ -218,7 +218,7 @@ def test_job_is_found_by_its_labels(client: Any, me: Any) -> None:
 @pytest.mark.parametrize(
     ("wrong", "status", "kind", "message"),
     [
-        ({"islands": 0}, 422, "invalid-settings", "islands is at least 1, got 0"),
+        ({"islands": 0}, 422, "invalid-settings", "islands is an integer from 1 to 10000, got 0"),
         ({"preset": "magic"}, 422, "invalid-settings", "unknown preset 'magic'"),
         ({"validation": 1.5}, 422, "invalid-request", "validation"),
         ({"hue": "red"}, 422, "invalid-request", "hue"),

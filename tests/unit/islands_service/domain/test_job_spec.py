@@ -24,7 +24,7 @@ def order(**changes):
 def refused(settings, **changes):
     """Return the error message for settings that can be parsed but not run, within a time limit."""
     began = time.perf_counter()
-    with pytest.raises((SettingsError, ValidationError)) as error:
+    with pytest.raises(SettingsError) as error:
         resolve_job_settings(order(settings=settings, **changes), 256, 10**10)
     assert time.perf_counter() - began < 20.0
     return str(error.value)
@@ -56,9 +56,9 @@ def test_value_above_a_limit_is_refused(name):
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"islands": 10**6}, "settings.islands\n  Input should be less than or equal to 10000"),
+        ({"islands": 10**6}, "islands is an integer from 1 to 10000"),
         ({"islands": 257}, "islands is at most 256 on this service"),
-        ({"islands": -1}, "settings.islands\n  Input should be greater than or equal to 1"),
+        ({"islands": -1}, "islands is an integer from 1 to 10000"),
         ({"topology": "0>1," * 250_000}, "topology has 1000000 characters, and 20000 is the most"),
         (
             {"islands": 2, "topology": ",".join(["0>1"] * 4000) + ",0>9"},
@@ -69,7 +69,7 @@ def test_value_above_a_limit_is_refused(name):
         ({"migrate_every": "5," * 10_001}, "migrate_every has 20002 characters"),
         ({"migrants": 10**30}, "cannot read migrants"),
         ({"shifts": [10**9]}, "back-shifts are at most 1000 on this service"),
-        ({"shifts": [0]}, "settings.shifts.0\n  Input should be greater than or equal to 1"),
+        ({"shifts": [0]}, "shifts is a list of integers of at least 1, got [0]"),
         ({"shifts": list(range(1, 66))}, "shifts has 65 entries, and 64 is the most"),
         ({"primitives": ["mul"] * 10_000}, "primitives has 10000 entries"),
         ({"characters": ["explorer"] * 65}, "characters has 65 entries"),
@@ -81,9 +81,9 @@ def test_value_above_a_limit_is_refused(name):
         ({"library": "phi-polynomial", "library_lags": 1}, "lags of at least 2"),
         ({"library": "polynomial", "library_degree": 0}, "degree and lags are at least 1"),
         ({"library": "no such"}, "library is one of phi-polynomial"),
-        ({"elite": 1.5}, "settings.elite\n  Input should be less than or equal to 1"),
-        ({"tolerance": -1e-3}, "settings.tolerance\n  Input should be greater than or equal to 0"),
-        ({"target_error": -1.0}, "settings.target_error\n  Input should be greater than or equal to 0"),
+        ({"elite": 1.5}, "elite is a number from 0 to 1, got 1.5"),
+        ({"tolerance": -1e-3}, "tolerance is a number of at least 0"),
+        ({"target_error": -1.0}, "target_error is a number of at least 0"),
         ({"initial_terms": [3, 2]}, "initial_terms (3, 2) lie between 1 and max_terms"),
         ({"shifts": [], "primitives": []}, "give at least one of them"),
         (
