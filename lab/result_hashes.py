@@ -179,18 +179,9 @@ def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
         "hysteresis": (
             "piezo.csv",
             *COLUMNS,
-            "--preset",
-            "hysteresis",
-            "--set",
-            "topology=star",
-            "--set",
-            "characters=plain,explorer",
-            "--set",
-            "migrants=2",
-            "--set",
-            "emigrants=front",
-            "--set",
-            "replaced=random",
+            *("--preset", "hysteresis", "--set", "topology=star"),
+            *("--set", "characters=plain,explorer", "--set", "migrants=2", "--set", "emigrants=front"),
+            *("--set", "replaced=random"),
         ),
         "narx": ("s1.csv", *of_s1, "--preset", "narx"),
     }
@@ -273,13 +264,8 @@ def diagnoses(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
         checkout.run(
             "diagnose",
             *lag,
-            "--simulation",
-            "column:theirs_um",
-            "--self-test",
-            "--workers",
-            "2",
-            "--out",
-            "self-test",
+            *("--simulation", "column:theirs_um", "--self-test", "--workers", "2"),
+            *("--out", "self-test"),
         )
         return checkout.hash_outputs("self-test", ".json")
 
@@ -295,16 +281,8 @@ def trials(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
             checkout.run(
                 *(
                     "trials",
-                    "--core",
-                    core,
-                    "--effects",
-                    "all",
-                    "--count",
-                    "1",
-                    "--clean",
-                    "2",
-                    "--pairs",
-                    "1",
+                    *("--core", core, "--effects", "all", "--count", "1", "--clean", "2"),
+                    *("--pairs", "1"),
                 ),
                 *("--open-set", "1", "--seed", "5", "--workers", "2", "--json", name),
                 *(() if core == "cascaded-tanks" else ("--seconds", "10")),

@@ -27,16 +27,8 @@ HIDDEN = (
 COLUMNS = ("--input", "u_V", "--output", "y_um")
 
 SEARCH = (
-    "--set",
-    "population=20",
-    "--generations",
-    1,
-    "--max-terms",
-    3,
-    "--set",
-    "shooting=50",
-    "--islands",
-    2,
+    *("--set", "population=20", "--generations", 1, "--max-terms", 3, "--set", "shooting=50"),
+    *("--islands", 2),
 )
 
 

@@ -11,14 +11,8 @@ from support.undrawn import undrawn_figures
 ISLANDS = (
     *("--generations", 6, "--islands", 3, "--set", "topology=bidirectional-ring"),
     *(
-        "--set",
-        "migrate_every=2,4:1",
-        "--set",
-        "migrants=2",
-        "--set",
-        "emigrants=front",
-        "--set",
-        "replaced=random",
+        *("--set", "migrate_every=2,4:1", "--set", "migrants=2", "--set", "emigrants=front"),
+        *("--set", "replaced=random"),
     ),
     *("--set", "characters=plain,explorer"),
 )
@@ -83,7 +77,7 @@ def test_invalid_island_options_are_rejected_in_one_line(folder: Path) -> None:
         (("--set", "topology=spiral"), "unknown topology 'spiral': take one of isolated, ring"),
         (("--islands", 3, "--set", "topology=0>7"), "does not join two of the islands 0 to 2"),
         (("--set", "migrate_every=often"), "cannot read migrate_every 'often'"),
-        (("--engine", "steam"), "unknown engine 'steam': take one of serial, ray"),
+        (("--engine", "steam"), "engine is one of serial, ray, got 'steam'"),
         (("--set", "characters=grumpy"), "unknown character 'grumpy'"),
         (("--set", "ray_address=127.0.0.1:9"), "no Ray cluster answers at 127.0.0.1:9"),
     ):

@@ -96,12 +96,7 @@ def test_constraints_of_an_option_hold_and_are_stated(folder, tmp_path):
     fitted = (
         "fit",
         *search[1:6],
-        "--model",
-        "latent",
-        "--constraints",
-        "even",
-        "--out",
-        tmp_path / "refused",
+        *("--model", "latent", "--constraints", "even", "--out", tmp_path / "refused"),
     )
     assert "its states read the inputs linearly" in " ".join(fail(*fitted).split())
 
@@ -124,15 +119,8 @@ def test_a_fit_has_the_structure_that_is_given(folder):
 def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
     budget = (
-        "--preset",
-        "latent",
-        "--islands",
-        "2",
-        "--set",
-        "population=6",
-        "--generations",
-        "2",
-        "--set",
+        *("--preset", "latent", "--islands", "2", "--set", "population=6", "--generations", "2"),
+        *("--set"),
     )
     succeed(*search, *budget, "structure=wiener", "--out", tmp_path / "out")
     found = islands.load(tmp_path / "out")

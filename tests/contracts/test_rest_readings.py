@@ -50,7 +50,10 @@ def test_without_options_the_first_data_set_is_returned(service, gaps):
 
 @pytest.mark.parametrize(
     ("reading", "expected"),
-    [({"gap": "split"}, "reading is a JSON object of options"), ({"gaps": "join"}, "split or interpolate")],
+    [
+        ({"gap": "split"}, "reading is a JSON object of options"),
+        ({"gaps": "join"}, "one of split, interpolate"),
+    ],
 )
 def test_unknown_options_are_refused_with_the_known_ones(service, gaps, reading, expected):
     dataset = service.upload(gaps).json()["id"]

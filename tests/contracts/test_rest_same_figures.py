@@ -100,14 +100,8 @@ def test_errors_and_figures_of_a_job_belong_to_the_model_before_its_refit(servic
 def test_a_model_of_deviations_has_the_same_figures_in_a_monitor(service, client, path, tmp_path):
     with undrawn_figures():
         options = (
-            "--set",
-            "detrend=constant",
-            "--max-terms",
-            3,
-            "--set",
-            "average=1",
-            "--out",
-            tmp_path / "result",
+            *("--set", "detrend=constant", "--max-terms", 3, "--set", "average=1"),
+            *("--out", tmp_path / "result"),
         )
         succeed("fit", path, "--input", "u_V", "--output", "y_um", *options)
     best = islands.read_result(tmp_path / "result").best

@@ -7,18 +7,8 @@ from islands.evolution.presets import resolve_settings
 from islands.records.dataset import Dataset
 
 SMALL = (
-    "--preset",
-    "hysteresis",
-    "--set",
-    "population=10",
-    "--generations",
-    "3",
-    "--max-terms",
-    "3",
-    "--set",
-    "shooting=50",
-    "--set",
-    "max_height=3",
+    *("--preset", "hysteresis", "--set", "population=10", "--generations", "3", "--max-terms", "3"),
+    *("--set", "shooting=50", "--set", "max_height=3"),
 )
 #: Options with one generation per epoch.
 STEPWISE = (*SMALL, "--set", "migrate_every=1")

@@ -20,16 +20,8 @@ from support.undrawn import undrawn_figures
 COLUMNS = ("--input", "u_V", "--output", "y_um")
 LINEAR = ("--library", "polynomial", "--degree", "1", "--set", "certificate=0")
 SEARCH = (
-    "--preset",
-    "narx",
-    "--set",
-    "population=20",
-    "--generations",
-    "2",
-    "--islands",
-    "1",
-    "--max-terms",
-    "3",
+    *("--preset", "narx", "--set", "population=20", "--generations", "2", "--islands", "1"),
+    *("--max-terms", "3"),
 )
 
 

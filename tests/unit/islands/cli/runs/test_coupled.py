@@ -63,16 +63,8 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
 def test_an_identified_model_has_its_errors_on_test_data(record, tmp_path) -> None:
     folder = tmp_path / "result"
     small = (
-        "--generations",
-        1,
-        "--set",
-        "population=10",
-        "--islands",
-        1,
-        "--max-terms",
-        4,
-        "--set",
-        "max_height=2",
+        *("--generations", 1, "--set", "population=10", "--islands", 1, "--max-terms", 4),
+        *("--set", "max_height=2"),
     )
     printed = succeed("identify", record, *COLUMNS, *small, "--test", 0.2, "--out", folder)
     found = json.loads((folder / "test.json").read_text())
@@ -93,12 +85,7 @@ def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> Non
             record,
             *COLUMNS,
             *SMALL,
-            "--set",
-            "detrend=constant",
-            "--set",
-            "lowpass=1",
-            "--out",
-            folder,
+            *("--set", "detrend=constant", "--set", "lowpass=1", "--out", folder),
         )
     printed = " ".join(succeed("simulate", folder, record, "--out", out).split())
     assert "y1 is the deviation from" in printed
