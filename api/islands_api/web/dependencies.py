@@ -1,11 +1,12 @@
 """State shared by the routes of one application, and the dependency that injects it."""
 
-from collections import defaultdict
-from collections.abc import AsyncIterator, Callable
+from collections import OrderedDict, defaultdict
+from collections.abc import AsyncIterator, Callable, Hashable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from logging import ERROR
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, TypeVar
+from threading import Lock
+from typing import TYPE_CHECKING, Annotated, Any, Generic, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 from fastapi import Depends, Request
@@ -19,7 +20,6 @@ from islands_api.web.limits.owner_slots import OwnerSlots
 from islands_api.web.limits.rate import RateLimiter
 from islands_api.web.model_simulation import SimulatedModel
 from islands_api.web.prometheus import ServiceMetrics
-from islands_api.web.recent_values import RecentValues
 from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
@@ -30,6 +30,48 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.blobs import Blobs
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
+
+
+class RecentValues(Generic[K, V]):
+    """Values that were used last, by keys that determine them, so that a request has the same answer without.
+
+    Parameters
+    ----------
+    most : int
+        Largest sum of the weights of the values. A value that weighs more is not kept.
+    weigh : callable
+        Returns the weight of a value; by default each has the weight 1.
+    """
+
+    def __init__(self, most: int, weigh: Callable[[V], int] = lambda _: 1) -> None:
+        self._most, self._weigh = most, weigh
+        self._weight = 0
+        self._values: OrderedDict[K, V] = OrderedDict()
+        self._lock = Lock()
+
+    def get(self, key: K) -> V | None:
+        """Return a value; None if it is not in memory."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+            return self._values.get(key)
+
+    def store(self, key: K, value: V) -> None:
+        """Store a value; those that were not used for the longest time are removed if they weigh too much."""
+        with self._lock:
+            if self._weigh(value) > self._most:
+                return
+            if key in self._values:
+                self._weight -= self._weigh(self._values.pop(key))
+            self._values[key] = value
+            self._weight += self._weigh(value)
+            while self._weight > self._most:
+                _, removed = self._values.popitem(last=False)
+                self._weight -= self._weigh(removed)
+
 
 if TYPE_CHECKING:
     from islands_api.oidc.token_verifier import TokenVerifier

@@ -1,6 +1,8 @@
 """Identification job: the search on Ray, its progress, its checkpoints and its result."""
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from math import isfinite
@@ -8,8 +10,10 @@ from sys import maxsize
 from time import monotonic
 from typing import Any
 
-from islands.evolution.engine import Engine
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import ArchipelagoEpoch, Engine
 from islands.evolution.presets import AUTO
+from islands.evolution.protocol import SearchProblem
 from islands.evolution.search_result import (
     COMPARISON,
     ResultCallback,
@@ -29,7 +33,7 @@ from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
 from islands.persistence.checkpoints import history_document
 from islands.persistence.models import NARX
-from islands.progress import PhasedProgress, ProgressCallback, StoppedError, TimeLeft
+from islands.progress import PhasedProgress, ProgressCallback, Stop, StoppedError, TimeLeft
 from islands.records.coupled import couple, split_coupled
 from islands.records.dataset import Dataset
 from islands.records.split import describe_search_extrapolation
@@ -45,15 +49,116 @@ from islands_service.coordinator.identification_outcome import (
 from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.search_view import SearchFront, describe_migration
-from islands_service.coordinator.stoppable_engine import StoppableEngine
-from islands_service.coordinator.stored_free_run import StoredFreeRun
-from islands_service.domain.job import BY_OWNER, RUN_TIME, JobOutcome, JobState, ProgressReport
+from islands_service.domain.free_runs import SearchFreeRun
+from islands_service.domain.job import (
+    BY_OWNER,
+    RUN_TIME,
+    SEARCH_FREE_RUN,
+    Job,
+    JobOutcome,
+    JobState,
+    ProgressReport,
+)
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.domain.search_limits import resolve_job_settings
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
+from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
+
+#: Least number of seconds between two free runs that are stored.
+_EVERY = 2.0
+
+
+class StoredFreeRun:
+    """The free run that the store has, or gets with the next report.
+
+    Parameters
+    ----------
+    job : Job
+    blobs : Blobs
+    """
+
+    def __init__(self, job: Job, blobs: Blobs) -> None:
+        self._job, self._blobs = job.id, blobs
+        self._due = 0.0
+        #: The newest one that was written, its blob, and whether the store is known to name it.
+        self._written: SearchFreeRun | None = None
+        self._blob, self._is_named = "", False
+        #: Blob that the store named before.
+        self._earlier: str | None = None
+        self._outage = OutageLog("free run not stored", "free runs stored again")
+
+    def write(self, found: SearchFreeRun | None) -> dict[str, str]:
+        """Write a free run; return the blob that the next report has to name, by artefact name.
+
+        None is written if another one was written a moment ago, or if the disk is full or the object store
+        does not answer: the progress of the job is reported without it.
+        """
+        pending = self._written is not None and not self._is_named
+        if found is not None and found is not self._written and not pending and monotonic() >= self._due:
+            self._due = monotonic() + _EVERY
+            # The name of the job keeps the blob apart from that of an equal search.
+            document = json.dumps({"job": self._job, **found.document})
+            try:
+                blob = self._blobs.write(document.encode())
+            except StoreError as error:
+                self._outage.fail(error, job=self._job)
+                return {}
+            self._outage.succeed(job=self._job)
+            if self._earlier is not None:
+                self._blobs.discard(self._earlier)
+            self._earlier = self._blob or None
+            self._written, self._blob, self._is_named, pending = found, blob, False, True
+        return {SEARCH_FREE_RUN: self._blob} if pending else {}
+
+    def confirm(self) -> None:
+        """Keep in mind that the store durably names the newest blob."""
+        self._is_named = True
+
+    def describe(self) -> dict[str, Any]:
+        """Return the part of the progress about the free run that the store names, or gets with it."""
+        return {} if self._written is None else {"free_run": self._written.mark}
+
+
+class StoppableEngine:
+    """Engine wrapper that ends the epochs of a search at the request of the owner of the job.
+
+    The steps after the epochs follow as after a complete search. The first population is always evaluated, so
+    that there are models.
+
+    Parameters
+    ----------
+    engine : Engine
+    is_stopped : callable
+        Returns whether the owner has asked for the end of the search.
+    on_problem : callable
+        Receives the problem of each search.
+    least : int
+        Generation before which the request ends no search: an earlier attempt, which was killed, has reached
+        it, and the owner has seen its models.
+    """
+
+    def __init__(
+        self, engine: Engine, is_stopped: Stop, on_problem: Callable[[SearchProblem], None], least: int = 0
+    ) -> None:
+        self._engine, self._is_stopped, self._on_problem = engine, is_stopped, on_problem
+        self._least = least
+
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+        """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
+        self._on_problem(problem)
+        reached, least = start.generation, min(self._least, problem.settings.generations)
+
+        def ends() -> bool:
+            return stop() or (reached >= least and self._is_stopped())
+
+        with closing(self._engine.run(problem, start, ends)) as epochs:
+            for epoch in epochs:
+                reached = epoch.archipelago.generation
+                yield epoch
+
 
 #: Phase after the last step of the search.
 STORING = "storing the result"

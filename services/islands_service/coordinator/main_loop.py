@@ -1,14 +1,15 @@
 """Main loop of the coordinator: claim a job, run it, store its outcome."""
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
 from logging import ERROR, INFO, WARNING
 from math import inf
 from time import monotonic
-from typing import TYPE_CHECKING, TypedDict
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TypeAlias, TypedDict
 
 import structlog
 
@@ -24,11 +25,13 @@ from islands_service.coordinator.job_failures import (
 )
 from islands_service.coordinator.job_notes import JobNotes
 from islands_service.coordinator.job_run import RETRY_SECONDS, JobRun
-from islands_service.coordinator.job_runners import JOB_RUNNERS
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
 from islands_service.coordinator.turn import Turn, TurnOver
 from islands_service.domain.job import (
+    DISCREPANCY,
+    IDENTIFICATION,
+    MONITORING,
     Job,
     JobOutcome,
     JobState,
@@ -44,6 +47,35 @@ from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.database import StoreError
 from islands_service.tracing import Traces
+
+#: Runs a job of one kind and returns its outcome.
+JobRunner: TypeAlias = Callable[[JobRun], JobOutcome]
+
+
+def _run_identification(run: JobRun) -> JobOutcome:
+    # These imports take half a second: claim the job before them.
+    from islands_service.coordinator.identification_job import run_identification_job  # noqa: PLC0415
+
+    return run_identification_job(run)
+
+
+def _run_diagnosis(run: JobRun) -> JobOutcome:
+    from islands_service.coordinator.diagnosis.job import run_diagnosis_job  # noqa: PLC0415
+
+    return run_diagnosis_job(run)
+
+
+def _run_monitoring(run: JobRun) -> JobOutcome:
+    from islands_service.coordinator.monitoring_job import run_monitoring_job  # noqa: PLC0415
+
+    return run_monitoring_job(run)
+
+
+#: Runner of each kind of job.
+JOB_RUNNERS: Mapping[str, JobRunner] = MappingProxyType(
+    {IDENTIFICATION: _run_identification, DISCREPANCY: _run_diagnosis, MONITORING: _run_monitoring}
+)
+
 
 if TYPE_CHECKING:
     from islands.evolution.engine import Engine

@@ -57,7 +57,7 @@ RESUMABLE = (JobState.FAILED, JobState.CANCELLED)
 RUN_TIME, BY_OWNER = "run time", "stopped by its owner"
 
 #: Kind of a job that identifies a model; a key of ``JOB_RUNNERS`` in
-#: `islands_service.coordinator.job_runners`.
+#: `islands_service.coordinator.main_loop`.
 IDENTIFICATION = "identification"
 
 #: Class of the models that a search finds, `islands.persistence.models.NARX`, whose import would take long.

@@ -4,14 +4,15 @@ An owner has access only to its own jobs.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, Select, bindparam, insert, select, tuple_
+from sqlalchemy import Connection, Row, Select, bindparam, func, insert, select, tuple_
 
 from islands_service.domain.job import (
+    ACTIVE,
     ISLANDS_VERSION,
     LABELLED,
     RESUMABLE,
@@ -34,12 +35,12 @@ from islands_service.store.job_rows.job_events import (
     append_event,
     cancel_job,
     job_from_row,
+    read_document,
     update_job,
     without_note,
 )
 from islands_service.store.job_rows.job_search import describe_labels, has_tag, has_words, join_tags
 from islands_service.store.job_rows.monitor_records import count_record
-from islands_service.store.job_rows.queue_statistics import QueueStatistics, read_queue_statistics
 from islands_service.store.job_rows.submission_checks import (
     check_datasets,
     check_quotas,
@@ -47,6 +48,57 @@ from islands_service.store.job_rows.submission_checks import (
     request_digest,
 )
 from islands_service.store.tables import datasets, events, jobs, owners
+
+
+@dataclass(frozen=True, slots=True)
+class QueueStatistics:
+    """Statistics of the jobs of all owners.
+
+    Attributes
+    ----------
+    counts : mapping
+        Number of jobs by state.
+    oldest : float
+        Seconds that the oldest queued job has waited since it was last queued.
+    running : mapping
+        Progress of the jobs with a valid lease, by job.
+    active : mapping
+        Number of queued and running jobs by owner and state.
+    """
+
+    counts: Mapping[JobState, int]
+    oldest: float
+    running: Mapping[str, Mapping[str, Any]]
+    active: Mapping[tuple[str, JobState], int]
+
+    @property
+    def leases(self) -> int:
+        """Number of jobs with a valid lease."""
+        return len(self.running)
+
+
+def read_queue_statistics(connection: Connection) -> QueueStatistics:
+    """Return statistics of the jobs of all owners."""
+    counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
+    active = (
+        select(jobs.c.owner, jobs.c.state, func.count())
+        .where(jobs.c.state.in_(ACTIVE))
+        .group_by(jobs.c.owner, jobs.c.state)
+    )
+    oldest = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
+        jobs.c.state == JobState.QUEUED
+    )
+    running = select(jobs.c.id, jobs.c.progress).where(
+        jobs.c.state == JobState.RUNNING, jobs.c.lease_until > now()
+    )
+    counts = {row[0]: row[1] for row in connection.execute(counted)}
+    return QueueStatistics(
+        {state: counts.get(state, 0) for state in JobState},
+        connection.execute(oldest).scalar_one(),
+        {row.id: read_document(row.progress) or {} for row in connection.execute(running)},
+        {(row[0], JobState(row[1])): row[2] for row in connection.execute(active)},
+    )
+
 
 #: Largest number of jobs of a page.
 MAX_PAGE_SIZE = 200

@@ -5,19 +5,69 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.diagnosis.calibrated_values import list_calibrated_values
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
+from islands.diagnosis.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    estimate_deviations,
+    whiten_target,
+)
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.confidence_limits import limit_confidences
+from islands.diagnosis.discovery.state_equations import get_linear
 from islands.diagnosis.gross_errors.closed_loop import find_closed_loop
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
+from islands.diagnosis.inference.finding import Value
 from islands.diagnosis.inference.hidden_structure import find_hidden_structure
 from islands.diagnosis.inference.noise_detectors import COLOURED_NOISE
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import Verdict
-from islands.diagnosis.result import Diagnosis, NoiseClaim
+from islands.diagnosis.result import CalibratedValue, Diagnosis, NoiseClaim
 from islands.effects.interface.effect import Signal
 from islands.errors import SettingsError
+
+
+def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[CalibratedValue, ...]:
+    """Return the values of the best simulation of a diagnosis, without those of its terms and initial states.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    target : Target
+        The record that it explains.
+
+    Returns
+    -------
+    tuple of CalibratedValue
+        Without intervals if the residual is a rounding error.
+    """
+    fit, base = found.best, found.base
+    simulation, part = fit.simulation, fit.simulation.simulator_slice
+    parameters = simulation.parameters[part]
+    if not parameters:
+        return ()
+    is_exact = target.is_matched(fit.output)
+    deviations = None if is_exact else estimate_deviations(fit, whiten_target(target, fit))
+    is_replaced = get_linear(base) is not None and get_linear(fit) is None
+    if is_replaced:  # The nominal values of the equations are those of the calibrated linear simulation.
+        alone = {each.name: each.nominal for each in parameters}
+    else:
+        known = base.simulation.simulator_slice
+        names = [each.name for each in base.simulation.parameters[known]]
+        alone = dict(zip(names, base.values[known].tolist(), strict=True))
+    terms = {name for each in found.causes if each.term for name in each.parameters}
+    values = []
+    for place, parameter in enumerate(parameters, part.start):
+        if parameter.initial or parameter.name in terms:
+            continue
+        value, unit = float(fit.values[place]), parameter.unit
+        estimate = (
+            Value(value, unit, None)
+            if deviations is None
+            else Value.estimate(value, unit, float(deviations[place]))
+        )
+        before = None if is_replaced else parameter.nominal
+        values.append(CalibratedValue(parameter.name, before, alone.get(parameter.name), estimate))
+    return tuple(values)
+
 
 #: Ratio of the residual to the stated noise of the sensor above which the residual is no noise of the sensor.
 #: Data sheets and estimates from a resting output are seldom wrong by a factor of two.

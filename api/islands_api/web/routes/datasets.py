@@ -6,15 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import fastapi
+import numpy as np
 from fastapi import APIRouter, File, Form, Query, Response, UploadFile
+from numpy.typing import NDArray
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.records.reading.options import ReadingOptions
+from islands.records.reading.table import select
 from islands_api.dataset_schemas import DatasetPage, DatasetView, FetchRequest, ReadingRequest, Samples
 from islands_api.web.auth import Reader, Writer
-from islands_api.web.dataset_samples import describe_rows, get_columns
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import (
@@ -32,12 +34,52 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
-from islands_api.web.uploads.dataset_storage import read_again, store_dataset
+from islands_api.web.uploads.dataset_storage import open_stored, read_again, store_dataset
 from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
 from islands_api.web.uploads.uploaded_file import parse_file_name
 from islands_service.domain.job_spec import Name
+from islands_service.domain.plot_envelopes import describe_envelopes
 from islands_service.intake.file_inspection import InspectionRequest
+from islands_service.intake.sample_reading import read_columns
 from islands_service.store.datasets import StoredDataset
+
+
+async def get_columns(
+    state: AppState, owner: str, stored: StoredDataset, names: Sequence[str]
+) -> NDArray[np.float64]:
+    """Return whole columns of a data set, shape (columns, samples), from memory if they were read before.
+
+    Raises
+    ------
+    RecordError, BlobNotFoundError, ObjectStoreError, StorageFullError
+    """
+    # How numbers are written is inferred from all columns that are read together.
+    key = owner, stored.id, tuple(names)
+    columns = state.plotted_columns.get(key)
+    if columns is None:
+        settings, reading = state.settings, stored.preview.get("reading", {})
+        limits = settings.inspection_memory, settings.inspection_seconds
+        async with open_stored(state, owner, stored) as path:
+            columns = await state.run_blocking(read_columns, path, names, reading, *limits)
+        state.plotted_columns.store(key, columns)
+    return columns
+
+
+def describe_rows(
+    columns: NDArray[np.float64], names: Sequence[str], file: str, rows: slice, points: int
+) -> dict[str, Any]:
+    """Return the envelopes of rows of columns, with the fields of `islands_api.dataset_schemas.Samples`.
+
+    Raises
+    ------
+    RecordError
+        The file has no such rows.
+    """
+    chosen = select(rows, columns.shape[1], file)
+    signals = dict(zip(names, columns[:, chosen.start : chosen.stop], strict=True))
+    first, envelopes = describe_envelopes(signals, chosen.start, points)
+    return {"start": chosen.start, "stop": chosen.stop, "rows": first, "columns": envelopes}
+
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
 

@@ -19,9 +19,8 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator, make_task_key
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.cancellation import resolve_cancellation
-from islands.diagnosis.inference.central_values import centre_values
 from islands.diagnosis.inference.chance_gain import ForwardSelection
-from islands.diagnosis.inference.curve_ends import flatten_ends
+from islands.diagnosis.inference.curve_ends import MAX_INCREASE, flatten_ends
 from islands.diagnosis.inference.hypothesis import Alternatives, Hypothesis, screen_others, with_effect
 from islands.diagnosis.inference.noise_floor import (
     MIN_FRACTION,
@@ -46,6 +45,28 @@ from islands.effects.interface.effect import Effect
 from islands.effects.model_form import CORE_SHAPE
 from islands.parallel import memoised_map
 from islands.records.noise_model import estimate_effective_samples
+
+
+def centre_values(hypothesis: Hypothesis, target: Target) -> Hypothesis:
+    """Set the values of effects that jump to the middle of those with the same response, and fit all others.
+
+    An effect whose likelihood would be lower by more than an interval of 95 % keeps its values: other effects
+    change its input.
+    """
+    fit = hypothesis.fit
+    for effect in hypothesis.effects:
+        if effect.centre is None:
+            continue
+        part, start = fit.simulation.get_slice(effect), fit.values.copy()
+        start[part] = effect.centre(fit.values[part], fit.simulation.context)
+        is_fixed = np.zeros(start.size, dtype=np.bool_)
+        is_fixed[part] = True
+        centred = calibrate(fit.simulation, target, start, is_fixed=is_fixed)
+        if centred.score < fit.score + MAX_INCREASE:
+            fit = centred
+    cost = hypothesis.cost + fit.score - hypothesis.fit.score
+    return replace(hypothesis, fit=fit, cost=cost)
+
 
 #: Beginning of the messages of a search that takes the residual for model error.
 WITH_MODEL_ERROR = "with model error: "

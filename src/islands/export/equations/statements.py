@@ -2,13 +2,12 @@
 
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from islands.export.equations.common_parts import take_common_parts
 from islands.export.equations.extended_system import ExtendedEquations
-from islands.export.equations.identifiers import make_identifiers
 from islands.export.equations.language import Language
 from islands.expressions.primitives import POW
 from islands.expressions.printing import EQUATION_OPERATORS, ProgramPrinter, render
@@ -21,11 +20,91 @@ from islands.expressions.tree import (
     find_symbols,
     replace,
     substitute,
+    walk,
 )
 from islands.models.block import quote_name
 from islands.simulators.ode.equation_parser import TIME
 from islands.simulators.ode.output_system import SIMULATED
 from islands.simulators.ode.system import sort_variables
+
+#: Reserved words of C, names of its macros, reserved words of MATLAB, and members of structures in programs.
+_RESERVED = frozenset(
+    """
+    alignas alignof auto bool break case char const constexpr continue default do double else enum extern
+    false float for goto if inline int long nullptr register restrict return short signed sizeof static
+    static_assert struct switch thread_local true typedef typeof typeof_unqual union unsigned void volatile
+    while NAN INFINITY NULL HUGE_VAL RAND_MAX EXIT_SUCCESS EXIT_FAILURE unix linux i386 assert errno
+    catch classdef elseif end endfunction endif endfor endwhile function global otherwise parfor
+    persistent spmd try until unwind_protect samples none
+    """.split()  # noqa: SIM905
+)
+
+#: Largest length; C and MATLAB distinguish 63 characters.
+_LENGTH = 55
+
+
+def make_identifiers(names: Iterable[str]) -> dict[str, str]:
+    """Return a different identifier for each name, which is the name itself if possible.
+
+    A minus sign before a digit becomes ``m``, so that ``at -0.25`` and ``at 0.25`` differ.
+    """
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        text = re.sub(r"\W+", "_", re.sub(r"-(?=\d)", "m", name), flags=re.ASCII).strip("_")[:_LENGTH]
+        if not text or not text[0].isalpha():
+            text = f"n{text}"
+        if text in _RESERVED:
+            text += "_"
+        number, unique = 2, text
+        while unique in taken:
+            unique, number = f"{text}_{number}", number + 1
+        taken.add(unique)
+        found[name] = unique
+    return found
+
+
+#: Least number of operations of a part that gets a name.
+_MIN_OPERATIONS = 4
+
+
+def take_common_parts(
+    expressions: Sequence[Expression], prefix: str
+) -> tuple[list[tuple[str, Expression]], list[Expression]]:
+    """Give names to the parts that occur repeatedly in expressions.
+
+    Returns
+    -------
+    list of (str, expression)
+        Names, which begin with ``prefix``, and parts, in an order in which each one follows those it reads.
+    list of expression
+        The expressions with these names.
+    """
+    parts: list[tuple[str, Expression]] = []
+    remaining = list(expressions)
+    while True:
+        counts = Counter(each for one in [*remaining, *(part for _, part in parts)] for each in _walk(one))
+        repeated = [each for each, count in counts.items() if count > 1 and _count(each) >= _MIN_OPERATIONS]
+        if not repeated:
+            return parts[::-1], remaining
+        largest = max(repeated, key=_count)
+        name = f"{prefix}{len(parts) + 1}"
+        remaining = [_replace(each, largest, Symbol(name)) for each in remaining]
+        parts = [(known, _replace(part, largest, Symbol(name))) for known, part in parts]
+        parts.append((name, largest))
+
+
+def _walk(expression: Expression) -> list[Expression]:
+    return [part for part in walk(expression) if isinstance(part, Apply)]
+
+
+def _count(expression: Expression) -> int:
+    return len(_walk(expression))
+
+
+def _replace(expression: Expression, part: Expression, name: Symbol) -> Expression:
+    return replace(expression, lambda each: name if each == part else None)
+
 
 #: Functions that are not functions of every language, and the names of their definitions in programs.
 DEFINED = {

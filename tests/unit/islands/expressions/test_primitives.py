@@ -8,11 +8,10 @@ import pytest
 
 from islands.errors import ModelError
 from islands.expressions.parsing import parse
-from islands.expressions.primitive_checks import check
 from islands.expressions.primitives import LARGEST_EXPONENT, PRIMITIVES
 from islands.expressions.printing import latex, plain
 from islands.expressions.tree import Lagged, Primitive
-from islands.expressions.user_primitive import primitive
+from islands.expressions.user_primitive import check, primitive
 from islands.models.regressor import canonical
 
 

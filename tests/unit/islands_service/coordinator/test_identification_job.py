@@ -99,7 +99,7 @@ def test_free_run_of_the_best_model_is_stored_while_the_job_searches(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    monkeypatch.setattr("islands_service.coordinator.stored_free_run._EVERY", 0.0)
+    monkeypatch.setattr("islands_service.coordinator.identification_job._EVERY", 0.0)
     monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e9)
     seen = dict[int, int]()
 

@@ -11,7 +11,7 @@ from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island
 from islands.evolution.settings import Settings
-from islands_service.coordinator.stoppable_engine import StoppableEngine
+from islands_service.coordinator.identification_job import StoppableEngine
 
 
 def archipelago(generation: int) -> Archipelago:

@@ -5,7 +5,7 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.export.equations.identifiers import make_identifiers
+from islands.export.equations.statements import make_identifiers
 
 
 def test_a_name_that_is_an_identifier_is_kept():

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import Column, Integer, MetaData, Table, create_engine, insert, select, text
 
-from islands_service.store.backends.compressed_text import CompressedText
+from islands_service.store.tables import CompressedText
 
 TABLE = Table(
     "texts", MetaData(), Column("id", Integer, primary_key=True), Column("document", CompressedText)

@@ -1,6 +1,6 @@
 """Values that are kept in memory as long as they are in use."""
 
-from islands_api.web.recent_values import RecentValues
+from islands_api.web.dependencies import RecentValues
 
 
 def test_the_value_that_was_not_used_for_the_longest_time_is_removed() -> None:

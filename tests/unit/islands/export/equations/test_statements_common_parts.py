@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.export.equations.common_parts import take_common_parts
+from islands.export.equations.statements import take_common_parts
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.expressions.printing import render
