@@ -31,7 +31,7 @@ BLOB = "b" * 64
 
 FOUND = JobOutcome(
     JobState.SUCCEEDED,
-    {"search": {"seed": 7}},
+    {"search": {"seed": 7}, "loop": True},
     (({"fitness": 0.5}, "first"), ({"fitness": 0.7}, "second")),
     {"best": 0.5},
 )
