@@ -6,7 +6,7 @@ A class of settings is a data class whose fields `setting` makes; `settings_clas
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from functools import wraps
-from inspect import Parameter, cleandoc, signature
+from inspect import Parameter, Signature, cleandoc, signature
 from numbers import Integral
 from reprlib import repr as abbreviate
 from types import UnionType
@@ -153,6 +153,7 @@ def settings_class(cls: type[T]) -> type[T]:
             raise SettingsError(_explain(error, made)) from None
 
     made.__init__ = check
+    made.__signature__ = Signature(_parameters(made))
     made.__doc__ = f"{cleandoc(made.__doc__ or '')}\n\nAttributes\n----------\n{_describe(made)}\n"
     return cast("type[T]", made)
 
@@ -163,17 +164,19 @@ def document_settings(cls: type, name: str) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         declared = signature(function)
         own = [each for each in declared.parameters.values() if each.name != name]
-        listed = [
-            Parameter(each, Parameter.KEYWORD_ONLY, default=info.default)
-            for each, info, _ in list_settings(cls)
-        ]
-        function.__signature__ = declared.replace(parameters=[*own, *listed])  # type: ignore[attr-defined]
+        function.__signature__ = declared.replace(parameters=[*own, *_parameters(cls)])  # type: ignore[attr-defined]
         function.__doc__ = str(function.__doc__).replace(
             f"**{name}\n", _describe(cls, "    ").lstrip() + "\n"
         )
         return function
 
     return decorate
+
+
+def _parameters(cls: type) -> list[Parameter]:
+    return [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=info.default) for name, info in _fields(cls).items()
+    ]
 
 
 def _describe(cls: type, indent: str = "") -> str:
