@@ -68,7 +68,7 @@ from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
 
 #: Least number of seconds between two free runs that are stored.
-_EVERY = 2.0
+FREE_RUN_EVERY = 2.0
 
 
 class StoredFreeRun:
@@ -98,7 +98,7 @@ class StoredFreeRun:
         """
         pending = self._written is not None and not self._is_named
         if found is not None and found is not self._written and not pending and monotonic() >= self._due:
-            self._due = monotonic() + _EVERY
+            self._due = monotonic() + FREE_RUN_EVERY
             # The name of the job keeps the blob apart from that of an equal search.
             document = json.dumps({"job": self._job, **found.document})
             try:

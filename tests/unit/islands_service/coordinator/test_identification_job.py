@@ -5,6 +5,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from math import inf
 from typing import Any
 
 import pytest
@@ -99,7 +100,7 @@ def test_free_run_of_the_best_model_is_stored_while_the_job_searches(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    monkeypatch.setattr("islands_service.coordinator.identification_job._EVERY", 0.0)
+    monkeypatch.setattr("islands_service.coordinator.identification_job.FREE_RUN_EVERY", 0.0)
     monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e9)
     seen = dict[int, int]()
 
@@ -380,6 +381,7 @@ def test_unavailable_store_does_not_cause_repeated_checkpoints(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(work, "FREE_RUN_EVERY", inf)  # one free run, however long the search takes
     before = set(dict(blobs.all()))
     flaky = Flaky(store, lambda number: number < 20)
     outcome = run_job(claim(store), flaky, blobs, every=3600.0)
