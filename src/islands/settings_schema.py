@@ -217,10 +217,14 @@ def is_daily(info: FieldInfo) -> bool:
     return bool(info.json_schema_extra.get("daily"))
 
 
+def _find_choice(info: FieldInfo) -> _Choice | None:
+    checks = [each.func for each in info.metadata if isinstance(each, AfterValidator)]
+    return next((each for each in checks if isinstance(each, _Choice)), None)
+
+
 def _describe_values(info: FieldInfo) -> str:
-    for each in info.metadata:
-        if isinstance(each, AfterValidator) and isinstance(each.func, _Choice):
-            return str(each.func)
+    if choice := _find_choice(info):
+        return str(choice)
     unit = info.json_schema_extra.get("unit", "") if isinstance(info.json_schema_extra, dict) else ""
     return f"{_describe_type(info.annotation, info.metadata)} {unit}".rstrip()
 
@@ -270,7 +274,10 @@ def _explain(error: ValidationError, cls: type) -> str:
 
 
 def _refuse(cls: type, name: str, value: object) -> str:
-    return f"{name} is {_describe_values(_fields(cls)[name])}, got {abbreviate(value)}"
+    info = _fields(cls)[name]
+    choice = _find_choice(info)
+    advice = suggest(str(value), map(str, choice.names)) if choice else ""
+    return f"{name} is {_describe_values(info)}, got {abbreviate(value)}{advice}"
 
 
 def parse_setting(cls: type, name: str, value: object) -> Any:

@@ -118,11 +118,8 @@ def test_a_fit_has_the_structure_that_is_given(folder):
 
 def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
-    budget = (
-        *("--preset", "latent", "--islands", "2", "--set", "population=6", "--generations", "2"),
-        *("--set"),
-    )
-    succeed(*search, *budget, "structure=wiener", "--out", tmp_path / "out")
+    budget = ("--preset", "latent", "--islands", "2", "--set", "population=6", "--generations", "2")
+    succeed(*search, *budget, "--set", "structure=wiener", "--out", tmp_path / "out")
     found = islands.load(tmp_path / "out")
     assert found.settings["structure"] == "wiener"
     models = [entry.model for entry in found.models]
@@ -132,7 +129,7 @@ def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
     assert "for 2 generations of 6 offspring" in method
     assert "no unit acts on the states" in method
     assert "full polynomial set" not in method
-    text = fail(*search, *budget, "structure=phi", "--out", tmp_path / "refused")
+    text = fail(*search, *budget, "--set", "structure=phi", "--out", tmp_path / "refused")
     assert "unknown structure of latent models 'phi': take one of auto, wiener" in text
     text = fail(*search, "--set", "structure=wiener", "--out", tmp_path / "refused")
     assert "unknown structure of narx models 'wiener'" in text

@@ -23,11 +23,11 @@ finally:
 LIMITS = {
     "--version": (280, ""),
     "fit --help": (715, ""),
-    "inspect {record}": (550, ""),
+    "inspect {record}": (615, ""),
     "jobs --help": (900, ""),
     "jobs list --url http://127.0.0.1:9": (850, ""),
-    "show {model}": (565, ""),
-    "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1310, "numba scipy"),
+    "show {model}": (610, ""),
+    "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1340, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
     # Other processes draw the report.
     "diagnose {record} --input u_V --output y_um --rows 0:600 --simulation linear:1 --workers 2 --force "

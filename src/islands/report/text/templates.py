@@ -4,7 +4,6 @@ A block of a template is a statement: its text is empty where it does not hold. 
 the group to which it belongs.
 """
 
-import re
 from collections.abc import Iterable, Iterator
 from functools import cache, partial
 from importlib.resources import files
@@ -50,7 +49,7 @@ def write_named(template: str, group: str = "", **facts: Any) -> Iterator[tuple[
 
 def _render(template: "Template", block: str, facts: dict[str, Any]) -> str:
     text = "".join(template.blocks[block](template.new_context(facts)))
-    return re.sub(r" *\n *", "\n", re.sub(" +", " ", text)).strip()
+    return "\n".join(" ".join(filter(None, line.split(" "))) for line in text.split("\n")).strip()
 
 
 def _list_names(names: Iterable[str]) -> str:
@@ -67,7 +66,7 @@ def _load() -> "Environment":
     folder = files("islands.report.text") / "templates"
     environment = Environment(
         loader=FunctionLoader(
-            lambda name: re.sub(r"\s*\n\s*", " ", (folder / name).read_text(encoding="utf-8"))
+            lambda name: " ".join(map(str.strip, (folder / name).read_text(encoding="utf-8").splitlines()))
         ),
         undefined=StrictUndefined,
     )

@@ -36,10 +36,8 @@ def record(kind, samples=600):
 
 def choose(data, delays=None):
     """Return the choice of `fit`, and its result."""
-    settings = FitSettings(certificate=0)
-    result = fit_chosen_library(
-        data, split(data), "auto", 2, None, None, delays, settings, 0, ignore_progress, never_stop
-    ).complete()
+    settings = FitSettings(degree=2, delays=delays, certificate=0)
+    result = fit_chosen_library(data, split(data), settings, 0, ignore_progress, never_stop).complete()
     return choice_from_document(result.settings["choice"]), result
 
 
@@ -67,7 +65,8 @@ def test_dead_time_is_added_to_the_lags():
     assert choice.delays == result.settings["delays"] == (7,)
     assert "dead time of 7 samples" in choice.reasons[1]
     given, result = choose(record("dead time"), delays=[0])
-    assert given.delays == result.settings["delays"] == (0,)
+    assert not any(given.delays)
+    assert not any(result.settings["delays"])
     assert given.trials["smooth"] > 10.0 * choice.trials["smooth"]
 
 
