@@ -49,8 +49,7 @@ def with_settings(**groups: type) -> Callable[[Callable[..., None]], Callable[..
             for name, value in values.items():
                 if name not in owners:
                     raise SettingsError(
-                        f"--set {name}: there is no such setting here{suggest(name, owners)}"
-                        "; islands settings lists them"
+                        f"--set {name}: not one of those that islands settings lists{suggest(name, owners)}"
                     )
                 group, cls = owners[name]
                 found[group][name] = parse_setting(cls, name, value)

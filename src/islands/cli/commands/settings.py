@@ -37,7 +37,8 @@ def settings(
         text = str(cls.__doc__).partition("\n\nAttributes")[0]
         output.print(f"{' '.join(text.split())} Of {', '.join(names)}.", markup=False)
         for name, info, values in list_settings(cls):
-            output.print(f"  {name} = {_write(info.default)}: {values}", markup=False)
+            default = _write(info.default)
+            output.print(f"  {name}: {values}{default and f', by default {default}'}", markup=False)
             output.print("\n".join(wrap(f"      {info.description}", "      ")), markup=False)
         output.print()
 

@@ -55,7 +55,10 @@ def test_a_text_becomes_a_value_of_the_setting(text: str, name: str, value: obje
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("popultion=3", "--set popultion: there is no such setting here. Did you mean 'population'?"),
+        (
+            "popultion=3",
+            "--set popultion: not one of those that islands settings lists. Did you mean 'population'?",
+        ),
         ("population", "--set population: write NAME=VALUE"),
         ("population=0", "population is an integer of at least 1, got '0'"),
         ("shifts=0", "shifts is a list of integers of at least 1, got '0'"),
