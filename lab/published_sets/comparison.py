@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from statistics import median
 
-from islands.errors import IslandsError, SettingsError, check_at_least, check_seconds, lookup
+from islands.errors import IslandsError, SettingsError, check_integers, check_seconds, lookup
 from islands.progress import (
     ProgressCallback,
     Stop,
@@ -52,7 +52,9 @@ class ComparisonSettings:
             lookup(MODEL_SEARCHES, each, "class of models")
         if not self.classes or len(set(self.classes)) < len(self.classes):
             raise SettingsError(f"give each class of models once, got {', '.join(self.classes) or 'none'}")
-        check_at_least(1, seeds=self.seeds)
+        check_integers(seeds=self.seeds)
+        if self.seeds < 1:
+            raise SettingsError(f"seeds is at least 1, got {self.seeds}")
         if self.budget is not None:
             check_seconds(self.budget, "the budget")
 

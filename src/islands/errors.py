@@ -189,20 +189,6 @@ def lookup(table: Mapping[str, T], name: str, kind: str) -> T:
     return table[name]
 
 
-def check_at_least(least: int, **values: int) -> None:
-    """Check lower bounds of settings, which are given by name.
-
-    Raises
-    ------
-    SettingsError
-        A value is below the bound.
-    """
-    for name, value in values.items():
-        check_integers(**{name: value})
-        if value < least:
-            raise SettingsError(f"{name} is at least {least}, got {value}")
-
-
 def check_seconds(value: object, name: str, kind: type[IslandsError] = SettingsError) -> float:
     """Return a time in seconds, after a check that it is a positive number.
 
