@@ -16,7 +16,7 @@ from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE
 from islands_service.logging_config import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
-from islands_service.store.backends.cached_blobs import open_blobs
+from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import DatabaseDamagedError, StoreError
 
 log = structlog.get_logger()

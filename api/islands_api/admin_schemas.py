@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from islands_api.schemas import ResponseModel
 from islands_service.domain.owner import DEFAULT_WEIGHT, MAX_QUOTA, WEIGHTS
-from islands_service.store.tenants.keys import SCOPES
+from islands_service.store.keys import SCOPES
 
 #: Name of an owner that can be part of a path.
 OwnerName = Annotated[

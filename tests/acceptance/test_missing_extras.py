@@ -23,8 +23,8 @@ from islands.facade.engine_choice import open_engine
 from islands.simulators.fmu.fmi_description import import_fmpy
 from islands_api.web.auth import make_verifier
 from islands_service.settings import ServiceSettings
-from islands_service.store.backends.connections import make_engine
-from islands_service.store.backends.object_store import ObjectStore
+from islands_service.store.connections import make_engine
+from islands_service.store.object_store import ObjectStore
 from islands_service.tracing import Traces
 from support.repository import ROOT
 
@@ -80,7 +80,7 @@ USES = {
         "psycopg",
         "psycopg",
         lambda _: make_engine("postgresql+psycopg://user@127.0.0.1/name"),
-        ("islands_service.store.backends.timed_connection",),
+        ("islands_service.store.timed_connection",),
     ),
     "control": Use("control", "control", lambda _: islands.linearise(model(), [0.0])),
     "excel": Use("openpyxl", "openpyxl", read("a.xlsx")),

@@ -4,7 +4,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_api.__main__ import check_safe, install_admin_key
-from islands_service.store.tenants.keys import ADMIN_KEY
+from islands_service.store.keys import ADMIN_KEY
 from support.processes import eventually
 from support.service import problem_of
 

@@ -8,7 +8,7 @@ import pytest
 from islands_api import Client
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import JobState, Submission
-from islands_service.store.tenants.keys import SCOPES
+from islands_service.store.keys import SCOPES
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
 

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from islands_api.web.routes import events
-from islands_service.store.tenants.keys import SCOPES
+from islands_service.store.keys import SCOPES
 from support.service import PATIENCE, csv, held, kept, problem_of, queued, spec
 
 

@@ -14,7 +14,7 @@ from islands.report.documents.monitor_state import monitor_to_json
 from islands_api.client import Client
 from islands_service.domain import monitor_spec
 from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState
-from islands_service.store import monitor_states
+from islands_service.store import monitors
 from islands_service.store.blobs import Blobs
 from support.monitored_oscillator import make_records
 from support.monitoring_jobs import OSCILLATOR, add_file, analyse_next, write_records
@@ -63,7 +63,7 @@ def test_the_defaults_of_the_service_are_those_of_the_library():
         record_follower.TRAINING,
         record_follower.MIN_TRAINING,
     )
-    assert monitor_states.STATE_SCHEMA == monitor_state.SCHEMA
+    assert monitors.STATE_SCHEMA == monitor_state.SCHEMA
 
 
 def test_the_client_creates_reads_lists_and_deletes_monitors(service):

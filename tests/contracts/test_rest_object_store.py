@@ -13,10 +13,9 @@ from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import JobOutcome, JobState, ProgressReport
 from islands_service.liveness import StopRequest
 from islands_service.settings import ServiceSettings
-from islands_service.store import Store
-from islands_service.store.backends import cached_blobs
-from islands_service.store.backends.cached_blobs import CachedBlobs, open_blobs
+from islands_service.store import Store, cached_blobs
 from islands_service.store.blobs import Blobs
+from islands_service.store.cached_blobs import CachedBlobs, open_blobs
 from islands_service.store.database import Database
 from support.coordinators import DONE, SerialCoordinator, replace_runner
 from support.object_stores import MemoryObjects

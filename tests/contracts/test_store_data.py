@@ -11,8 +11,8 @@ from islands.errors import SettingsError
 from islands_service.domain.job import TERMINAL, DatasetDeletedError, JobState, QuotaError
 from islands_service.store import retention
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, dataset_id
+from islands_service.store.keys import PREFIX, SCOPES, KeyNotFoundError
 from islands_service.store.tables import datasets, jobs
-from islands_service.store.tenants.keys import PREFIX, SCOPES, KeyNotFoundError
 from support.stores import (
     ALICE,
     BLOB,

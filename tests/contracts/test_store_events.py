@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import update
 
 from islands_service.domain.job import DISCREPANCY, JobState, JobStateError
-from islands_service.store.job_rows.job_claims import ATTEMPTS
+from islands_service.store.leases import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.stores import (
     ALICE,

@@ -10,7 +10,7 @@ from islands_service.domain.job import JobNotFoundError
 from islands_service.store import Store
 from islands_service.store import database as database_module
 from islands_service.store.database import MAX_GROUP_SIZE, StoreError
-from islands_service.store.job_rows.job_events import append_event, update_job
+from islands_service.store.job_rows import append_event, update_job
 from islands_service.store.tables import keys
 from support.stores import (
     ALICE,

@@ -67,7 +67,7 @@ def test_a_change_that_is_rolled_back_leaves_no_delivery(store):
     lease = claimed(store)
 
     def broken(connection):
-        from islands_service.store.job_rows.job_events import append_event, update_job
+        from islands_service.store.job_rows import append_event, update_job
 
         append_event(connection, update_job(connection, job.id, state=JobState.FAILED), "failed")
         raise RuntimeError

@@ -5,10 +5,9 @@ from functools import partial
 
 import pytest
 
-from islands_service.store import Store
-from islands_service.store.backends import timed_connection
+from islands_service.store import Store, timed_connection
 from islands_service.store.database import CommitUnknownError, StoreUnavailableError
-from islands_service.store.job_rows.job_events import update_job
+from islands_service.store.job_rows import update_job
 from support.databases import emptied, server
 from support.stores import ALICE, LONG, asked, at_once, brought_on, claimed, kinds, submitted
 from support.tcp_proxy import proxied

@@ -13,7 +13,7 @@ import pytest
 from islands_service.domain.job import JobState, LeaseLostError
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
-from islands_service.store.job_rows.job_events import append_event, update_job
+from islands_service.store.job_rows import append_event, update_job
 from support.databases import emptied, is_available, server
 from support.processes import eventually
 from support.repository import ROOT

@@ -35,8 +35,7 @@ from islands_service.domain.job import (
 )
 from islands_service.domain.owner import DEFAULT_WEIGHT
 from islands_service.store import Store
-from islands_service.store.job_rows import job_claims
-from islands_service.store.job_rows.fair_queue import STRIDE
+from islands_service.store.fair_queue import STRIDE
 from support.databases import emptied
 from support.stores import ALICE, BOB, CANCELLED, EXPIRED, FAILED, FOUND, LONG, asked, brought_on
 
@@ -312,7 +311,7 @@ class Machine(RuleBasedStateMachine):
 
 
 def play(url, monkeypatch, examples, steps):
-    monkeypatch.setattr(job_claims, "ATTEMPTS", ATTEMPTS)
+    monkeypatch.setattr(leases, "ATTEMPTS", ATTEMPTS)
     run_state_machine_as_test(
         lambda: Machine(url()),
         settings=settings(

@@ -15,7 +15,7 @@ from islands.report.documents.monitor_json import (
 from islands.report.documents.monitor_state import SavedMonitor, head_to_json, record_to_json
 from islands_service.domain.monitoring import Monitor, MonitorStatus, MonitorUpdate, RecordEntry
 from islands_service.store import Store
-from islands_service.store.job_rows.monitor_records import update_monitor
+from islands_service.store.monitors import update_monitor
 
 
 def make_entry(record: int, index: int, is_rejected: bool = False) -> RecordEntry:

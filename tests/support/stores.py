@@ -164,7 +164,7 @@ _STOPPED_WRITER = """
 import signal, sys, threading
 from islands_service.store import Store
 from islands_service.store.backends import connections
-from islands_service.store.job_rows.job_events import update_job
+from islands_service.store.job_rows import update_job
 connections.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", -1.0)

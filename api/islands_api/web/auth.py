@@ -18,7 +18,7 @@ from islands_api.web.problems import AuthenticationError, InsufficientScopeError
 from islands_service.domain.job import Requester
 from islands_service.settings import ServiceSettings
 from islands_service.store.database import StoreError
-from islands_service.store.tenants.keys import SCOPES, Key
+from islands_service.store.keys import SCOPES, Key
 
 if TYPE_CHECKING:
     from islands_api.oidc.token_verifier import TokenVerifier

@@ -28,8 +28,8 @@ from islands_service.outage_log import OutageLog
 from islands_service.outbound.checked_client import CheckedClient, make_checked_client
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.backends.cached_blobs import open_blobs
 from islands_service.store.blobs import Blobs
+from islands_service.store.cached_blobs import open_blobs
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")

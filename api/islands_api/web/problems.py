@@ -27,12 +27,12 @@ from islands_service.domain.job import (
 from islands_service.domain.monitoring import MonitorNotFoundError
 from islands_service.domain.webhook import WebhookNotFoundError
 from islands_service.outbound.addresses import OutboundFailedError
-from islands_service.store.backends.object_store import ObjectStoreError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, FmuNotFoundError
-from islands_service.store.tenants.keys import KeyNotFoundError
-from islands_service.store.tenants.owners import OwnerNotFoundError
+from islands_service.store.keys import KeyNotFoundError
+from islands_service.store.object_store import ObjectStoreError
+from islands_service.store.owners import OwnerNotFoundError
 
 MEDIA_TYPE = "application/problem+json"
 

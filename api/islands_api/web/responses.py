@@ -14,8 +14,8 @@ from islands_service.domain.monitoring import Monitor
 from islands_service.domain.owner import Owner
 from islands_service.domain.webhook import Delivery, Webhook
 from islands_service.store.datasets import StoredDataset
-from islands_service.store.job_rows.queue_places import QueuePlace
-from islands_service.store.tenants.keys import Key
+from islands_service.store.fair_queue import QueuePlace
+from islands_service.store.keys import Key
 
 #: Parts of the progress that are valid only while a job runs.
 _OF_ATTEMPTS = ("phase", "note", "seconds_left", "evaluations_per_second", "free_run")

@@ -43,9 +43,9 @@ from islands_service.outage_log import OutageLog
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.backends.cached_blobs import open_blobs
-from islands_service.store.backends.object_store import ObjectStoreError
+from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import StoreError
+from islands_service.store.object_store import ObjectStoreError
 from islands_service.tracing import Traces
 
 #: Runs a job of one kind and returns its outcome.

@@ -15,7 +15,7 @@ from islands_service.outage_log import OutageLog
 from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
 from islands_service.outbound.checked_client import CheckedClient
 from islands_service.store.database import StoreError
-from islands_service.store.tenants.deliveries import Deliveries
+from islands_service.store.webhooks import Deliveries
 
 log = structlog.get_logger()
 

@@ -10,8 +10,8 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from islands_service.domain.job import Requester
-from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
+from islands_service.store.dialect import now
 from islands_service.store.tables import audit
 
 

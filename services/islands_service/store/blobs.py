@@ -36,7 +36,7 @@ class Blobs:
     ----------
     folder : Path
         Created if it does not exist. All roles of a cluster must share it, or use an object store:
-        `islands_service.store.backends.cached_blobs`.
+        `islands_service.store.cached_blobs`.
     """
 
     def __init__(self, folder: Path) -> None:

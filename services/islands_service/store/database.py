@@ -6,23 +6,24 @@ accepts three times as many jobs as one transaction per job, and the longest wai
 0009).
 """
 
+import os
 import sqlite3
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from time import monotonic
 from typing import Any, TypeVar
 
-from sqlalchemy import Connection, PoolProxiedConnection
+from sqlalchemy import Connection, PoolProxiedConnection, make_url
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from islands.errors import IslandsError
-from islands_service.store.backends import dialect
-from islands_service.store.backends.connections import make_engine
-from islands_service.store.backends.disk_reserve import DiskReserve
+from islands_service.store import dialect
+from islands_service.store.connections import make_engine
 
 T = TypeVar("T")
 
@@ -50,6 +51,9 @@ _COLLISION_STATES = ("40001", "40P01")
 
 #: Names of the errors of SQLite for a file that is no database, and for one with damaged pages.
 _DAMAGED_NAMES = ("SQLITE_NOTADB", "SQLITE_CORRUPT")
+
+#: Bytes of the reserve, and its largest share of the disk.
+_BYTES, _SHARE = 8_000_000, 0.05
 
 
 class StoreError(IslandsError):
@@ -356,3 +360,38 @@ def _is_full(error: sqlite3.Error) -> bool:
         "SQLITE_IOERR_SHMSIZE",
         "SQLITE_IOERR_FSYNC",
     )
+
+
+class DiskReserve:
+    """File that takes disk space until an operation needs it.
+
+    Parameters
+    ----------
+    url : str
+        URL of the database. One that is not a file on this machine has no reserve.
+    """
+
+    def __init__(self, url: str) -> None:
+        name = make_url(url).database if url.startswith("sqlite") else None
+        self._path = None if name is None else Path(f"{name}-reserve")
+
+    def fill(self) -> None:
+        """Allocate the reserve unless that would take half of the space that is left."""
+        if self._path is None:
+            return
+        with suppress(OSError), self._path.open("ab") as stream:
+            disk = os.statvfs(stream.fileno())
+            size = min(_BYTES, int(_SHARE * disk.f_blocks * disk.f_frsize))
+            if os.fstat(stream.fileno()).st_size < size and 2 * size < disk.f_bavail * disk.f_frsize:
+                os.posix_fallocate(stream.fileno(), 0, size)
+
+    @contextmanager
+    def release(self) -> Iterator[None]:
+        """Free the reserve during the block, and fill it again as far as there is room."""
+        with suppress(OSError):
+            if self._path is not None:
+                os.truncate(self._path, 0)
+        try:
+            yield
+        finally:
+            self.fill()

@@ -11,11 +11,11 @@ from sqlalchemy import Connection, Row, bindparam, func, insert, select, tuple_,
 from islands.errors import IslandsError
 from islands_service.domain.job import ACTIVE, QuotaError, Requester
 from islands_service.domain.uploaded_fmu import FMU_SUFFIX
+from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.backends import dialect
-from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.job_deletion import delete_unused_datasets
+from islands_service.store.dialect import now
+from islands_service.store.job_rows import delete_unused_datasets
 from islands_service.store.tables import datasets, jobs, owners
 
 #: Names of what is stored, by whether it is an FMU.

@@ -26,22 +26,25 @@ from islands_service.domain.job import (
     Submission,
     find_datasets,
 )
+from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.backends import dialect
-from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.job_deletion import delete_job
-from islands_service.store.job_rows.job_events import (
+from islands_service.store.dialect import now
+from islands_service.store.job_rows import (
     append_event,
     cancel_job,
+    delete_job,
+    describe_labels,
+    has_tag,
+    has_words,
     job_from_row,
+    join_tags,
     read_document,
     update_job,
     without_note,
 )
-from islands_service.store.job_rows.job_search import describe_labels, has_tag, has_words, join_tags
-from islands_service.store.job_rows.monitor_records import count_record
-from islands_service.store.job_rows.submission_checks import (
+from islands_service.store.monitors import count_record
+from islands_service.store.submission_checks import (
     check_datasets,
     check_quotas,
     find_accepted_job,

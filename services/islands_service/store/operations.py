@@ -3,19 +3,18 @@
 from types import TracebackType
 
 from islands_service.store.audit import AuditTrail
-from islands_service.store.backends.readiness import Readiness
 from islands_service.store.database import Database
 from islands_service.store.datasets import Datasets
 from islands_service.store.jobs import Jobs
+from islands_service.store.keys import Keys
 from islands_service.store.leases import Leases
 from islands_service.store.migrations.upgrade import prepare
-from islands_service.store.monitor_states import Monitors
+from islands_service.store.monitors import Monitors
+from islands_service.store.owners import Owners
+from islands_service.store.readiness import Readiness
 from islands_service.store.results import Results
 from islands_service.store.retention import Retention
-from islands_service.store.tenants.deliveries import Deliveries
-from islands_service.store.tenants.keys import Keys
-from islands_service.store.tenants.owners import Owners
-from islands_service.store.tenants.webhooks import Webhooks
+from islands_service.store.webhooks import Deliveries, Webhooks
 
 
 class Store:

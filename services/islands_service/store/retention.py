@@ -10,9 +10,9 @@ from sqlalchemy import Column, ColumnElement, Connection, Update, delete, select
 
 from islands_service.domain.job import TERMINAL, Requester, find_datasets
 from islands_service.store.audit import Action, record_change
-from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
-from islands_service.store.job_rows.job_deletion import delete_unused_datasets
+from islands_service.store.dialect import now
+from islands_service.store.job_rows import delete_unused_datasets
 from islands_service.store.tables import artefacts, audit, datasets, jobs, owners, retired_keys
 
 #: Rows that are deleted in one transaction. A job has some thousands of events and points.

@@ -16,7 +16,7 @@ from islands_api.cli.service.admin_job_commands import jobs
 from islands_api.cli.service.owner_commands import owners
 from islands_api.cli.service.store_options import Database, DataDir, open_store
 from islands_service.settings import service_settings
-from islands_service.store.backends.cached_blobs import open_blobs
+from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import Database as StoreDatabase
 from islands_service.supervisor import folder_lock
 

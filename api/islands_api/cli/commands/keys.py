@@ -10,7 +10,7 @@ from rich.text import Text
 from islands.cli.console import errors, output
 from islands.errors import SettingsError
 from islands_api.cli.service.store_options import COMMAND_LINE, Database, DataDir, open_store
-from islands_service.store.tenants.keys import SCOPES
+from islands_service.store.keys import SCOPES
 
 keys = typer.Typer(
     help="API keys of a service: create, list, revoke.", no_args_is_help=True, add_completion=False

@@ -19,8 +19,8 @@ from islands_service.outbound.addresses import OutboundFailedError, OutboundRefu
 from islands_service.outbound.checked_client import MAX_URL, is_listed
 from islands_service.setting_checks import split_list
 from islands_service.settings import ServiceSettings
-from islands_service.store.backends.object_store import ObjectNotFoundError, ObjectStore
 from islands_service.store.blobs import translate_disk_full
+from islands_service.store.object_store import ObjectNotFoundError, ObjectStore
 
 #: Redirects that are followed, each to a listed host.
 _MAX_REDIRECTS = 3

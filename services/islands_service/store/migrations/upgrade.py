@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Connection, inspect, text
 
 from islands_service.domain.job import ISLANDS_VERSION
-from islands_service.store.backends import dialect
+from islands_service.store import dialect
 from islands_service.store.database import Database, StoreError
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from islands_service.domain.job import Job, JobOutcome, JobState, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import BlobNotFoundError
-from islands_service.store.job_rows.job_claims import ATTEMPTS
+from islands_service.store.leases import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.coordinators import DONE, replace_runner, wait_until_finished
 from support.processes import eventually

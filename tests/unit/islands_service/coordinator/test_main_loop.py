@@ -27,8 +27,7 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError, StoreUnavailableError
-from islands_service.store.job_rows.job_claims import ATTEMPTS
-from islands_service.store.leases import Leases
+from islands_service.store.leases import ATTEMPTS, Leases
 from support.coordinators import (
     DONE,
     RayCoordinator,

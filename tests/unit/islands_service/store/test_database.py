@@ -12,8 +12,7 @@ import pytest
 from sqlalchemy import delete, event, false, insert, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError
 
-from islands_service.store import Store
-from islands_service.store.backends import connections
+from islands_service.store import Store, connections
 from islands_service.store.database import (
     CommitUnknownError,
     Database,

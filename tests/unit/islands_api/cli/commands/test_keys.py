@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from islands_api.client import Client, ServiceError
-from islands_service.store.tenants.keys import Key
+from islands_service.store.keys import Key
 from support.service import Service
 
 Run = Callable[..., tuple[int, str, str]]

@@ -88,7 +88,7 @@ def _enable_wal(connection: sqlite3.Connection) -> None:
 def _postgresql(url: str) -> Engine:
     # An optional dependency, which SQLite does not need.
     try:
-        from islands_service.store.backends.timed_connection import TimedConnection  # noqa: PLC0415
+        from islands_service.store.timed_connection import TimedConnection  # noqa: PLC0415
     except ImportError as error:
         raise SettingsError(describe_missing_extra("a database of PostgreSQL", "cluster")) from error
 

@@ -17,8 +17,8 @@ from islands_service.domain.owner import (
     check_owner_changes,
     merge_quotas,
 )
+from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.backends import dialect
 from islands_service.store.database import Database
 from islands_service.store.tables import datasets, jobs, keys, owners
 

@@ -7,15 +7,15 @@ from time import monotonic, time
 
 import pytest
 
-from islands_service.store.backends import object_store
-from islands_service.store.backends.cached_blobs import CachedBlobs
-from islands_service.store.backends.object_store import (
+from islands_service.store import object_store
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.cached_blobs import CachedBlobs
+from islands_service.store.object_store import (
     ObjectNotFoundError,
     ObjectStore,
     ObjectStoreError,
     ObjectStoreRefusedError,
 )
-from islands_service.store.blobs import BlobNotFoundError
 from support.object_stores import (
     ACCESS,
     CuttingProxy,

@@ -11,10 +11,10 @@ from sqlalchemy import Column, Connection, Row, func, insert, or_, select, updat
 
 from islands.errors import IslandsError, SettingsError, suggest
 from islands_service.domain.job import Requester
+from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.backends import dialect
-from islands_service.store.backends.dialect import now
 from islands_service.store.database import Database
+from islands_service.store.dialect import now
 from islands_service.store.tables import keys
 
 #: Scopes of a key, and what each allows.

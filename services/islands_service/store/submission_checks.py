@@ -24,7 +24,7 @@ from islands_service.domain.job import (
     QuotaError,
     Submission,
 )
-from islands_service.store.job_rows.job_events import job_from_row
+from islands_service.store.job_rows import job_from_row
 from islands_service.store.tables import datasets, jobs, owners, retired_keys
 
 # Built once, since building a statement takes as long as executing it.

@@ -8,13 +8,13 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_service.settings import ServiceSettings, service_settings
-from islands_service.store.backends import cached_blobs
-from islands_service.store.backends.cached_blobs import CachedBlobs, open_blobs
-from islands_service.store.backends.object_store import (
+from islands_service.store import cached_blobs
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.cached_blobs import CachedBlobs, open_blobs
+from islands_service.store.object_store import (
     ObjectStoreError,
     ObjectStoreRefusedError,
 )
-from islands_service.store.blobs import BlobNotFoundError
 from support.object_stores import MemoryObjects
 
 LIMIT = 1000

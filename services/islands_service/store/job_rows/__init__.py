@@ -1,1 +1,0 @@
-"""Rows of jobs, within a transaction: updates with their events, claims, checks of submissions."""

@@ -1,1 +1,0 @@
-"""Tenants of the service: keys, owners with their quotas, and webhooks with their deliveries."""
