@@ -13,7 +13,7 @@ from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier
 from islands_service.intake.reader_process import FORK_SERVER
 from islands_service.liveness import FAILED, MISCONFIGURED, UNAVAILABLE
-from islands_service.logging_config import configure_logs
+from islands_service.logs import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.cached_blobs import open_blobs

@@ -45,18 +45,16 @@ from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState, advance
 from islands.records.dataset import Dataset
+from islands_service.coordinator.checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.identification_job import ProgressReporter
-from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.job_run import JobNotes, JobRun
 from islands_service.coordinator.search_view import SearchFront
 from islands_service.domain.job_spec import parse_identification
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool, regions
 from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
 from islands_service.runtime.ray_engine import RayEngine
-from islands_service.runtime.region_actor import RegionReport, RegionStatus
-from islands_service.runtime.region_islands import RegionIslands
+from islands_service.runtime.regions import RegionIslands, RegionReport, RegionStatus
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from support.stores import claimed, submitted

@@ -144,7 +144,7 @@ def test_an_fmu_is_kept_until_the_jobs_that_name_it_have_ended(shared, dataset, 
 
 @pytest.mark.nightly
 def test_a_diagnosis_of_an_fmu_can_be_cancelled_during_a_simulation(shared, fmu):
-    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
+    from islands_service.coordinator.diagnosis_job import run_diagnosis_job
     from islands_service.store.blobs import Blobs
     from support.job_runs import make_run
 

@@ -6,7 +6,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from islands_service.coordinator.diagnosis.job import run_diagnosis_job
+from islands_service.coordinator.diagnosis_job import run_diagnosis_job
 from islands_service.domain.job import JobOutcome, JobState
 from islands_service.store.blobs import Blobs
 from support.job_runs import make_run

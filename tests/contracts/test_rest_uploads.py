@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from islands_service.intake.inspection_limits import count_slots
+from islands_service.intake.file_inspection import count_slots
 from support.bad_records import write_hdf5_bomb, write_mat_bomb, write_parquet_bomb
 from support.processes import eventually
 from support.service import csv, problem_of

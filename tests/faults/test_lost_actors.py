@@ -18,8 +18,8 @@ from islands.evolution.problem import Problem
 from islands.progress import Steps
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool
+from islands_service.runtime.actor_pool import IslandActor
 from islands_service.runtime.cluster import LOSS_ERRORS, ClusterError
-from islands_service.runtime.island_actor import IslandActor
 from islands_service.runtime.ray_engine import RayEngine
 from support.latent_systems import spring_record
 from support.processes import actors, alive, eventually, kill

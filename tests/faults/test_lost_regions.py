@@ -12,10 +12,8 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands.persistence.checkpoints import compressed_checkpoint, read_checkpoint, write_checkpoint
 from islands_service.engines import ENGINES
-from islands_service.runtime import regions
-from islands_service.runtime.errors import ClusterError
-from islands_service.runtime.region_islands import RegionIslands
-from islands_service.runtime.regions import run_regions
+from islands_service.runtime import ClusterError, regions
+from islands_service.runtime.regions import RegionIslands, run_regions
 from support.processes import actors, alive, descendants, eventually, kill
 from support.searches import SMALL, exactly, record
 

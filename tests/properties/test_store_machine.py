@@ -34,7 +34,7 @@ from islands_service.domain.job import (
     QuotaError,
 )
 from islands_service.domain.owner import DEFAULT_WEIGHT
-from islands_service.store import Store
+from islands_service.store import Store, leases
 from islands_service.store.fair_queue import STRIDE
 from support.databases import emptied
 from support.stores import ALICE, BOB, CANCELLED, EXPIRED, FAILED, FOUND, LONG, asked, brought_on

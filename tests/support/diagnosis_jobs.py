@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.parallel import ParallelMap
 from islands.records.reading.preview import preview
-from islands_service.coordinator.diagnosis.job import run_diagnosis_job
+from islands_service.coordinator.diagnosis_job import run_diagnosis_job
 from islands_service.domain.job import DISCREPANCY, Job, JobOutcome, Lease, Submission
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

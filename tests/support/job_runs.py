@@ -5,8 +5,7 @@ from typing import Any
 
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator.heartbeat import CoordinatorStopping
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.job_run import JobNotes, JobRun
 from islands_service.domain.job import Job, Lease
 
 

@@ -237,7 +237,7 @@ def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
 
 def execute_diagnosis(service: Service) -> str:
     """Execute the diagnosis that is next in the queue in this process; return the id of the job."""
-    from islands_service.coordinator.diagnosis.job import run_diagnosis_job
+    from islands_service.coordinator.diagnosis_job import run_diagnosis_job
     from support.job_runs import make_run
 
     lease = service.store.leases.claim("test", 600.0)

@@ -12,7 +12,7 @@ from joserfc.errors import JoseError
 from joserfc.jwk import JWKRegistry
 
 from islands_api.oidc.bearer_token import IssuerUnavailableError
-from islands_service.outage_log import OutageLog
+from islands_service.logs import OutageLog
 from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
 from islands_service.outbound.checked_client import CheckedClient, read_body
 

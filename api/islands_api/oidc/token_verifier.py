@@ -15,8 +15,7 @@ from islands.errors import SettingsError
 from islands_api.oidc.bearer_token import MAX_TOKEN, ROLES, TokenIdentity, TokenRefusedError, read_header
 from islands_api.oidc.issuer_keys import IssuerKeys
 from islands_service.outbound.checked_client import CheckedClient
-from islands_service.setting_checks import split_list
-from islands_service.settings import ServiceSettings
+from islands_service.settings import ServiceSettings, split_list
 
 #: Algorithms of signatures that may be allowed. All are asymmetric.
 ALGORITHMS = (

@@ -23,8 +23,8 @@ from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.responses import QueuePlaces
 from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
-from islands_service.intake.inspection_limits import count_slots
-from islands_service.outage_log import OutageLog
+from islands_service.intake.file_inspection import count_slots
+from islands_service.logs import OutageLog
 from islands_service.outbound.checked_client import CheckedClient, make_checked_client
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store

@@ -10,7 +10,7 @@ import structlog
 
 from islands_api.web.concurrency import BlockingExecutor
 from islands_service.domain.job import LABELLED, TERMINAL, Event
-from islands_service.outage_log import OutageLog
+from islands_service.logs import OutageLog
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 

@@ -10,9 +10,9 @@ from functools import partial
 
 from islands.errors import IslandsError
 from islands.processes.settings import limit_threads
+from islands_service.coordinator.heartbeat import restart_process
 from islands_service.coordinator.main_loop import Coordinator
 from islands_service.coordinator.metrics import CoordinatorMetrics
-from islands_service.coordinator.process_restart import restart_process
 from islands_service.liveness import (
     FAILED,
     MISCONFIGURED,
@@ -21,9 +21,9 @@ from islands_service.liveness import (
     stop_on_signals,
     watch_supervisor,
 )
-from islands_service.logging_config import configure_logs
+from islands_service.logs import configure_logs
 from islands_service.metrics import serve_metrics
-from islands_service.runtime.errors import ClusterError
+from islands_service.runtime import ClusterError
 from islands_service.settings import service_settings
 from islands_service.store.database import DatabaseDamagedError, StoreError
 

@@ -1,22 +1,25 @@
 """Heartbeat of a lease: renews the lease and reports whether the job may continue."""
 
 import os
+import signal
+import sys
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from math import inf
+from pathlib import Path
 from sys import maxsize
 from threading import Event, Thread
 from time import monotonic, process_time
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import structlog
 
 from islands.errors import IslandsError
 from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError
-from islands_service.liveness import StopRequest
-from islands_service.outage_log import OutageLog
+from islands_service.liveness import STARTING, StopRequest, send_heartbeat
+from islands_service.logs import OutageLog
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 
@@ -47,6 +50,9 @@ HANG_TIMEOUT = 600.0
 #: The same outside the search, if the process uses less than this fraction of a core meanwhile. Reading
 #: before a search and refinement after it take long without a check if the record is long, but they compute.
 IDLE_TIMEOUT, IDLE_SHARE = 3600.0, 0.05
+
+#: Standard input, output and error.
+_STANDARD = (0, 1, 2)
 
 
 class JobCancelled(IslandsError):  # noqa: N818 - control flow, not an error
@@ -272,3 +278,38 @@ class HangGuard:
         """Run the wrapped engine."""
         with self._heartbeat.search():
             yield from self._engine.run(problem, start, stop)
+
+
+def restart_process(lifeline: int | None, *kept: int | None) -> NoReturn:
+    """Start the program of this process again in its place, with the same arguments and environment.
+
+    All threads end at once, whatever they compute, and child processes are killed. Ray notices that the
+    connections of this driver are closed, and ends its tasks and actors. For the supervisor it is the same
+    process.
+
+    Parameters
+    ----------
+    lifeline : int or None
+        Heartbeat pipe of the supervisor, which stays open.
+    *kept : int or None
+        Further file descriptors that stay open.
+    """
+    for child in _find_children():
+        with suppress(ProcessLookupError, ChildProcessError):
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+    for descriptor in [int(each.name) for each in Path("/proc/self/fd").iterdir()]:
+        # Without this, Ray's connections would stay open.
+        if descriptor not in (*_STANDARD, lifeline, *kept):
+            with suppress(OSError):
+                os.set_inheritable(descriptor, False)
+    send_heartbeat(lifeline, STARTING)
+    os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+
+
+def _find_children() -> list[int]:
+    found: list[int] = []
+    for task in Path("/proc/self/task").iterdir():
+        with suppress(OSError):
+            found += map(int, (task / "children").read_text().split())
+    return found

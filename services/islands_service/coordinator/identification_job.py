@@ -37,7 +37,7 @@ from islands.progress import PhasedProgress, ProgressCallback, Stop, StoppedErro
 from islands.records.coupled import couple, split_coupled
 from islands.records.dataset import Dataset
 from islands.records.split import describe_search_extrapolation
-from islands_service.coordinator.checkpoint_blobs import CHECKPOINT_SHARE
+from islands_service.coordinator.checkpoints import CHECKPOINT_SHARE, JobCheckpoints, JobStart
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_outcome import (
     keep_free_runs,
@@ -46,7 +46,6 @@ from islands_service.coordinator.identification_outcome import (
     write_coupled,
     write_recommended,
 )
-from islands_service.coordinator.job_checkpoints import JobCheckpoints, JobStart
 from islands_service.coordinator.job_run import JobRun
 from islands_service.coordinator.search_view import SearchFront, describe_migration
 from islands_service.domain.free_runs import SearchFreeRun
@@ -62,8 +61,8 @@ from islands_service.domain.job import (
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.domain.search_limits import resolve_job_settings
 from islands_service.intake.job_inputs import read_record_and_validation
-from islands_service.outage_log import OutageLog
-from islands_service.runtime.errors import ClusterError
+from islands_service.logs import OutageLog
+from islands_service.runtime import ClusterError
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
 

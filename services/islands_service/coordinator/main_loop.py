@@ -23,11 +23,9 @@ from islands_service.coordinator.job_failures import (
     describe_interruption,
     make_problem_document,
 )
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.coordinator.job_run import RETRY_SECONDS, JobRun
+from islands_service.coordinator.job_run import RETRY_SECONDS, JobNotes, JobRun, Turn, TurnOver
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.coordinator.sweeper import Sweeper
-from islands_service.coordinator.turn import Turn, TurnOver
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -39,8 +37,8 @@ from islands_service.domain.job import (
     LeaseLostError,
 )
 from islands_service.liveness import StopRequest, stop_on_signals
-from islands_service.outage_log import OutageLog
-from islands_service.runtime.errors import ClusterError
+from islands_service.logs import OutageLog
+from islands_service.runtime import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.cached_blobs import open_blobs
@@ -60,7 +58,7 @@ def _run_identification(run: JobRun) -> JobOutcome:
 
 
 def _run_diagnosis(run: JobRun) -> JobOutcome:
-    from islands_service.coordinator.diagnosis.job import run_diagnosis_job  # noqa: PLC0415
+    from islands_service.coordinator.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
 
     return run_diagnosis_job(run)
 

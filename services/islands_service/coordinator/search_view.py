@@ -23,7 +23,7 @@ from islands.models.narx import require_narx
 from islands.records.channel_names import parse_channel_name
 from islands.records.input_lead import advance_all_inputs
 from islands_service.domain.free_runs import SearchFreeRun, simulate_searched
-from islands_service.runtime.errors import ClusterError
+from islands_service.runtime import ClusterError
 
 log = structlog.get_logger()
 

@@ -11,12 +11,23 @@ from typing import TYPE_CHECKING, Any
 from islands.errors import RecordError, SettingsError, suggest
 from islands_service.intake.confined_answer import ask_confined
 from islands_service.intake.confined_process import enter, refuse, send_document
+from islands_service.settings import ServiceSettings
 
 if TYPE_CHECKING:
     from islands.records.inspection.record_note import RecordNote
     from islands.records.reading import Preview
     from islands.records.reading.options import ReadingOptions
     from islands.records.reading.table import Table
+
+
+#: Largest ratio of unpacked to received bytes. Text of measured values has 3 to 30, constant columns more.
+EXPANSION = 100
+
+#: Bytes that every file may unpack to: the unit of the slots of inspections.
+SLOT_BYTES = 64_000_000
+
+#: Least address space of a reader in bytes: its libraries, and 18 for each byte of a text of `SLOT_BYTES`.
+_LEAST_MEMORY = 1_500_000_000
 
 #: Largest number of columns of a record: their descriptions are stored, and shown in every list.
 _MAX_COLUMNS = 1000
@@ -26,6 +37,38 @@ _MAX_NAME = 200
 
 #: Characters of a longer name in a message.
 _SHOWN = 40
+
+
+@dataclass(frozen=True, slots=True)
+class InspectionLimits:
+    """Limits of the inspection of one file.
+
+    Attributes
+    ----------
+    unpacked : int
+        Bytes that the file may unpack to.
+    memory : int
+        Bytes of address space of the process that reads it, which bounds what a reader unpacks.
+    slots : int
+        Part of what all inspections may take at once, in units of `SLOT_BYTES`.
+    """
+
+    unpacked: int
+    memory: int
+    slots: int
+
+
+def find_limits(received: int, settings: ServiceSettings) -> InspectionLimits:
+    """Return the limits of a file by the number of its bytes as they were received."""
+    most = settings.max_unpacked
+    unpacked = min(max(SLOT_BYTES, EXPANSION * received), most)
+    memory = min(_LEAST_MEMORY + settings.inspection_memory * unpacked // most, settings.inspection_memory)
+    return InspectionLimits(unpacked, memory, count_slots(unpacked))
+
+
+def count_slots(size: int) -> int:
+    """Return the number of slots of a file that unpacks to some bytes."""
+    return -(-size // SLOT_BYTES)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset
-from islands_service.intake.confined_file import open_answer
+from islands_service.intake.confined_answer import open_answer
 from islands_service.intake.confined_process import enter, refuse
 
 #: Largest number of bytes of the description of a record.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError, SettingsError, suggest
-from islands_service.intake.confined_file import open_answer
+from islands_service.intake.confined_answer import open_answer
 from islands_service.intake.confined_process import enter, refuse
 
 #: Numbers as they are sent.

@@ -22,8 +22,7 @@ from islands_service.outbound.addresses import (
     is_public,
     resolve,
 )
-from islands_service.setting_checks import split_list
-from islands_service.settings import ServiceSettings
+from islands_service.settings import ServiceSettings, split_list
 
 #: Largest number of characters of a URL.
 MAX_URL = 2000

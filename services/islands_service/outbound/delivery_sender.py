@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import structlog
 
 from islands_service.domain.webhook import DueDelivery
-from islands_service.outage_log import OutageLog
+from islands_service.logs import OutageLog
 from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
 from islands_service.outbound.checked_client import CheckedClient
 from islands_service.store.database import StoreError

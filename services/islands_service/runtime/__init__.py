@@ -6,6 +6,8 @@ Read `ray_engine` first, then `epochs_in_flight`, `actor_pool` and `epoch_schedu
 import os
 import sys
 
+from islands.errors import EngineError
+
 # Send no usage statistics.
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 # A connecting driver does not detect that the cluster requires a token. If Ray is imported already, the mode
@@ -20,3 +22,7 @@ os.environ.setdefault("RAY_DEDUP_LOGS_SKIP_REGEX", ".")
 os.environ.setdefault("RAY_worker_niceness", "0")
 # A frozen process keeps its CPU until Ray kills it, by default after five seconds.
 os.environ.setdefault("RAY_kill_worker_timeout_milliseconds", "500")
+
+
+class ClusterError(EngineError):
+    """No usable Ray cluster. The message says what to do."""

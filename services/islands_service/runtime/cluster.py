@@ -32,7 +32,7 @@ from ray.exceptions import (
 from islands.available_cpus import count_cpus
 from islands.distribution import read_version
 from islands.progress import StoppedError
-from islands_service.runtime.errors import ClusterError
+from islands_service.runtime import ClusterError
 
 #: Bytes of shared memory of a local Ray: it holds the record and the migrants.
 OBJECT_STORE_BYTES = 200_000_000

@@ -9,8 +9,7 @@ from ray.exceptions import RayTaskError
 from islands.evolution.protocol import Caches
 from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOSS_ERRORS
-from islands_service.runtime.epoch_deadline import EpochDeadlines
-from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
+from islands_service.runtime.epoch_scheduler import EpochDeadlines, EpochScheduler, EpochTask
 from islands_service.runtime.packed_epoch import PackedEpoch, sum_caches
 
 #: Seconds to wait for a result between two checks of the stop function.

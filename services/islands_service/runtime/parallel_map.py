@@ -9,8 +9,8 @@ import ray
 from ray.exceptions import RayError, RayTaskError
 
 from islands.parallel import ParallelMap
+from islands_service.runtime import ClusterError
 from islands_service.runtime.cluster import cluster, cluster_cpus, reserved_cpus
-from islands_service.runtime.errors import ClusterError
 
 #: Seconds between two checks.
 _CHECK_SECONDS = 0.1

@@ -9,12 +9,11 @@ from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.protocol import SearchProblem
 from islands.expressions.tree import Primitive
 from islands.progress import ProgressCallback, Stop, ignore_progress
+from islands_service.runtime import ClusterError
 from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement
 from islands_service.runtime.cluster import cluster_cpus
-from islands_service.runtime.epoch_deadline import EpochDeadlines
-from islands_service.runtime.epoch_scheduler import EpochScheduler, schedule_islands
+from islands_service.runtime.epoch_scheduler import EpochDeadlines, EpochScheduler, schedule_islands
 from islands_service.runtime.epochs_in_flight import EpochsInFlight
-from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
 from islands_service.runtime.regions import count_regions, run_regions
 

@@ -5,26 +5,45 @@ few hundred islands has a separate coordinator, a `RegionActor`. The driver pass
 borders of regions on, and merges the statistics. The result does not depend on the number of regions.
 """
 
-from collections.abc import Callable, Generator, Iterator
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import islice, pairwise
 from time import monotonic
+from typing import Any
 
 import ray
 from ray.actor import ActorHandle
 from ray.exceptions import RayError, RayTaskError
 
+from islands.distribution import read_version
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, make_topology
 from islands.evolution.epoch import next_stop
-from islands.evolution.protocol import SearchProblem
+from islands.evolution.individual import AnyIndividual
+from islands.evolution.island import Island, StepInfo
+from islands.evolution.protocol import Caches, SearchProblem
 from islands.progress import ProgressCallback
-from islands_service.runtime.actor_pool import ignore_placement, put_problem
+from islands_service.runtime import ClusterError
+from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement, put_problem
 from islands_service.runtime.cluster import LOSS_ERRORS, check_version
-from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, begin_epoch
-from islands_service.runtime.errors import ClusterError
-from islands_service.runtime.packed_epoch import pack_epoch, sum_caches
-from islands_service.runtime.region_actor import RegionActor, RegionReport
-from islands_service.runtime.region_islands import RegionIslands
+from islands_service.runtime.epoch_scheduler import (
+    MAX_EPOCHS_AHEAD,
+    EpochDeadlines,
+    EpochScheduler,
+    begin_epoch,
+)
+from islands_service.runtime.epochs_in_flight import EpochsInFlight
+from islands_service.runtime.packed_epoch import (
+    LazyIslands,
+    PackedEpoch,
+    PackedIslands,
+    pack_best,
+    pack_epoch,
+    sum_caches,
+    unpack_individuals,
+)
 
 #: Islands for which one coordinator is sufficient at epochs of a second.
 REGION_SIZE = 500
@@ -40,6 +59,250 @@ _POLL_SECONDS = 0.1
 
 #: Losses of a region, without a completed epoch between them, after which the search fails.
 _MAX_LOSSES = 5
+
+
+def _render(
+    problem: SearchProblem, state: tuple[PackedEpoch, ...], function: Callable[[Island], bytes]
+) -> list[bytes]:
+    return [*map(function, PackedIslands(state, problem.settings.primitive_table))]
+
+
+def _pack_best(problem: SearchProblem, state: tuple[PackedEpoch, ...]) -> bytes:
+    return pack_best(state, problem.settings.primitive_table)
+
+
+#: Ray prefers the machine that has the islands. Its CPUs are busy with islands, so that no CPU is requested.
+_TASK = ray.remote(num_cpus=0, max_retries=3)(_render)
+
+
+_BEST_TASK = ray.remote(num_cpus=0, max_retries=3)(_pack_best)
+
+
+class RegionIslands(LazyIslands):
+    """Islands of all regions. A region is fetched at the first access to one of its islands.
+
+    Parameters
+    ----------
+    starts : sequence of int
+        First island of every region.
+    size : int
+        Number of islands.
+    states : sequence of references to tuples of PackedEpoch
+        Islands of every region.
+    problem : SearchProblem
+    shared : reference to SearchProblem
+        The problem in the object store.
+
+    Raises
+    ------
+    ClusterError
+        Later, at an access: the islands of a region were lost with their machine.
+    """
+
+    def __init__(
+        self,
+        starts: Sequence[int],
+        size: int,
+        states: Sequence["ray.ObjectRef"],
+        problem: SearchProblem,
+        shared: "ray.ObjectRef[SearchProblem]",
+    ) -> None:
+        super().__init__(size)
+        self._starts, self._states = starts, states
+        self._primitives, self._shared = problem.settings.primitive_table, shared
+        self._regions: dict[int, PackedIslands] = {}
+
+    def fetch(self) -> None:
+        """Fetch all regions: later the cluster may not exist any more."""
+        for region in range(len(self._starts)):
+            self._get_region(region)
+
+    def render(self, function: Callable[[Island], bytes]) -> Iterator[bytes]:
+        """Yield the bytes that a function returns for each island; see `Archipelago.render`.
+
+        A region that was not fetched is rendered by a task of Ray, and all of them at the same time.
+
+        Raises
+        ------
+        ClusterError
+            The islands of a region were lost with their machine.
+        """
+        tasks = {
+            region: _TASK.remote(self._shared, state, function)
+            for region, state in enumerate(self._states)
+            if region not in self._regions
+        }
+        try:
+            for region in range(len(self._states)):
+                if region in tasks:
+                    yield from _get(tasks[region])
+                    del tasks[region]
+                else:
+                    yield from map(function, self._regions[region])
+        finally:
+            for reference in tasks.values():
+                ray.cancel(reference, force=True)
+
+    def find_best(self) -> Iterator[AnyIndividual]:
+        """Yield the best individual of every size of every region.
+
+        Tasks of Ray find them, all at the same time.
+
+        Raises
+        ------
+        ClusterError
+            The islands of a region were lost with their machine.
+        """
+        tasks = [_BEST_TASK.remote(self._shared, state) for state in self._states]
+        try:
+            for task in tasks:
+                yield from unpack_individuals(_get(task), self._primitives)
+        finally:
+            for task in tasks:
+                ray.cancel(task, force=True)
+
+    def _read(self, place: int) -> Island:
+        region = bisect_right(self._starts, place) - 1
+        return self._get_region(region)[place - self._starts[region]]
+
+    def _get_region(self, region: int) -> PackedIslands:
+        if region not in self._regions:
+            self._regions[region] = PackedIslands(_get(self._states[region]), self._primitives)
+        return self._regions[region]
+
+
+def _get(reference: "ray.ObjectRef") -> Any:
+    """Return a value of the object store."""
+    try:
+        return ray.get(reference)
+    except RayError as error:
+        if isinstance(error, RayTaskError) and not isinstance(error.cause, RayError):
+            raise error.cause from error
+        raise ClusterError(f"islands were lost, and the search cannot continue: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class RegionStatus:
+    """Answer of a region to a check.
+
+    Attributes
+    ----------
+    version : str
+        Version of islands on its machine.
+    messages : tuple of str
+        Messages for the user since the last check.
+    placed, waiting : int
+        Number of islands with and without a separate CPU.
+    """
+
+    version: str
+    messages: tuple[str, ...] = ()
+    placed: int = 0
+    waiting: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RegionReport:
+    """Result of an epoch of all islands of a region, without the islands.
+
+    Attributes
+    ----------
+    steps : tuple of tuple of StepInfo
+        For every island of the region, one entry per generation of the epoch.
+    emigrants : mapping
+        Packed emigrants of the islands from which other regions receive, by island.
+    caches : mapping
+        Memory of the caches of all actors of the region.
+    """
+
+    steps: tuple[tuple[StepInfo, ...], ...]
+    emigrants: Mapping[int, bytes]
+    caches: Caches = field(default_factory=dict)
+
+
+class RegionActor:
+    """Runs the islands of a region, one epoch of all of them per call.
+
+    Islands without sources in other regions may be ahead of the epoch, as in `EpochScheduler`.
+
+    Parameters
+    ----------
+    problem : SearchProblem
+    sources : sequence of sequences of int
+        For every island of the search, the islands that it receives from.
+    border : frozenset of int
+        Islands of the region from which other regions receive.
+    generation : int
+        Generation of ``state``.
+    state : tuple of PackedEpoch
+        The islands of the region.
+    share : float
+        Fraction of the CPUs of the cluster for this region.
+    autoscaling : bool
+        See `IslandActorPool`.
+    """
+
+    def __init__(
+        self,
+        problem: SearchProblem,
+        sources: Sequence[Sequence[int]],
+        border: frozenset[int],
+        generation: int,
+        state: tuple[PackedEpoch, ...],
+        share: float,
+        autoscaling: bool,
+    ) -> None:
+        self._border = border
+        self._messages: deque[str] = deque()
+        self._placement = 0, len(state)
+        start = {report.index: report for report in state}
+        self._scheduler = EpochScheduler(problem.settings, sources, generation, start)
+        self._pool = IslandActorPool(
+            problem,
+            len(state),
+            self._store_message,
+            autoscaling=autoscaling,
+            observe=self._store_placement,
+            share=share,
+        )
+        self._deadlines = EpochDeadlines(len(state), problem.settings.population)
+        self._in_flight = EpochsInFlight(self._scheduler, self._pool, self._deadlines)
+
+    def _store_message(self, message: str, _fraction: float | None = None, /) -> None:
+        self._messages.append(message)
+
+    def _store_placement(self, placed: int, waiting: int) -> None:
+        self._placement = placed, waiting
+
+    @ray.method(concurrency_group="watch")
+    def check(self) -> RegionStatus:
+        """Return the status since the last call."""
+        messages = tuple(self._messages.popleft() for _ in range(len(self._messages)))
+        return RegionStatus(read_version(), messages, *self._placement)
+
+    @ray.method(num_returns=2)
+    def advance(self, *arriving: Mapping[int, bytes]) -> tuple[RegionReport, tuple[PackedEpoch, ...]]:
+        """Run all islands to the next stop; return the report and the islands.
+
+        Parameters
+        ----------
+        *arriving : mapping
+            Packed emigrants of islands of other regions at the last stop, by island.
+        """
+        for emigrants in arriving:
+            for island, packed in emigrants.items():
+                self._in_flight.receive(island, self._scheduler.completed_generation, packed)
+        while (reports := next(self._scheduler.completed_epochs(), None)) is None:
+            if self._pool.maintain():
+                self._in_flight.submit()
+            self._in_flight.wait()
+        self._pool.reset_losses()
+        self._deadlines.reset()
+        self._in_flight.drop_old_references()
+        leaving = {each.index: each.emigrants for each in reports if each.index in self._border}
+        steps = tuple(each.steps for each in reports)
+        return RegionReport(steps, leaving, self._in_flight.memory), reports
+
 
 _ACTOR = ray.remote(max_restarts=0, max_task_retries=0, num_cpus=0, concurrency_groups={"watch": 1})(
     RegionActor

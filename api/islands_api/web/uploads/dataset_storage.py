@@ -10,9 +10,13 @@ from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
 from islands_api.web.uploads.uploaded_file import find_stored_suffix, receive
 from islands_service.domain.uploaded_fmu import FMU_SUFFIX
-from islands_service.intake.file_inspection import InspectionRequest, inspect_file
+from islands_service.intake.file_inspection import (
+    InspectionLimits,
+    InspectionRequest,
+    find_limits,
+    inspect_file,
+)
 from islands_service.intake.fmu_inspection import inspect_fmu
-from islands_service.intake.inspection_limits import InspectionLimits, find_limits
 from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
 

@@ -17,8 +17,7 @@ from islands_api.web.problems import PayloadTooLargeError
 from islands_service.domain.job import QuotaError
 from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
 from islands_service.outbound.checked_client import MAX_URL, is_listed
-from islands_service.setting_checks import split_list
-from islands_service.settings import ServiceSettings
+from islands_service.settings import ServiceSettings, split_list
 from islands_service.store.blobs import translate_disk_full
 from islands_service.store.object_store import ObjectNotFoundError, ObjectStore
 

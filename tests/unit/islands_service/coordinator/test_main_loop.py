@@ -22,7 +22,7 @@ from islands_service.domain.job import (
     Submission,
 )
 from islands_service.liveness import StopRequest
-from islands_service.runtime.errors import ClusterError
+from islands_service.runtime import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

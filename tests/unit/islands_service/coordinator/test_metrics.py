@@ -12,8 +12,7 @@ from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.coordinator.heartbeat import Heartbeat
-from islands_service.coordinator.job_notes import JobNotes
-from islands_service.coordinator.job_run import JobRun
+from islands_service.coordinator.job_run import JobNotes, JobRun
 from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest

@@ -27,7 +27,7 @@ from islands_service.coordinator.search_view import (
     describe_migration,
 )
 from islands_service.domain.free_runs import SEARCH_POINTS
-from islands_service.runtime.errors import ClusterError
+from islands_service.runtime import ClusterError
 
 RECORD = Dataset(u=np.zeros((99, 1)), y=np.zeros(99), dt=0.1, input_names=("u_V",), output_name="y_um")
 PROBLEM = Problem(RECORD, Settings())

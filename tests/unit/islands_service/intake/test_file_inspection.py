@@ -14,12 +14,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from islands.errors import RecordError
 from islands_service.intake import confined_answer
 from islands_service.intake.confined_process import ENVIRONMENT
-from islands_service.intake.file_inspection import InspectionRequest, describe_file, inspect_file
+from islands_service.intake.file_inspection import (
+    SLOT_BYTES,
+    InspectionRequest,
+    count_slots,
+    describe_file,
+    find_limits,
+    inspect_file,
+)
 from islands_service.intake.record_reading import RecordRequest, read_confined
+from islands_service.settings import ServiceSettings
 from support.odd_files import write_workbook
 from support.parsed_files import list_parsed
 from support.processes import alive, descendants, eventually
@@ -42,6 +52,7 @@ for path in sys.argv[1:]:
     except OSError as error:
         print(error.errno)
 """
+SETTINGS = ServiceSettings()
 
 
 def inspect(path, asked=None, memory=MEMORY, seconds=SECONDS):
@@ -279,3 +290,25 @@ def test_a_file_without_a_record_has_no_facts(tmp_path):
     found = inspect(tmp_path / "one.npz")["inspection"]
     assert found["facts"] == []
     assert found["choice"]["reason"].startswith("Only y is a signal")
+
+
+def test_a_file_of_two_megabytes_unpacks_to_two_hundred():
+    """A gigabyte, the most that any file may have, would take its reader a minute."""
+    limits = find_limits(2_000_000, SETTINGS)
+    assert limits.unpacked == 200_000_000
+    assert limits.memory < 3_000_000_000
+    assert limits.slots == 4
+
+
+def test_a_small_file_takes_one_slot_and_may_unpack_to_all_of_it():
+    assert find_limits(0, SETTINGS) == find_limits(640_000, SETTINGS)
+    assert (find_limits(0, SETTINGS).unpacked, find_limits(0, SETTINGS).slots) == (SLOT_BYTES, 1)
+
+
+@given(st.integers(0, 10**10), st.integers(1, 10**10), st.integers(1, 10**11))
+def test_no_file_exceeds_the_settings_and_a_larger_one_has_no_less(received, most, memory):
+    settings = SETTINGS.model_copy(update={"max_unpacked": most, "inspection_memory": memory})
+    small, large = find_limits(received, settings), find_limits(2 * received, settings)
+    assert small.unpacked <= large.unpacked <= most
+    assert small.memory <= large.memory <= memory
+    assert 1 <= small.slots <= large.slots <= count_slots(most)

@@ -11,7 +11,7 @@ import pytest
 from islands.errors import RecordError
 from islands.records.reading import read_dataset
 from islands.records.reading.options import ReadingOptions
-from islands_service.intake import confined_file
+from islands_service.intake import confined_answer
 from islands_service.intake.record_reading import (
     RecordRequest,
     read_confined,
@@ -107,13 +107,13 @@ def test_an_answer_that_is_not_a_record_is_refused(answer):
 def test_a_process_that_fails_is_a_clear_error(tmp_path, monkeypatch, programs, program, words):
     path = tmp_path / "a.csv"
     path.touch()
-    monkeypatch.setattr(confined_file, "FORK_SERVER", programs(program))
+    monkeypatch.setattr(confined_answer, "FORK_SERVER", programs(program))
     with pytest.raises(RecordError, match=words):
         read_confined(path, RecordRequest(["u"], "y", None, None, {}), MEMORY, 1.0)
 
 
 @pytest.mark.ci
 def test_a_killed_process_is_reported_as_a_lack_of_memory(tmp_path, monkeypatch, programs):
-    monkeypatch.setattr(confined_file, "FORK_SERVER", programs("import os; os.kill(os.getpid(), 9)"))
+    monkeypatch.setattr(confined_answer, "FORK_SERVER", programs("import os; os.kill(os.getpid(), 9)"))
     with pytest.raises(MemoryError, match="was killed"):
         read_confined(Path(tmp_path), RecordRequest(["u"], "y", None, None, {}), MEMORY, 5.0)

@@ -13,11 +13,11 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, SerialEngine
 from islands.evolution.island import Island
 from islands_service.coordinator import identification_job as work
+from islands_service.coordinator.checkpoints import SEARCH_RESTARTED, JobCheckpoints
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.coordinator.job_checkpoints import RESTARTED, JobCheckpoints
 from islands_service.coordinator.job_failures import JobDeclinedError
 from islands_service.domain.job import ISLANDS_VERSION, Job, Lease, LeaseLostError, ProgressReport
-from islands_service.runtime.errors import ClusterError
+from islands_service.runtime import ClusterError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import CommitUnknownError, StoreUnavailableError
@@ -85,8 +85,8 @@ def test_job_without_its_checkpoint_starts_again_with_the_same_result(
     ended = store.jobs.get(ALICE, job.id)
     assert ended.progress is not None
     assert outcome.summary is not None
-    assert ended.progress["note"] == outcome.summary["note"] == RESTARTED
-    assert outcome.summary["words"].endswith(f"Note: {RESTARTED}.")
+    assert ended.progress["note"] == outcome.summary["note"] == SEARCH_RESTARTED
+    assert outcome.summary["words"].endswith(f"Note: {SEARCH_RESTARTED}.")
 
 
 @pytest.mark.ci

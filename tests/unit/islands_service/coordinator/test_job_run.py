@@ -2,8 +2,9 @@
 
 import pytest
 
-from islands_service.coordinator import job_notes
-from islands_service.coordinator.job_notes import JobNotes
+from islands_service.coordinator import job_run
+from islands_service.coordinator import job_run as turn_module
+from islands_service.coordinator.job_run import JobNotes, Turn, TurnOver
 from islands_service.domain.job import ProgressReport
 from islands_service.runtime import actor_pool
 from islands_service.runtime.actor_pool import IslandActorPool
@@ -43,8 +44,8 @@ def test_running_search_keeps_its_figures_and_the_message_for_a_while(store, lea
     notes.add(LOST)
     assert progress_of(store, lease) == {**figures, "note": LOST}
     assert notes.complete({"generation": 8}) == {"generation": 8, "note": LOST}
-    shown_until = job_notes.monotonic() + job_notes.SHOWN_SECONDS
-    monkeypatch.setattr(job_notes, "monotonic", lambda: shown_until + 1.0)
+    shown_until = job_run.monotonic() + job_run.SHOWN_SECONDS
+    monkeypatch.setattr(job_run, "monotonic", lambda: shown_until + 1.0)
     assert notes.complete({"generation": 9}) == {"generation": 9}
 
 
@@ -57,7 +58,7 @@ def test_a_change_between_two_reports_keeps_the_fraction_and_no_old_time_left(st
 
 def test_message_about_waiting_is_repeated_while_the_progress_shows_it(monkeypatch):
     """Otherwise the owner would no longer see it after a minute."""
-    assert actor_pool.WAITING_NOTICE_EVERY < job_notes.SHOWN_SECONDS
+    assert actor_pool.WAITING_NOTICE_EVERY < job_run.SHOWN_SECONDS
     said = []
     monkeypatch.setattr(actor_pool, "put_problem", lambda problem: problem)
     pool = IslandActorPool(None, 2, said.append)
@@ -66,4 +67,19 @@ def test_message_about_waiting_is_repeated_while_the_progress_shows_it(monkeypat
     for seconds in range(100):
         pool._report_waiting(begin + seconds)
     assert said == [WAITING] * 4
-    assert said[0].startswith(job_notes.WAITING)
+    assert said[0].startswith(job_run.WAITING)
+
+
+def test_a_turn_begins_with_a_checkpoint_and_ends_if_others_wait(monkeypatch):
+    """The start of a job takes a minute on a busy machine, and is repeated in each turn."""
+    clock, waiting = [0.0], []
+    monkeypatch.setattr(turn_module, "monotonic", lambda: clock[0])
+    turn = Turn(30.0, lambda: bool(waiting))
+    for clock[0] in (90.0, 95.0, 119.0, 125.0, 500.0):
+        turn.end_if_over()
+    waiting.append("other")
+    with pytest.raises(TurnOver, match="another owner waits"):
+        turn.end_if_over()
+    later = Turn(30.0, lambda: bool(waiting))
+    for clock[0] in (600.0, 610.0, 630.0):
+        later.end_if_over()

@@ -1,15 +1,46 @@
-"""Log of an outage: a line at its begin, one each minute, and one at its end."""
+"""Logs of the processes: their format, and one line for the beginning and the end of an outage."""
 
+import logging
+import sys
 from collections.abc import Callable
 from logging import WARNING
 from time import monotonic
 
 import structlog
+from structlog.typing import Processor
 
 log = structlog.get_logger()
 
 #: Least number of seconds between two lines about failures.
 EVERY = 60.0
+
+
+def configure_logs(form: str, role: str) -> None:
+    """Log as ``text`` or ``json`` and add the role to every line; warnings of libraries likewise."""
+    shared: list[Processor] = [
+        structlog.contextvars.merge_contextvars,
+        structlog.processors.add_log_level,
+        structlog.processors.TimeStamper(fmt="iso", utc=True),
+        structlog.processors.format_exc_info,
+    ]
+    renderer: Processor = (
+        structlog.processors.JSONRenderer()
+        if form == "json"
+        else structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty())
+    )
+    structlog.configure(
+        processors=[*shared, renderer],
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        cache_logger_on_first_use=True,
+    )
+    handler = logging.StreamHandler(sys.stderr)
+    remove_meta = structlog.stdlib.ProcessorFormatter.remove_processors_meta
+    handler.setFormatter(
+        structlog.stdlib.ProcessorFormatter(foreign_pre_chain=shared, processors=[remove_meta, renderer])
+    )
+    logging.basicConfig(handlers=[handler], level=logging.WARNING, force=True)
+    structlog.contextvars.bind_contextvars(role=role)
 
 
 class OutageLog:

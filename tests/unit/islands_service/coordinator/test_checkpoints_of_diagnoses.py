@@ -20,11 +20,10 @@ from islands.evolution import engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.search_state import SearchState
 from islands.facade import explain_residual
-from islands_service.coordinator.diagnosis import job as diagnosis_job
-from islands_service.coordinator.diagnosis import progress as diagnosis_progress
-from islands_service.coordinator.diagnosis.checkpoints import (
+from islands_service.coordinator import diagnosis_job
+from islands_service.coordinator.checkpoints import (
+    DIAGNOSIS_RESTARTED,
     DIFFERENT,
-    RESTARTED,
     DiagnosisCheckpoints,
     DiagnosisState,
 )
@@ -92,8 +91,8 @@ def cheap_analysis() -> Iterator[None]:
         patch.setattr(noise_floor, "SURROGATES", 1)
         patch.setattr(explain_residual, "SEARCH", MappingProxyType({**explain_residual.SEARCH, **SEARCH}))
         patch.setattr(diagnosis_job, "diagnose", partial(diagnosis_job.diagnose, catalogue=EFFECTS))
-        patch.setattr(diagnosis_progress, "REPORT_EVERY", -1.0)
-        patch.setattr(diagnosis_progress, "CHECKPOINT_SHARE", 1e9)
+        patch.setattr(diagnosis_job, "REPORT_EVERY", -1.0)
+        patch.setattr(diagnosis_job, "CHECKPOINT_SHARE", 1e9)
         yield
 
 
@@ -194,7 +193,7 @@ def test_harmed_checkpoint_costs_only_time(
 
     truncate(interrupt(store, blobs, Work(fits=20)))
     path = interrupt(store, blobs, again)
-    assert (again.fits, read_note()) == (12, RESTARTED)
+    assert (again.fits, read_note()) == (12, DIAGNOSIS_RESTARTED)
     swap_fits(path)
     outcome = run(claim(store), store, blobs, last)
     assert outcome.summary is not None
@@ -223,7 +222,7 @@ def stored(store: Store, blobs: Blobs, content: bytes | None) -> DiagnosisCheckp
 def test_unreadable_checkpoint_is_lost(store: Store, blobs: Blobs, content: bytes | None) -> None:
     submitted(store)
     packed = content and gzip.compress(content)
-    assert stored(store, blobs, packed).read().note == RESTARTED
+    assert stored(store, blobs, packed).read().note == DIAGNOSIS_RESTARTED
 
 
 def test_checkpoint_of_another_job_is_lost(store: Store, blobs: Blobs) -> None:
@@ -234,7 +233,7 @@ def test_checkpoint_of_another_job_is_lost(store: Store, blobs: Blobs) -> None:
     read = stored(store, blobs, blobs.read(own)).read()
     assert (read.note, read.spent) == ("", 7.0)
     submitted(store)
-    assert stored(store, blobs, blobs.read(own)).read().note == RESTARTED
+    assert stored(store, blobs, blobs.read(own)).read().note == DIAGNOSIS_RESTARTED
 
 
 def test_checkpoint_of_a_newer_version_is_left_to_its_coordinators(store: Store, blobs: Blobs) -> None:

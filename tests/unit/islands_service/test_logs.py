@@ -3,7 +3,7 @@
 import pytest
 import structlog
 
-from islands_service.outage_log import OutageLog
+from islands_service.logs import OutageLog
 
 
 class Clock:

@@ -1,1 +1,0 @@
-"""Discrepancy jobs: diagnosis of a simulation, its progress and its checkpoints."""
