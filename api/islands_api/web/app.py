@@ -21,7 +21,7 @@ from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.outbound.delivery_sender import DeliverySender
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.tracing import Traces
+from islands_service.telemetry import Traces
 
 #: Least number of seconds between two complete checks of the database.
 CHECK_SECONDS = 60.0

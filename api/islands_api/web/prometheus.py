@@ -10,8 +10,8 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from islands_service.domain.job import JobState
-from islands_service.metrics import make_commit_histogram, make_object_observer, make_registry
 from islands_service.store import Store
+from islands_service.telemetry import make_commit_histogram, make_object_observer, make_registry
 
 #: Largest number of owners with metrics of their jobs: each is a time series.
 MAX_OWNERS = 50

@@ -22,10 +22,10 @@ from islands_service.liveness import (
     watch_supervisor,
 )
 from islands_service.logs import configure_logs
-from islands_service.metrics import serve_metrics
 from islands_service.runtime import ClusterError
 from islands_service.settings import service_settings
 from islands_service.store.database import DatabaseDamagedError, StoreError
+from islands_service.telemetry import serve_metrics
 
 
 def main() -> int:

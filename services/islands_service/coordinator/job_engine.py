@@ -13,9 +13,8 @@ from islands.facade.identification_progress import estimate_state_space_seconds
 from islands.persistence.models import NARX
 from islands.progress import ProgressCallback, Stop
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, Job, Lease
-from islands_service.domain.job_memory import estimate_memory, machine_memory
 from islands_service.domain.job_spec import parse_identification
-from islands_service.domain.search_limits import resolve_job_settings
+from islands_service.domain.search_limits import estimate_memory, machine_memory, resolve_job_settings
 
 log = structlog.get_logger()
 

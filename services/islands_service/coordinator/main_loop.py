@@ -44,7 +44,7 @@ from islands_service.store import Store
 from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import StoreError
 from islands_service.store.object_store import ObjectStoreError
-from islands_service.tracing import Traces
+from islands_service.telemetry import Traces
 
 #: Runs a job of one kind and returns its outcome.
 JobRunner: TypeAlias = Callable[[JobRun], JobOutcome]

@@ -7,7 +7,7 @@ from time import monotonic
 from prometheus_client import Counter, Gauge, Histogram, Metric
 from prometheus_client.registry import Collector
 
-from islands_service.metrics import (
+from islands_service.telemetry import (
     WRITE_BUCKETS,
     make_commit_histogram,
     make_object_observer,

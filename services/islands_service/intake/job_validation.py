@@ -19,9 +19,15 @@ from islands.records.reading.column_names import find_column
 from islands.records.reading.row_range import overlap, parse_rows
 from islands.records.reading.validation import check_choice
 from islands.simulators.specification.table import SIMULATORS, ModelSpec, PhysicalSpec, innermost
-from islands_service.domain.job_memory import DEFAULT_SHARE, estimate_memory, machine_memory
 from islands_service.domain.job_spec import Discrepancy, Identification, Part, SimulatedRecord
-from islands_service.domain.search_limits import LIMITS, MAX_SHIFT, resolve_job_settings
+from islands_service.domain.search_limits import (
+    DEFAULT_SHARE,
+    LIMITS,
+    MAX_SHIFT,
+    estimate_memory,
+    machine_memory,
+    resolve_job_settings,
+)
 from islands_service.intake.file_inspection import InspectionRequest
 from islands_service.intake.job_fmu import check_allowed, check_fmu
 from islands_service.settings import ServiceSettings

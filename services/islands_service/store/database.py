@@ -23,7 +23,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from islands.errors import IslandsError
 from islands_service.store import dialect
-from islands_service.store.connections import make_engine
+from islands_service.store.dialect import make_engine
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from islands_service.coordinator import job_engine
 from islands_service.coordinator.job_engine import JobEngine, estimate_seconds, expects_cluster
 from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import DISCREPANCY, MONITORING, Lease
-from islands_service.domain.job_memory import ACTOR_BYTES, COORDINATOR_BYTES, JobMemoryError
+from islands_service.domain.search_limits import ACTOR_BYTES, COORDINATOR_BYTES, JobMemoryError
 from islands_service.runtime import cluster
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store

@@ -12,7 +12,7 @@ import pytest
 from sqlalchemy import delete, event, false, insert, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError
 
-from islands_service.store import Store, connections
+from islands_service.store import Store, dialect
 from islands_service.store.database import (
     CommitUnknownError,
     Database,
@@ -123,7 +123,7 @@ def test_connection_lost_during_the_commit_means_unknown_outcome(postgresql):
 
 def test_locked_file_raises_an_error_after_the_timeout(sqlite, tmp_path, monkeypatch):
     sqlite.write(executing("SELECT 1"))
-    monkeypatch.setattr(connections, "PRAGMAS", ("busy_timeout=200",))
+    monkeypatch.setattr(dialect, "PRAGMAS", ("busy_timeout=200",))
     hasty = Database(sqlite.url)
     with closing(sqlite3.connect(tmp_path / "islands.db", isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")
@@ -140,7 +140,7 @@ def test_locked_file_raises_an_error_after_the_timeout(sqlite, tmp_path, monkeyp
 
 def test_locked_new_file_raises_an_error_after_the_timeout(tmp_path, monkeypatch):
     """SQLite itself does not wait when the file is switched to write-ahead logging."""
-    monkeypatch.setattr(connections, "BUSY_TIMEOUT", 0.4)
+    monkeypatch.setattr(dialect, "BUSY_TIMEOUT", 0.4)
     database = Database(f"sqlite:///{tmp_path / 'islands.db'}")
     with closing(sqlite3.connect(tmp_path / "islands.db", isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")
@@ -176,13 +176,13 @@ def test_sqlite_connections_are_durable_and_enforce_foreign_keys(sqlite):
 
     names = ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
     found = at_once([lambda: [asked(name) for name in names]] * 8)
-    assert found == [["wal", 2, 1, 1000 * connections.BUSY_TIMEOUT]] * 8
+    assert found == [["wal", 2, 1, 1000 * dialect.BUSY_TIMEOUT]] * 8
 
 
 @pytest.mark.ci
 def test_server_that_never_answers_raises_an_error_after_a_timeout(monkeypatch):
     """For example a stopped server, or one behind a firewall."""
-    monkeypatch.setitem(connections.LIBPQ_OPTIONS, "connect_timeout", 2)
+    monkeypatch.setitem(dialect.LIBPQ_OPTIONS, "connect_timeout", 2)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         database = Database(f"postgresql+psycopg://user@127.0.0.1:{silent.getsockname()[1]}/none")
         began = time.monotonic()

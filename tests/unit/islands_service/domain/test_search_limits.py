@@ -3,13 +3,13 @@
 import pytest
 
 from islands.errors import SettingsError
-from islands_service.domain.job_memory import (
+from islands_service.domain.job_spec import Identification
+from islands_service.domain.search_limits import (
     ACTOR_BYTES,
     COORDINATOR_BYTES,
     JobMemory,
     JobMemoryError,
 )
-from islands_service.domain.job_spec import Identification
 from islands_service.intake import job_validation
 from islands_service.settings import ServiceSettings
 from support.service import spec
