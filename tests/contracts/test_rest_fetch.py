@@ -13,7 +13,7 @@ import trustme
 
 from islands.errors import SettingsError
 from islands_api.client import Client
-from islands_api.web.uploads import remote_file
+from islands_api.web import uploads
 from islands_service.outbound import checked_client
 from islands_service.outbound.checked_client import CheckedClient
 from islands_service.settings import service_settings
@@ -144,7 +144,7 @@ def test_a_record_is_downloaded_checked_and_stored_with_its_source(service: Serv
 @pytest.mark.ci
 def test_an_object_of_a_listed_bucket_is_copied(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     with s3_server(monkeypatch) as endpoint:
-        remote_file._open_bucket.cache_clear()
+        uploads._open_bucket.cache_clear()
         client = make_bucket(endpoint, "measured")
         for key, content in (("lab/a.csv", csv(320)), ("lab/big.csv", bytes(100_001)), ("b.csv", csv())):
             client.put_object(Bucket="measured", Key=key, Body=content)
@@ -155,7 +155,7 @@ def test_an_object_of_a_listed_bucket_is_copied(service: Service, monkeypatch: p
         assert "ISLANDS_DATASET_BUCKETS" in problem_of(
             fetch(service, "s3://measured/b.csv"), 422, "invalid-settings"
         )
-    remote_file._open_bucket.cache_clear()
+    uploads._open_bucket.cache_clear()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 import islands
 from islands_api.client import Client
-from islands_api.client.errors import ServiceError
+from islands_api.client.responses import ServiceError
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import REPORT, JobState

@@ -22,8 +22,7 @@ from fastapi import FastAPI
 from sqlalchemy import Connection
 
 from islands.records.writer import write_record
-from islands_api.server.asgi import HTTPServer, make_server_config
-from islands_api.server.listener import open_listener
+from islands_api.server import HTTPServer, make_server_config, open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import Job, Submission

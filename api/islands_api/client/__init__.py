@@ -2,8 +2,7 @@
 
 from islands_api.client.asynchronous import AsyncClient
 from islands_api.client.calls import JobRef
-from islands_api.client.errors import JobFailedError, ServiceError, ServiceUnreachableError
-from islands_api.client.response_parsing import Event
+from islands_api.client.responses import Event, JobFailedError, ServiceError, ServiceUnreachableError
 from islands_api.client.synchronous import Client
 
 __all__ = [

@@ -8,18 +8,9 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, get_args, over
 
 import httpx
 
-from islands_api.client import (
-    admin_calls,
-    calls,
-    dataset_calls,
-    diagnosis_calls,
-    fmu_calls,
-    monitor_calls,
-    simulation_calls,
-    webhook_calls,
-)
+from islands_api.client import calls, diagnosis_calls, monitor_calls, upload_calls
 from islands_api.client.calls import RequestSpec, T
-from islands_api.client.errors import JobFailedError
+from islands_api.client.responses import JobFailedError
 from islands_api.client.transport import (
     ANSWER_TIMEOUT,
     check_url,
@@ -81,10 +72,10 @@ class BaseClient(Generic[H]):
     The parameters are described in `islands_api.client.synchronous.Client`.
     """
 
-    upload = Endpoint(dataset_calls.upload)
-    fetch = Endpoint(dataset_calls.fetch)
-    samples = Endpoint(dataset_calls.samples)
-    read_again = Endpoint(dataset_calls.read_again)
+    upload = Endpoint(upload_calls.upload)
+    fetch = Endpoint(upload_calls.fetch)
+    samples = Endpoint(upload_calls.samples)
+    read_again = Endpoint(upload_calls.read_again)
     presets = Endpoint(calls.presets)
     submit = Endpoint(calls.submit)
     diagnose = Endpoint(diagnosis_calls.diagnose)
@@ -92,10 +83,10 @@ class BaseClient(Generic[H]):
     check_equations = Endpoint(diagnosis_calls.check_equations)
     preview = Endpoint(diagnosis_calls.preview)
     outputs = Endpoint(diagnosis_calls.outputs)
-    upload_fmu = Endpoint(fmu_calls.upload_fmu)
-    fmus = Endpoint(fmu_calls.fmus)
-    describe_fmu = Endpoint(fmu_calls.describe_fmu)
-    delete_fmu = Endpoint(fmu_calls.delete_fmu)
+    upload_fmu = Endpoint(upload_calls.upload_fmu)
+    fmus = Endpoint(upload_calls.fmus)
+    describe_fmu = Endpoint(upload_calls.describe_fmu)
+    delete_fmu = Endpoint(upload_calls.delete_fmu)
     next_experiment = Endpoint(diagnosis_calls.next_experiment)
     job = Endpoint(calls.job)
     jobs = Endpoint(calls.jobs)
@@ -114,8 +105,8 @@ class BaseClient(Generic[H]):
     history = Endpoint(calls.history)
     export = Endpoint(calls.export)
     figure = Endpoint(calls.figure)
-    simulate = Endpoint(simulation_calls.simulate)
-    free_run = Endpoint(simulation_calls.free_run)
+    simulate = Endpoint(calls.simulate)
+    free_run = Endpoint(calls.free_run)
     fmu = Endpoint(calls.fmu)
     create_monitor = Endpoint(monitor_calls.create_monitor)
     monitors = Endpoint(monitor_calls.monitors)
@@ -124,13 +115,13 @@ class BaseClient(Generic[H]):
     monitor_state = Endpoint(monitor_calls.monitor_state)
     add_record = Endpoint(monitor_calls.add_record)
     delete_monitor = Endpoint(monitor_calls.delete_monitor)
-    create_webhook = Endpoint(webhook_calls.create_webhook)
-    webhooks = Endpoint(webhook_calls.webhooks)
-    delete_webhook = Endpoint(webhook_calls.delete_webhook)
-    deliveries = Endpoint(webhook_calls.deliveries)
-    caller = Endpoint(admin_calls.caller)
-    admin_jobs = Endpoint(admin_calls.admin_jobs)
-    admin_cancel = Endpoint(admin_calls.admin_cancel)
+    create_webhook = Endpoint(calls.create_webhook)
+    webhooks = Endpoint(calls.webhooks)
+    delete_webhook = Endpoint(calls.delete_webhook)
+    deliveries = Endpoint(calls.deliveries)
+    caller = Endpoint(calls.caller)
+    admin_jobs = Endpoint(calls.admin_jobs)
+    admin_cancel = Endpoint(calls.admin_cancel)
 
     _http_class: type[H]
 

@@ -10,23 +10,34 @@ from urllib.parse import quote
 from uuid import uuid4
 
 import httpx
+import numpy as np
 
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
 from islands.persistence.models import NARX
-from islands_api.client.recording_parts import make_part
-from islands_api.client.response_parsing import read_as, read_mapping
-from islands_api.dataset_schemas import DatasetPage, DatasetSummary, DatasetView
+from islands_api.client.responses import read_as, read_mapping
+from islands_api.dataset_schemas import DatasetPage, DatasetSummary, DatasetView, FmuSummary
+from islands_api.result_schemas import SearchFreeRunView
 from islands_api.schemas import (
+    CallerView,
     HistoryPage,
     JobPage,
     JobView,
     ModelPage,
     ModelView,
     Names,
+    OwnedJobPage,
+    OwnedJobView,
     PresetPage,
 )
-from islands_api.webhook_schemas import WebhookView
+from islands_api.simulation_schemas import SimulatedOutput
+from islands_api.webhook_schemas import (
+    CreatedWebhook,
+    DeliveryPage,
+    DeliveryView,
+    WebhookPage,
+    WebhookView,
+)
 
 T = TypeVar("T")
 
@@ -35,6 +46,9 @@ JobRef = JobView | str
 
 #: Data set or its id.
 DatasetRef = DatasetView | DatasetSummary | str
+
+#: Webhook or its id.
+WebhookRef = WebhookView | str
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,12 +325,12 @@ def events_path(which: JobRef) -> str:
     return f"/v1/jobs/{quote_id(which)}/events"
 
 
-def get_id(which: JobView | DatasetRef | WebhookView) -> str:
+def get_id(which: JobView | DatasetRef | FmuSummary | WebhookView) -> str:
     """Return the id of a resource that is given as a value or as an id."""
     return which if isinstance(which, str) else which.id
 
 
-def quote_id(which: JobView | DatasetRef | WebhookView) -> str:
+def quote_id(which: JobView | DatasetRef | FmuSummary | WebhookView) -> str:
     """Return an id as one percent-encoded path segment."""
     return quote(get_id(which), safe="")
 
@@ -349,3 +363,124 @@ def _check_finite(body: Mapping[str, Any]) -> None:
 def as_list(given: str | Sequence[str]) -> list[str]:
     """Return a list of names, given as one name or as a sequence."""
     return [given] if isinstance(given, str) else list(given)
+
+
+def make_part(
+    given: DatasetView | DatasetSummary | str | Mapping[str, Any], rows: str | None = None
+) -> Mapping[str, Any]:
+    """Return a recording in the form of the body; one that is given in this form is returned unchanged.
+
+    Parameters
+    ----------
+    given : data set, its id, or mapping
+    rows : str, optional
+        ``START:STOP``, the samples of a data set to use.
+    """
+    if isinstance(given, Mapping):
+        return given
+    part = {"dataset": given if isinstance(given, str) else given.id}
+    return part if rows is None else {**part, "rows": rows}
+
+
+def simulate(
+    which: JobRef,
+    rank: int = 1,
+    inputs: Mapping[str, Sequence[float] | Mapping[str, Any]] | None = None,
+    *,
+    samples: int | None = None,
+    initial_output: float | None = None,
+) -> RequestSpec[SimulatedOutput]:
+    """Simulate a model of a job with inputs of choice.
+
+    Parameters
+    ----------
+    which : str or JobView
+    rank : int
+        Rank of the model.
+    inputs : mapping, optional
+        By column, samples at the sampling time of the model (a sequence or an array), or an excitation:
+        ``{"kind": "hold", "value": 1}``; ``{"kind": "sine", "amplitude": 2, "offset": 0, "frequency": 0.5}``,
+        also ``triangle`` and ``steps``; ``{"kind": "sweep", "amplitude": 2, "first": 0.1, "last": 5}``;
+        ``{"kind": "record", "scale": 1.2, "offset": 0}``. Other inputs are held in the middle of their range.
+    samples : int, optional
+        Number of samples, at most 50 000; by default that of the given samples, or 2000.
+    initial_output : float, optional
+        Output before the first sample; by default the stable equilibrium at the first values of the inputs,
+        or the first measured output if there is no unique one.
+    """
+    given: dict[str, Any] = {
+        "inputs": {
+            name: dict(each) if isinstance(each, Mapping) else np.asarray(each, dtype=np.float64).tolist()
+            for name, each in (inputs or {}).items()
+        },
+        "samples": samples,
+        "initial_output": initial_output,
+    }
+    body = {name: value for name, value in given.items() if value is not None}
+    path = f"/v1/jobs/{quote_id(which)}/models/{rank}/simulate"
+    return RequestSpec("POST", path, read_as(SimulatedOutput), json=body)
+
+
+def free_run(which: JobRef) -> RequestSpec[SearchFreeRunView]:
+    """Return the free run of the best model so far of a running search, with the measured output."""
+    return RequestSpec("GET", f"/v1/jobs/{quote_id(which)}/free-run", read_as(SearchFreeRunView))
+
+
+def caller() -> RequestSpec[CallerView]:
+    """Return the owner and the scopes of the key of this client."""
+    return RequestSpec("GET", "/v1/caller", read_as(CallerView))
+
+
+def admin_jobs(
+    owner: str | None = None, state: str | None = None, cursor: str | None = None, limit: int = 50
+) -> RequestSpec[OwnedJobPage]:
+    """Return a page of the jobs of all owners, newest first.
+
+    Parameters
+    ----------
+    owner, state : str, optional
+        Only jobs of this owner, or in this state.
+    """
+    given = {"owner": owner, "state": state, "cursor": cursor, "limit": limit}
+    params = {key: value for key, value in given.items() if value is not None}
+    return RequestSpec("GET", "/v1/admin/jobs", read_as(OwnedJobPage), params=params)
+
+
+def admin_cancel(which: JobRef) -> RequestSpec[OwnedJobView]:
+    """Cancel a job of any owner. The audit trail of the service has the key of the administrator."""
+    # A repetition after a lost answer would be refused, because the job is cancelled already.
+    path = f"/v1/admin/jobs/{quote_id(which)}/cancel"
+    return RequestSpec("POST", path, read_as(OwnedJobView), repeatable=False)
+
+
+def create_webhook(url: str, events: Sequence[str] | None = None) -> RequestSpec[CreatedWebhook]:
+    """Create a webhook and return it with its secret, which no other call returns.
+
+    Parameters
+    ----------
+    url : str
+        HTTPS URL that receives the events.
+    events : sequence of str, optional
+        Some of ``job.succeeded``, ``job.failed``, ``job.cancelled`` and ``monitor.alarm``; all by default.
+    """
+    asked = {"url": url, **({} if events is None else {"events": list(events)})}
+    return RequestSpec("POST", "/v1/webhooks", read_as(CreatedWebhook), json=asked, repeatable=False)
+
+
+def webhooks() -> RequestSpec[tuple[WebhookView, ...]]:
+    """Return all webhooks, oldest first."""
+    page = read_as(WebhookPage)
+    return RequestSpec("GET", "/v1/webhooks", lambda response: page(response).items)
+
+
+def delete_webhook(which: WebhookRef) -> RequestSpec[None]:
+    """Delete a webhook and its deliveries."""
+    return RequestSpec("DELETE", f"/v1/webhooks/{quote_id(which)}", lambda _: None, repeatable=False)
+
+
+def deliveries(which: WebhookRef) -> RequestSpec[tuple[DeliveryView, ...]]:
+    """Return the last hundred deliveries of a webhook, newest first."""
+    page = read_as(DeliveryPage)
+    return RequestSpec(
+        "GET", f"/v1/webhooks/{quote_id(which)}/deliveries", lambda response: page(response).items
+    )

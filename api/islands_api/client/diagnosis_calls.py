@@ -12,11 +12,11 @@ from islands_api.client.calls import (
     RequestSpec,
     as_list,
     get_id,
+    make_part,
     make_submission,
     quote_id,
 )
-from islands_api.client.recording_parts import make_part
-from islands_api.client.response_parsing import read_as, read_mapping
+from islands_api.client.responses import read_as, read_mapping
 from islands_api.result_schemas import DiagnosisOutputs
 from islands_api.schemas import JobView
 from islands_api.simulation_schemas import SimulationList, SimulationPreview, SimulationView

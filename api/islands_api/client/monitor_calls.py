@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from islands_api.client.calls import DatasetRef, JobRef, RequestSpec, as_list, get_id, make_submission
 from islands_api.client.diagnosis_calls import parse_simulation
-from islands_api.client.response_parsing import read_as
+from islands_api.client.responses import read_as
 from islands_api.monitor_schemas import MonitorPage, MonitorRecordPage, MonitorSummary, MonitorView
 from islands_api.schemas import JobView
 

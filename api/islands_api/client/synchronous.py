@@ -12,8 +12,7 @@ import httpx
 from islands_api.client import calls
 from islands_api.client.base import BaseClient, check_succeeded
 from islands_api.client.calls import JobRef, RequestSpec, T
-from islands_api.client.errors import ServiceError
-from islands_api.client.response_parsing import Event, EventParser, raise_for_problem
+from islands_api.client.responses import Event, EventParser, ServiceError, raise_for_problem
 from islands_api.client.transport import RetryPolicy, long_poll_seconds, translate_timeout
 from islands_api.schemas import JobView
 from islands_service.domain.job import TERMINAL, JobState

@@ -15,7 +15,7 @@ import httpx
 
 from islands.distribution import read_version
 from islands.errors import SettingsError
-from islands_api.client.errors import ServiceUnreachableError
+from islands_api.client.responses import ServiceUnreachableError
 
 #: Seconds to wait for an answer. The service takes up to two minutes to read an upload.
 ANSWER_TIMEOUT = 150.0

@@ -12,7 +12,7 @@ from fastapi.security.base import SecurityBase
 
 from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
-from islands_api.oidc.bearer_token import TokenRefusedError, is_token
+from islands_api.bearer_token import TokenRefusedError, is_token
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import AuthenticationError, InsufficientScopeError
 from islands_service.domain.job import Requester
@@ -21,7 +21,7 @@ from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
 
 if TYPE_CHECKING:
-    from islands_api.oidc.token_verifier import TokenVerifier
+    from islands_api.token_verifier import TokenVerifier
 
 #: Owner of all data of requests without a key, which only a loopback address allows.
 LOCAL_OWNER = "local"
@@ -169,7 +169,7 @@ def make_verifier(settings: ServiceSettings) -> "TokenVerifier | None":
     if find_spec("joserfc") is None:
         raise SettingsError(describe_missing_extra("the setting ISLANDS_OIDC_ISSUER", "oidc"))
     # The import of the cryptography takes a tenth of a second.
-    from islands_api.oidc.token_verifier import make_token_verifier  # noqa: PLC0415
+    from islands_api.token_verifier import make_token_verifier  # noqa: PLC0415
 
     return make_token_verifier(settings)
 

@@ -13,15 +13,11 @@ from fastapi import Depends, Request
 from numpy.typing import NDArray
 
 from islands.records.dataset import Dataset
-from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
-from islands_api.web.limits.owner_counts import OwnerCounts
-from islands_api.web.limits.owner_slots import OwnerSlots
-from islands_api.web.limits.rate import RateLimiter
+from islands_api.web.limits import BlockingExecutor, OwnerCounts, OwnerSlots, RateLimiter, UploadAdmission
 from islands_api.web.model_simulation import SimulatedModel
 from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.responses import QueuePlaces
-from islands_api.web.uploads.admission import UploadAdmission
 from islands_service.domain.owner import Quotas, default_quotas
 from islands_service.intake.file_inspection import count_slots
 from islands_service.logs import OutageLog
@@ -74,7 +70,7 @@ class RecentValues(Generic[K, V]):
 
 
 if TYPE_CHECKING:
-    from islands_api.oidc.token_verifier import TokenVerifier
+    from islands_api.token_verifier import TokenVerifier
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import structlog
 
-from islands_api.web.concurrency import BlockingExecutor
+from islands_api.web.limits import BlockingExecutor
 from islands_service.domain.job import LABELLED, TERMINAL, Event
 from islands_service.logs import OutageLog
 from islands_service.store import Store

@@ -19,7 +19,7 @@ from starlette.types import Scope
 from islands.document_problems import explain_problem
 from islands.errors import IslandsError
 from islands.records.reading.options import ReadingOptions
-from islands_api.oidc.bearer_token import TokenRefusedError
+from islands_api.bearer_token import TokenRefusedError
 from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,

@@ -12,7 +12,7 @@ from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import ResourceNotFoundError, ResultNotReadyError
 from islands_api.web.responses import JSONDocument, job_document
-from islands_api.web.uploads.dataset_storage import open_stored
+from islands_api.web.uploads import open_stored
 from islands_service.domain.job import Job, JobState, Requester, Submission
 from islands_service.domain.job_spec import Discrepancy, Identification
 from islands_service.intake.file_inspection import inspect_file

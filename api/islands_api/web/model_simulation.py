@@ -23,7 +23,7 @@ from islands.persistence.models import any_model_from_json
 from islands.records.dataset import Dataset
 from islands.records.split import compare_input_ranges, measure_input_ranges
 from islands.systems import signals
-from islands_api.model_simulation_schemas import (
+from islands_api.simulation_schemas import (
     MAX_SAMPLES,
     Hold,
     RecordedInput,
@@ -264,7 +264,7 @@ def describe_start(found: SimulatedModel, output: float, reason: str) -> str:
 def simulate_inputs(
     found: SimulatedModel, u: NDArray[np.float64], initial: float, start: str, warnings: Sequence[str]
 ) -> dict[str, Any]:
-    """Simulate a model; return the fields of `islands_api.model_simulation_schemas.SimulatedOutput`.
+    """Simulate a model; return the fields of `islands_api.simulation_schemas.SimulatedOutput`.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-from islands_api.oidc.bearer_token import IssuerUnavailableError, TokenRefusedError
+from islands_api.bearer_token import IssuerUnavailableError, TokenRefusedError
 from islands_service.domain.job import (
     DatasetDeletedError,
     IdempotencyError,

@@ -3,32 +3,47 @@
 The JSON parser of the framework keeps the last value of a duplicate name and accepts NaN as a number.
 """
 
+import asyncio
 import base64
 import binascii
 import json
 import re
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Collection, Coroutine, Iterable
 from contextlib import asynccontextmanager
+from dataclasses import fields
 from http import HTTPStatus
 from math import isfinite
 from operator import itemgetter
-from typing import Annotated, Any, ClassVar
+from time import monotonic
+from typing import IO, Annotated, Any, BinaryIO, ClassVar, cast
 
 from fastapi import Header, Query, Request, Response
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from pydantic import BaseModel
+from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
-from starlette.types import Receive, Scope
+from starlette.formparsers import MultiPartException, MultiPartParser
+from starlette.types import Message, Receive, Scope
 
-from islands.errors import IslandsError, SettingsError
+from islands.errors import IslandsError, SettingsError, suggest
+from islands.records.reading.options import ReadingOptions
 from islands_api.web.auth import Principal, authenticate, check_scope
 from islands_api.web.middleware import FORM_OVERHEAD_BYTES
-from islands_api.web.parameter_names import check_names
-from islands_api.web.problems import MalformedBodyError, PayloadTooLargeError, UnsupportedMediaTypeError
-from islands_api.web.uploads.body_reader import BodyReader
-from islands_api.web.uploads.request import UploadRequest
+from islands_api.web.problems import (
+    MalformedBodyError,
+    PayloadTooLargeError,
+    RequestTimeoutError,
+    UnsupportedMediaTypeError,
+)
+from islands_service.domain.job import QuotaError
+
+#: Options of reading a record, which the form field ``reading`` contains.
+_READING = frozenset(option.name for option in fields(ReadingOptions))
+
+#: Characters of a name in a message.
+_SHOWN = 40
 
 #: Maximum number of digits of an integer: parsing takes time proportional to the square of the digits.
 _MAX_INTEGER_DIGITS = 400
@@ -42,6 +57,146 @@ _LARGE_BODY = 20_000
 
 #: Maximum number of characters of a name that an error message repeats.
 _MAX_QUOTED_NAME = 40
+
+
+def check_names(given: Iterable[str], known: Collection[str], kind: str, path: str) -> None:
+    """Refuse an unknown name.
+
+    Parameters
+    ----------
+    given, known : collection of str
+        Names of a request and of its route.
+    kind : str
+        ``query parameter`` or ``form field``.
+    path : str
+        Path of the route.
+
+    Raises
+    ------
+    SettingsError
+        A name is unknown. The message lists the known ones.
+    """
+    for name in given:
+        if name not in known:
+            listed = f"its {kind}s are {', '.join(known)}" if known else f"it has no {kind}s"
+            advice = suggest(name, known)
+            if path == "/v1/datasets" and name in _READING:
+                advice = (
+                    f"; {name} is an option of reading: send it in the form field reading, a JSON object, as "
+                    'reading={"header": false}'
+                )
+            raise SettingsError(f"{path} has no {kind} {name[:_SHOWN]!r}; {listed}{advice}")
+
+
+class BodyReader:
+    """Reader that ends a body that stalls, is too slow or exceeds the owner's quota.
+
+    Parameters
+    ----------
+    receive : Receive
+    timeout : float
+        Longest time in seconds without a byte.
+    rate : float
+        Least mean rate in bytes per second, after the first ``timeout`` seconds; 0 for none. Only the time in
+        which the service waits for the client counts.
+    room : int, optional
+        Maximum number of bytes.
+    """
+
+    def __init__(self, receive: Receive, timeout: float, rate: float, room: int | None = None) -> None:
+        self._receive, self._timeout, self._rate, self._room = receive, timeout, rate, room
+        self._received, self._waited, self._complete = 0, 0.0, False
+
+    async def receive(self) -> Message:
+        """Receive the next message.
+
+        Raises
+        ------
+        RequestTimeoutError
+            No byte arrived in time, or the body is too slow.
+        QuotaError
+            The body is longer than the owner's quota allows.
+        """
+        if self._complete:
+            return await self._receive()
+        patience = self._timeout
+        if self._rate:
+            patience = min(patience, self._timeout + self._received / self._rate - self._waited)
+        start = monotonic()
+        try:
+            async with asyncio.timeout(max(patience, 0.0)):
+                message = await self._receive()
+        except TimeoutError:
+            self._waited += monotonic() - start
+            raise RequestTimeoutError(
+                f"{self._received / 1e6:.3g} MB of the body arrived in {self._waited:.3g} s, but the service "
+                f"needs some bytes every {self._timeout:g} s and {self._rate:g} bytes per second: use a "
+                "faster connection, or compress the file (.gz)"
+            ) from None
+        self._waited += monotonic() - start
+        self._received += len(message.get("body", b""))
+        self._complete = not message.get("more_body", False)
+        if self._room is not None and self._received > self._room:
+            raise QuotaError("the data sets would take more bytes than their owner may store: delete some")
+        return message
+
+
+class UploadRequest(Request):
+    """Request with a form.
+
+    Parameters
+    ----------
+    scope, receive
+        See ASGI.
+    target : file object
+        Empty file on the disk that receives the single file of the form.
+    fields : collection of str
+        Names of the fields of the form.
+    path : str
+        Path of the route, for messages.
+    """
+
+    def __init__(
+        self, scope: Scope, receive: Receive, target: IO[bytes], fields: Collection[str], path: str
+    ) -> None:
+        super().__init__(scope, receive)
+        self._target, self._fields, self._path = target, fields, path
+
+    async def form(self, **limits: Any) -> FormData:  # type: ignore[override]
+        """Parse the form; the limits are those of the framework.
+
+        Raises
+        ------
+        HTTPException
+            The form is malformed.
+        SettingsError
+            A field is unknown.
+        """
+        if self._form is None:
+            parser = _FileParser(self.headers, self.stream(), **limits)
+            parser.target = self._target
+            try:
+                self._form = await parser.parse()
+            except MultiPartException as error:
+                raise HTTPException(HTTPStatus.BAD_REQUEST, error.message) from None
+            check_names(self._form, self._fields, "form field", self._path)
+        return self._form
+
+
+class _FileParser(MultiPartParser):
+    target: IO[bytes]
+
+    def on_headers_finished(self) -> None:
+        super().on_headers_finished()
+        part = self._current_part
+        if part.file is not None:
+            part.file.file.close()  # empty, and not yet on the disk
+            part.file = UploadFile(
+                cast("BinaryIO", self.target),
+                size=0,
+                filename=part.file.filename,
+                headers=part.file.headers,
+            )
 
 
 class StrictRoute(APIRoute):

@@ -23,9 +23,9 @@ from islands.simulators.specification.table import parse_spec
 from islands_api.cli.service import job_views as views
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.client import Client, JobFailedError
+from islands_api.client.calls import make_part
 from islands_api.client.diagnosis_calls import parse_simulation
-from islands_api.client.fmu_calls import name_uploaded
-from islands_api.client.recording_parts import make_part
+from islands_api.client.upload_calls import name_uploaded
 from islands_api.schemas import JobView
 from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, PRIORITIES, JobState
 

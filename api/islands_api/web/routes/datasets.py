@@ -34,9 +34,15 @@ from islands_api.web.requests import (
     matches_etag,
 )
 from islands_api.web.responses import JSONDocument, dataset_document, dataset_summary
-from islands_api.web.uploads.dataset_storage import open_stored, read_again, store_dataset
-from islands_api.web.uploads.remote_file import check_source, fetch, find_file_name
-from islands_api.web.uploads.uploaded_file import parse_file_name
+from islands_api.web.uploads import (
+    check_source,
+    fetch,
+    find_file_name,
+    open_stored,
+    parse_file_name,
+    read_again,
+    store_dataset,
+)
 from islands_service.domain.job_spec import Name
 from islands_service.domain.plot_envelopes import describe_envelopes
 from islands_service.intake.file_inspection import InspectionRequest

@@ -6,7 +6,7 @@ import fastapi
 from fastapi import APIRouter, File, UploadFile
 
 from islands.simulators.fmu.model import MAX_DEFAULT_PARAMETERS, list_calibrated
-from islands_api.fmu_schemas import FmuPage, FmuView
+from islands_api.dataset_schemas import FmuPage, FmuView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppStateDep
 from islands_api.web.problems import RESPONSES
@@ -19,8 +19,7 @@ from islands_api.web.requests import (
     encode_cursor,
 )
 from islands_api.web.responses import JSONDocument, dataset_document
-from islands_api.web.uploads.dataset_storage import store_fmu
-from islands_api.web.uploads.uploaded_file import parse_fmu_name
+from islands_api.web.uploads import parse_fmu_name, store_fmu
 from islands_service.domain.uploaded_fmu import read_fmu
 from islands_service.intake.job_fmu import check_allowed
 from islands_service.store.datasets import StoredDataset

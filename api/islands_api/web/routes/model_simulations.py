@@ -6,7 +6,7 @@ from fastapi import APIRouter, Header, Response
 
 from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset
-from islands_api.model_simulation_schemas import MAX_SAMPLES, SimulatedOutput, SimulationRequest
+from islands_api.simulation_schemas import MAX_SAMPLES, SimulatedOutput, SimulationRequest
 from islands_api.web.auth import Principal, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import get_job_of_kind, get_result

@@ -1,4 +1,4 @@
-"""Service endpoints: liveness, readiness, metrics, and descriptions of problem types."""
+"""Endpoints of the service itself: presets, caller, liveness, readiness, metrics and types of problems."""
 
 import asyncio
 from asyncio import Future
@@ -8,16 +8,55 @@ from fastapi import APIRouter, Path, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from islands.errors import suggest
+from islands.evolution.presets import (
+    AUTO,
+    AUTO_SUMMARY,
+    PRESET_NAMES,
+    PRESET_SUMMARIES,
+    common_settings,
+    list_fixed_settings,
+    list_structures,
+)
 from islands_api.result_schemas import ProblemType
-from islands_api.schemas import Health
-from islands_api.web.auth import Operator
+from islands_api.schemas import CallerView, Health, PresetPage
+from islands_api.web.auth import Operator, Reader
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import PROBLEMS, RESPONSES, NotReadyError, ResourceNotFoundError
+from islands_api.web.requests import StrictRoute
+from islands_service.domain.job_spec import SettingsChanges
 
 #: Seconds that the database and the disk have to answer a readiness check.
 _READY_SECONDS = 2.0
 
 router = APIRouter(tags=["service"], responses=RESPONSES)
+
+#: Routes that refuse unknown query parameters.
+strict_router = APIRouter(responses=RESPONSES, route_class=StrictRoute)
+
+
+@strict_router.get("/v1/presets", tags=["jobs"], response_model=PresetPage)
+async def presets(_caller: Reader) -> Any:
+    """List the presets of a job with their settings, and describe the settings."""
+    summaries = {AUTO: AUTO_SUMMARY, **PRESET_SUMMARIES}
+    return {
+        "items": [
+            {
+                "name": name,
+                "summary": summaries[name],
+                "settings": common_settings(name),
+                "structures": list_structures(name),
+                "fixed": list_fixed_settings(name),
+            }
+            for name in PRESET_NAMES
+        ],
+        "settings": SettingsChanges.model_json_schema()["properties"],
+    }
+
+
+@strict_router.get("/v1/caller", tags=["service"], response_model=CallerView)
+async def caller(caller: Reader) -> Any:
+    """Return the owner and the scopes of the key or the token of this request."""
+    return {"owner": caller.owner, "scopes": sorted(caller.scopes)}
 
 
 @router.get("/healthz", response_model=Health)

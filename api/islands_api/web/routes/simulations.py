@@ -24,7 +24,7 @@ from islands_api.web.dependencies import AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
 from islands_api.web.responses import JSONDocument
-from islands_api.web.uploads.dataset_storage import open_stored
+from islands_api.web.uploads import open_stored
 from islands_service.intake.job_fmu import check_allowed, check_fmu, explain_refusal
 from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.job_validation import check_discrepancy

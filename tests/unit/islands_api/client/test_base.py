@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from islands_api.client import AsyncClient, Client, dataset_calls
+from islands_api.client import AsyncClient, Client, upload_calls
 from islands_api.dataset_schemas import DatasetView
 
 
@@ -44,7 +44,7 @@ def test_signatures_name_their_parameters(kind: type) -> None:
     assert inspect.signature(kind.upload) == inspect.Signature(  # type: ignore[attr-defined]
         [
             inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD),
-            *inspect.signature(dataset_calls.upload).parameters.values(),
+            *inspect.signature(upload_calls.upload).parameters.values(),
         ],
         return_annotation=DatasetView,
     )

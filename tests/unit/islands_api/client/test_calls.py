@@ -13,7 +13,7 @@ import pytest
 import islands_api
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.settings import Settings
-from islands_api.client import AsyncClient, Client, ServiceError, calls, dataset_calls, diagnosis_calls
+from islands_api.client import AsyncClient, Client, ServiceError, calls, diagnosis_calls, upload_calls
 from islands_api.client.calls import RequestSpec
 from islands_api.dataset_schemas import DatasetView
 from islands_api.schemas import JobPage, JobRequest, JobView
@@ -59,12 +59,12 @@ def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> 
 
 def test_upload_sends_all_given_values() -> None:
     for inputs in ("u_V", ["u_V"], ("u_V",)):  # a single name is one input, not one input per letter
-        assert dataset_calls.upload("r.csv", inputs, "y_um", 0.0).data == {
+        assert upload_calls.upload("r.csv", inputs, "y_um", 0.0).data == {
             "inputs": ["u_V"],
             "output": "y_um",
             "dt": 0.0,
         }
-    assert dataset_calls.upload("r.csv").data == {}
+    assert upload_calls.upload("r.csv").data == {}
 
 
 @pytest.mark.parametrize("path", ["nowhere.csv", "."])
@@ -313,7 +313,7 @@ def test_calls_declare_whether_they_are_repeatable() -> None:
     assert [call.repeatable for call in made] == [True, True, False, False, False]
     assert all(
         call.repeatable
-        for call in (calls.job("0"), calls.submit("0", ["u"], "y"), dataset_calls.upload("r.csv"))
+        for call in (calls.job("0"), calls.submit("0", ["u"], "y"), upload_calls.upload("r.csv"))
     )
 
 

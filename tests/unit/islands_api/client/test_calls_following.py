@@ -12,7 +12,7 @@ from islands_api.client import (
     ServiceError,
     ServiceUnreachableError,
 )
-from islands_api.client.response_parsing import EventParser
+from islands_api.client.responses import EventParser
 from islands_service.domain.job import JobOutcome, JobState
 from support.service import Service
 from support.stores import CANCELLED, FAILED, FOUND, brought_on

@@ -7,8 +7,8 @@ import pytest
 import structlog
 
 from islands_api.web import event_hub as hubs
-from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
+from islands_api.web.limits import BlockingExecutor
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
 from support.stores import FOUND, brought_on, claimed, submitted

@@ -9,7 +9,7 @@ import pytest
 
 import islands
 from islands.persistence.models import model_json
-from islands_api.model_simulation_schemas import SimulationRequest
+from islands_api.simulation_schemas import SimulationRequest
 from islands_api.web.model_simulation import (
     SimulatedModel,
     describe_start,

@@ -1,13 +1,17 @@
-"""Calls that make data sets, by a file or a download, and that read their samples."""
+"""Calls that upload, list, describe and delete data sets and FMUs, and the simulation of an uploaded FMU."""
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from islands_api.client.calls import DatasetRef, RequestSpec, as_list, quote_id
-from islands_api.client.response_parsing import read_as
-from islands_api.dataset_schemas import DatasetView, Samples
+from islands.simulators.specification.code import FmuSpec
+from islands_api.client.calls import DatasetRef, RequestSpec, as_list, get_id, quote_id
+from islands_api.client.responses import read_as
+from islands_api.dataset_schemas import DatasetView, FmuPage, FmuSummary, FmuView, Samples
+
+#: FMU or its id.
+FmuRef = FmuSummary | str
 
 
 def upload(
@@ -110,3 +114,29 @@ def samples(
     params = {"column": as_list(columns), "start": start, "stop": stop, "points": points}
     given = {name: value for name, value in params.items() if value is not None}
     return RequestSpec("GET", f"/v1/datasets/{quote_id(dataset)}/samples", read_as(Samples), params=given)
+
+
+def upload_fmu(path: str | Path) -> RequestSpec[FmuView]:
+    """Upload an FMU; its ``id`` is the ``file`` of the simulation ``{"kind": "fmu", "file": ID}``."""
+    return RequestSpec("POST", "/v1/fmus", read_as(FmuView), file=Path(path))
+
+
+def fmus(cursor: str | None = None, limit: int = 50) -> RequestSpec[FmuPage]:
+    """Return a page of the uploaded FMUs, newest first."""
+    params = {"limit": limit, **({} if cursor is None else {"cursor": cursor})}
+    return RequestSpec("GET", "/v1/fmus", read_as(FmuPage), params=params)
+
+
+def describe_fmu(which: FmuRef) -> RequestSpec[FmuView]:
+    """Return an uploaded FMU with its inputs, outputs, parameters and values at the first sample."""
+    return RequestSpec("GET", f"/v1/fmus/{quote_id(which)}", read_as(FmuView))
+
+
+def delete_fmu(which: FmuRef) -> RequestSpec[None]:
+    """Delete an uploaded FMU that no unfinished job needs."""
+    return RequestSpec("DELETE", f"/v1/fmus/{quote_id(which)}", lambda _: None, repeatable=False)
+
+
+def name_uploaded(spec: FmuSpec, uploaded: FmuRef) -> dict[str, Any]:
+    """Return the simulation of an FMU in a file as that of the uploaded file."""
+    return {**spec.model_dump(mode="json", exclude_unset=True), "file": get_id(uploaded)}

@@ -9,7 +9,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands_api.web.problems import PayloadTooLargeError
-from islands_api.web.uploads.uploaded_file import (
+from islands_api.web.uploads import (
     MAX_NAME_BYTES,
     find_stored_suffix,
     parse_file_name,

@@ -1,4 +1,4 @@
-"""Parsing of responses: documents, problems and event streams, without transport."""
+"""Answers of the service: documents, problems and event streams, without transport."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -9,9 +9,39 @@ from typing import Any, TypeVar
 import httpx
 from pydantic import BaseModel, ValidationError
 
-from islands_api.client.errors import ServiceError
+from islands.errors import IslandsError
 
 M = TypeVar("M", bound=BaseModel)
+
+
+class ServiceError(IslandsError):
+    """The service answered with a problem. The message is its detail.
+
+    Attributes
+    ----------
+    status : int
+        HTTP status.
+    type : str
+        Type of the problem, ``/problems/invalid-record`` and so on: see docs/how-to/use-the-rest-api.md.
+    detail : str
+        What is wrong, and what to do.
+    document : mapping
+        The whole problem document.
+    """
+
+    def __init__(self, status: int, document: Mapping[str, Any]) -> None:
+        detail = document.get("detail") or document.get("title") or f"HTTP {status}"
+        super().__init__(str(detail))
+        self.status, self.detail, self.document = status, str(detail), document
+        self.type = str(document.get("type", "about:blank"))
+
+
+class ServiceUnreachableError(IslandsError):
+    """The service does not answer."""
+
+
+class JobFailedError(IslandsError):
+    """A job has failed or was cancelled while the caller waited for its success."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
-"""Connections: requests that are not HTTP, or never complete, and idle ones."""
+"""Listening socket: no delay of small responses, clear errors."""
 
+import asyncio
 import json
 import select
 import socket
@@ -9,12 +10,44 @@ from contextlib import suppress
 
 import pytest
 
-from islands_api.server import http_protocol
+from islands.errors import SettingsError
+from islands_api import server
 from support.service import PROBLEM, Service, served
 
 #: Start of a request with a body in chunks, and headers that are too large together.
 CHUNKED = b"POST /v1/jobs HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n"
 LARGE = 70 * (b"X: " + 1000 * b"x" + b"\r\n")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_accepted_connections_send_small_responses_at_once(host: str) -> None:
+    """With Nagle's algorithm each response on a kept connection takes 40 ms."""
+
+    async def read_options() -> tuple[int, int]:
+        accepted = asyncio.get_running_loop().create_future()
+        with server.open_listener(host, 0) as listening:
+            answering = await asyncio.start_server(
+                lambda _, writer: accepted.set_result(writer), sock=listening
+            )
+            async with answering:
+                _, client = await asyncio.open_connection(*listening.getsockname()[:2])
+                writer = await accepted
+                connection = writer.get_extra_info("socket")
+                delayed = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+                reused = listening.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)
+                for each in (client, writer):
+                    each.close()
+                    await each.wait_closed()
+        return delayed, reused
+
+    nodelay, reuse = asyncio.run(read_options())
+    assert nodelay
+    assert reuse
+
+
+def test_an_address_of_another_machine_is_refused() -> None:
+    with pytest.raises(SettingsError, match=r"cannot listen at 192\.0\.2\.1, port 1234 .*as --host"):
+        server.open_listener("192.0.2.1", 1234)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +58,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 @pytest.fixture
 def short_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(http_protocol, "HEADER_TIMEOUT", 0.5)
+    monkeypatch.setattr(server, "HEADER_TIMEOUT", 0.5)
 
 
 def exchange(service: Service, sent: bytes = b"") -> tuple[int, dict[str, str], bytes]:

@@ -1,15 +1,21 @@
-"""HTTP protocol of a connection: limits of a request, and problems instead of plain text errors."""
+"""Web server: listening socket, HTTP protocol, and uvicorn with the configuration of this service."""
 
 import asyncio
 import json
 import secrets
+import socket
 import sys
+from errno import EADDRINUSE
+from time import monotonic, sleep
 from typing import Any
 
 import structlog
+import uvicorn
+from fastapi import FastAPI
 from starlette.exceptions import HTTPException
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from islands.errors import SettingsError
 from islands_api.web.middleware import SECURITY_HEADERS
 from islands_api.web.problems import (
     MEDIA_TYPE,
@@ -20,6 +26,13 @@ from islands_api.web.problems import (
     lookup_problem,
     problem_document,
 )
+from islands_service.settings import ServiceSettings
+
+#: Seconds for which a port in use is tried again: its previous owner may be shutting down.
+_PORT_RETRY_SECONDS = 2.0
+
+#: Length of the queue of connections that wait to be accepted.
+_BACKLOG = 2048
 
 log = structlog.get_logger()
 
@@ -27,12 +40,58 @@ log = structlog.get_logger()
 #: first byte on a kept connection.
 HEADER_TIMEOUT = 10.0
 
-
 #: Maximum number of headers of a request: each look-up reads all of them.
 _MAX_HEADERS = 200
 
 #: Maximum size in bytes of the request line and the headers of a request, and of the trailers of a body.
 _MAX_HEADER_BYTES = 65_536
+
+#: Seconds that open requests have to finish at shutdown.
+_SHUTDOWN_SECONDS = 2
+
+#: Seconds for which an idle connection is kept after a response.
+_KEEP_ALIVE_SECONDS = 30
+
+
+def open_listener(host: str, port: int) -> socket.socket:
+    """Open a listening TCP socket.
+
+    Raises
+    ------
+    SettingsError
+        The address does not belong to this machine, or another program uses the port.
+    """
+    deadline = monotonic() + _PORT_RETRY_SECONDS
+    while True:
+        try:
+            return _listen(host, port)
+        except OSError as error:
+            if error.errno == EADDRINUSE and monotonic() < deadline:
+                sleep(0.05)
+                continue
+            reason = "another program uses it" if error.errno == EADDRINUSE else error.strerror
+            raise SettingsError(
+                f"cannot listen at {host}, port {port} ({reason}): give another --port, or an "
+                "address of this machine as --host"
+            ) from error
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    # `socket.create_server` leaves the protocol number at 0. asyncio sets TCP_NODELAY only on sockets whose
+    # protocol is IPPROTO_TCP. Without it every response on a kept connection is delayed by some 40 ms:
+    # Nagle's algorithm waits for the acknowledgement of the headers, which the client delays.
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if family == socket.AF_INET6:
+            listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        listener.bind((host, port))
+        listener.listen(_BACKLOG)
+    except BaseException:
+        listener.close()
+        raise
+    return listener
 
 
 class HTTPProtocol(HttpToolsProtocol):
@@ -169,3 +228,31 @@ def _format_response(problem: ProblemKind, detail: str, request_id: str) -> byte
     }
     head = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
     return f"HTTP/1.1 {int(problem.status)} {problem.status.phrase}\r\n{head}\r\n".encode() + body
+
+
+class HTTPServer(uvicorn.Server):
+    """Server that closes the event streams first; they would outlast the shutdown timeout."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close the event streams, then shut down."""
+        self.config.app.state.islands.hub.close()  # type: ignore[union-attr]
+        await super().shutdown(sockets)
+
+
+def make_server_config(app: FastAPI, settings: ServiceSettings) -> uvicorn.Config:
+    """Return the configuration of uvicorn for an application."""
+    return uvicorn.Config(
+        app,
+        http=HTTPProtocol,
+        ws="none",
+        access_log=False,
+        log_config=None,
+        timeout_graceful_shutdown=_SHUTDOWN_SECONDS,
+        timeout_keep_alive=_KEEP_ALIVE_SECONDS,
+        ssl_certfile=settings.tls_certificate,
+        ssl_keyfile=settings.tls_key,
+        server_header=False,
+        # Without trusted proxies the header X-Forwarded-For of any client would change its address.
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=settings.trusted_proxies,
+    )

@@ -1,1 +1,0 @@
-"""HTTP server: listening socket, HTTP protocol and uvicorn's configuration. Read `asgi` first."""

@@ -1,1 +1,0 @@
-"""Limits of the requests of an owner: their rate, what is in progress, and turns for scarce work."""
