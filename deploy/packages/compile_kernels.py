@@ -31,7 +31,7 @@ def compile_archive() -> None:
 
     from islands.facade.warm_up import use_other_kernels, warm_up
     from islands.kernels import jit_cache
-    from islands.simulators.fmu.warm_up import compile_kernels
+    from islands_service.intake.simulation_server import compile_kernels
     from support.kernels import compile_further_kernels
 
     # Numba writes the paths of sources into messages, and addresses into the names of array expressions.

@@ -12,6 +12,7 @@ from islands.effects.interface.context import SimulationContext
 from islands.effects.interface.effect import Effect, Site
 from islands.export.fmu.compiler import find_compiler
 from islands.simulators import (
+    extended,
     intersample,
     linear,
     narx,
@@ -19,7 +20,6 @@ from islands.simulators import (
     parametric,
     python_function,
     recorded_output,
-    saved_extension,
 )
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
@@ -43,7 +43,7 @@ CLASSES = {
     "python": python_function.PythonFunctionSimulator,
     "held": intersample.ResampledSimulator,
     "terms": output_equation.OutputEquation,
-    "extended": saved_extension.SavedExtension,
+    "extended": extended.SavedExtension,
 }
 
 #: Modules of the package that define no simulator of a specification.

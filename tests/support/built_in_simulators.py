@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-from islands.simulators.ode.preparation import make_ode_simulator
-from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator
 from islands.simulators.specification.equations import read_built_in
 from support.simulated_records import recorded, wave
 

@@ -21,8 +21,7 @@ import numpy as np
 from islands.errors import ModelError
 from islands.kernels.jit_cache import cache_folder
 from islands.simulators.fmu.fmi_description import FmiDescription
-from islands.simulators.fmu.instance import FmuInstance, FmuLane, FmuRun
-from islands.simulators.fmu.source import FmuSource
+from islands.simulators.fmu.instance import FmuInstance, FmuLane, FmuRun, FmuSource
 from islands_service.domain.uploaded_fmu import check_interface, describe_fmu, read_fmu
 from islands_service.intake.confined_process import end_writing, enter, make_message
 from islands_service.intake.reader_process import SIMULATION_SERVER, ReaderProcess, open_memory

@@ -62,7 +62,7 @@ def _describe(path: str, most_bytes: int) -> dict[str, Any]:
 
 
 def _check_sizes(path: str, most_bytes: int) -> None:
-    from islands.simulators.fmu.model_description import DESCRIPTION  # noqa: PLC0415
+    from islands.simulators.fmu.fmi_description import DESCRIPTION  # noqa: PLC0415
 
     with zipfile.ZipFile(path) as archive:
         files = archive.infolist()  # a name can appear twice

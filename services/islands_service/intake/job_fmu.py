@@ -16,7 +16,7 @@ from islands_service.store.blobs import Blobs
 from islands_service.store.datasets import StoredDataset
 
 if TYPE_CHECKING:
-    from islands.simulators.fmu.source import FmuSource
+    from islands.simulators.fmu.instance import FmuSource
 
 
 def explain_refusal(settings: ServiceSettings) -> str:

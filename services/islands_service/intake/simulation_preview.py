@@ -73,7 +73,7 @@ def main() -> None:
     """Simulate the record named on standard input, and write the preview to standard output."""
     # Only the processes that simulate import the kernels.
     from islands.kernels.jit_cache import cache_folder  # noqa: PLC0415
-    from islands.simulators.fmu.source import LOCAL_FMUS  # noqa: PLC0415
+    from islands.simulators.fmu.instance import LOCAL_FMUS  # noqa: PLC0415
     from islands_service.intake.confined_fmu import load_extracted  # noqa: PLC0415
 
     kernels = [each for each in (cache_folder(),) if each is not None]

@@ -1,4 +1,4 @@
-"""Model-form error; `islands.simulators.model_form` makes the effect of a given model."""
+"""Model-form error; `islands.simulators.narx` makes the effect of a given model."""
 
 from islands.effects.interface.effect import EffectTemplate
 

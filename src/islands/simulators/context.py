@@ -8,9 +8,8 @@ from islands.effects.interface.context import SimulationContext
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
 from islands.records.segments import fill_gaps, is_resting
-from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.interface import Simulator
+from islands.simulators.interface import Simulator, peak_amplitude
 
 
 def make_context(record: Dataset, simulator: Simulator, fitted: int) -> SimulationContext:

@@ -1,8 +1,10 @@
 """Simulator with effects: input maps, simulation with forces, output maps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +13,14 @@ from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, ForceLaw, Site, apply_map
 from islands.records.masked_values import fill_masked
+from islands.records.signal_ranges import RangeLike
 from islands.simulators.interface import (
     Forces,
     SimulationRun,
     Simulator,
+    SimulatorWrapper,
     split_recordings,
 )
-from islands.simulators.mapped_input import MappedInput, map_input
 
 #: Cached outputs before the output maps: finite differences need the same one several times.
 _CACHE_SIZE = 4
@@ -26,6 +29,49 @@ _NONE: Mapping[str, float] = MappingProxyType({})
 
 #: A simulation diverges if its output exceeds its nominal peak by this factor; squares would overflow later.
 _DIVERGENCE_FACTOR = 1e6
+
+
+class MappedInput(NamedTuple):
+    """Input of a simulation, as in `SimulationRun`.
+
+    Attributes
+    ----------
+    x : ndarray, shape (samples,)
+    characteristic : callable or None
+        Map that acts on the values between samples as well.
+    """
+
+    x: Signal
+    characteristic: Callable[[Signal, Signal], Signal] | None
+
+
+def count_sampled_maps(effects: Sequence[Effect]) -> int:
+    """Return how many maps of the input act on its samples in continuous time.
+
+    They are the maps up to the last one that does not act between samples.
+    """
+    places = [place for place, effect in enumerate(effects, start=1) if not effect.acts_between_samples]
+    return max(places, default=0)
+
+
+def map_input(
+    maps: Sequence[tuple[Effect, Signal]], context: SimulationContext, is_continuous_time: bool
+) -> MappedInput:
+    """Apply maps of the input, each with its values, in their order.
+
+    In continuous time, the last ones form the characteristic if they act between samples.
+    """
+    last = count_sampled_maps([effect for effect, _ in maps]) if is_continuous_time else len(maps)
+
+    def apply(
+        part: Sequence[tuple[Effect, Signal]], signal: Signal, intervals: Signal | None = None
+    ) -> Signal:
+        given = replace(context, intervals=intervals)
+        for effect, values in part:
+            signal = apply_map(effect, signal, values, given)
+        return signal
+
+    return MappedInput(apply(maps[:last], context.u), partial(apply, maps[last:]) if maps[last:] else None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -312,3 +358,77 @@ def _group_by_site(
     """Return the effects at each site with the slices of their values, in the order in which they act."""
     placed = list(zip(effects, slices, strict=True))
     return {site: tuple((effect, part) for effect, part in placed if effect.site == site) for site in Site}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedExtension(SimulatorWrapper):
+    """Simulator with effects and their calibrated values.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        Simulator without the effects, with the intersample behaviour that the record required.
+    added : tuple of Effect
+    values : ndarray, shape (parameters,)
+        Nominal values of the parameters of the effects.
+    scales : SimulationContext
+        Scales of the record in which the effects were found; some strengths are relative to its peaks or its
+        duration.
+    tested : tuple of RangeLike
+        Ranges of the inputs and of the output in which the extension was tested; empty if they are not known.
+    """
+
+    added: tuple[Effect, ...]
+    values: Signal
+    scales: SimulationContext
+    tested: tuple[RangeLike, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Names of the simulator and of the effects."""
+        return " + ".join([self.simulator.name, *(effect.name for effect in self.added)])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the simulator, then those of each effect, prefixed with the name of the effect."""
+        found, at = list(self.simulator.parameters), 0
+        for effect in self.added:
+            for parameter in effect.parameters(self.scales):
+                name = f"{effect.name} {parameter.name}"
+                found.append(replace(parameter, name=name, nominal=float(self.values[at])))
+                at += 1
+        return tuple(found)
+
+    @property
+    def is_continuous_time(self) -> bool:
+        """False: the intersample behaviour is already selected."""
+        return False
+
+    @property
+    def built_in_effects(self) -> frozenset[str]:
+        """Built-in effects of the simulator, and the added effects."""
+        return self.simulator.built_in_effects | {effect.name for effect in self.added}
+
+    def simulate(
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """Simulate the output; see `Simulator.simulate`."""
+        scales = self.scales
+        inner = replace(
+            context,
+            u=np.ascontiguousarray(x),
+            input_peak=scales.input_peak,
+            output_peak=scales.output_peak,
+            fit_end_time=scales.fit_end_time,
+            reference_duration=scales.duration,
+            step_width=scales.step_width,
+            force_coordinate=scales.force_coordinate,
+        )
+        return ExtendedSimulator(self.simulator, self.added, inner).simulate(
+            values, effect_parameters, forces
+        )

@@ -10,7 +10,6 @@ import numpy as np
 
 from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, ForceLaw, Site
-from islands.simulators.coordinates import input_coordinate
 
 #: Force laws on the coordinate of a simulator, each with its values.
 Forces = Sequence[tuple[ForceLaw, Signal]]
@@ -342,3 +341,30 @@ def split_recordings(
         (simulator.for_samples(*bounds), part)
         for bounds, part in zip(context.bounds, context.split(), strict=True)
     )
+
+
+def input_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
+    """Return the input as the coordinate, for simulators without inertia: forces are added to the output."""
+    rate = float(np.std(context.take_differences(context.u))) / context.dt or 1.0
+    return ForceCoordinate(
+        context.input_unit, context.input_peak, rate, context.output_unit, peak_amplitude(output)
+    )
+
+
+def output_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
+    """Return the output as the coordinate, for simulators with inertia: forces are added to the input."""
+    rate = float(np.std(context.take_differences(output))) / context.dt or 1.0
+    return ForceCoordinate(
+        context.output_unit,
+        peak_amplitude(output),
+        rate,
+        context.input_unit,
+        context.input_peak,
+        is_dissipative=True,
+        friction_smoothing=0.02,
+    )
+
+
+def peak_amplitude(signal: Signal) -> float:
+    """Return the largest absolute value; 1 if the signal is zero."""
+    return float(np.max(np.abs(signal))) or 1.0

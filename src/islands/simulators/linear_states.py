@@ -21,8 +21,7 @@ from islands.expressions.tree import DELAY, Apply, Constant, Expression, Symbol,
 from islands.records.channel_names import simplify_unit
 from islands.records.segments import delay_samples
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.ode.system import OdeSystem
-from islands.simulators.ode.system_parts import OdeEffect, OdeForce, OdeParameter, OdeState
+from islands.simulators.ode.system import OdeEffect, OdeForce, OdeParameter, OdeState, OdeSystem
 
 #: Largest order of a model that is written as differential equations.
 MAX_ORDER = 2

@@ -1,5 +1,6 @@
 """Identified model in free run."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -8,17 +9,234 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
-from islands.effects.interface.effect import Effect, Site
+from islands.effects.interface.effect import Effect, Formula, Site
 from islands.effects.interface.force import sum_output_forces
+from islands.effects.model_form import CORE_SHAPE, MODEL_FORM
 from islands.errors import ModelError
+from islands.expressions.primitives import MUL, PRIMITIVES, SUB
+from islands.expressions.printing import plain
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
 from islands.models.narx import Model, make_model
-from islands.models.regressor import Regressor
+from islands.models.regressor import Regressor, regressor
 from islands.simulation.linked import LinkedModel
-from islands.simulators.interface import BatchSimulator, SimulationRun
-from islands.simulators.model_form import SLOPE, MissingTerm, missing_terms, model_form
+from islands.simulators.interface import (
+    BatchSimulator,
+    SimulationRun,
+    Simulator,
+    split_recordings,
+)
 
-#: Typical change of a parameter, relative to its value.
+#: Name of the slope c.
+SLOPE = f"{CORE_SHAPE} c"
+
+#: The slope in the text of a term.
+_SLOPE_PATTERN = re.compile(r"u2\(k-\d+\)")
+
+#: Largest number of regressors of the lowest degree that are multiplied by a distance.
+_MAX_MULTIPLIED = 4
+
+#: Largest number of regressors that are delayed by a sample.
+_MAX_DELAYED = 8
+
+#: Typical change of a coefficient, relative to the coefficient of the regressor that the term contains.
 _SCALE = 0.01
+
+#: Step of a finite difference, relative to the typical change.
+_STEP = 0.01
+
+#: Degrees of freedom of the effect in the information criterion, for any number of coefficients. An error in
+#: the form of an identified model is likely a priori. The penalty is therefore not larger than that of a
+#: second hysteresis with friction, which imitates the effect. It is not smaller either: by chance, each
+#: coefficient lowers minus twice the log-likelihood by one.
+_DEGREES_OF_FREEDOM = 4
+
+#: Trial values of the slope c, relative to the slope of a regression of the output on the input.
+_SLOPES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+
+#: Number of trial slopes that become starting points.
+_STARTING_POINTS = 2
+
+#: Bound of the slope, relative to the ratio of the peaks of output and input.
+_MAX_SLOPE = 10.0
+
+#: Singular values below this fraction of the largest one are ignored in the fit of a starting point.
+_CUTOFF = 1e-2
+
+
+@dataclass(frozen=True, slots=True)
+class MissingTerm:
+    """Term that a model may lack; it is zero where the regressor that it contains is zero.
+
+    Attributes
+    ----------
+    name : str
+        Name of its coefficient.
+    regressor : Regressor
+        The term; its second input, a constant, is the slope c.
+    base_index : int
+        Index of the regressor of the model that the term contains.
+    has_distance : bool
+        Whether the term is that regressor times a distance, which has the unit of the output.
+    """
+
+    name: str
+    regressor: Regressor
+    base_index: int
+    has_distance: bool
+
+    def with_slope(self, slope: float) -> Expression:
+        """Return the term with a number for the slope."""
+        return _insert_slope(self.regressor.expression, slope)
+
+
+def missing_terms(model: Model, indices: Sequence[int]) -> tuple[MissingTerm, ...]:
+    """Return the terms that a model may lack, made of the regressors with the given indices.
+
+    The width of a hysteresis loop depends on the absolute distance of the output from a line over the input,
+    which a polynomial in both cannot represent. A delayed regressor may exceed the maximum lag of the search
+    that found the model.
+
+    Parameters
+    ----------
+    model : Model
+    indices : sequence of int
+        Indices of regressors of the model. Constants are skipped.
+    """
+    ordered = sorted(
+        (place for place in indices if model.regressors[place].lags),
+        key=lambda place: (model.regressors[place].degree, model.regressors[place].maximum_lag),
+    )
+    lowest = model.regressors[ordered[0]].degree if ordered else 0
+    simplest = [place for place in ordered if model.regressors[place].degree == lowest][:_MAX_MULTIPLIED]
+    psi = {place: model.regressors[place].expression for place in ordered}
+    latest, previous = (_make_distance(lag) for lag in (1, 2))
+    candidates = [(place, _multiply(psi[place], _take_absolute(latest)), True) for place in simplest]
+    candidates += [(place, _multiply(psi[place], _take_absolute(previous)), True) for place in simplest]
+    # Models of hysteresis already have the absolute value of the first regressor times levels.
+    candidates += [(place, _multiply(_take_absolute(psi[place]), latest), True) for place in simplest[1:]]
+    candidates += [(place, Shift(1, psi[place]), False) for place in ordered[:_MAX_DELAYED]]
+    known, found = set(model.regressors), []
+    for place, expression, has_distance in candidates:
+        _, item = regressor(expression)
+        if item is not None and item not in known:
+            known.add(item)
+            text = plain(item.expression, inputs=2).replace("u1(", "u(")
+            name = f"{CORE_SHAPE} {_SLOPE_PATTERN.sub('c', text)}"
+            found.append(MissingTerm(name, item, place, has_distance))
+    return tuple(found)
+
+
+def _make_distance(lag: int) -> Expression:
+    """Return ``y - c u``, delayed by a number of samples."""
+    return Apply(SUB, (Lagged(0, lag), _multiply(Lagged(2, lag), Lagged(1, lag))))
+
+
+def _multiply(*factors: Expression) -> Expression:
+    return Apply(MUL, factors)
+
+
+def _take_absolute(expression: Expression) -> Expression:
+    return Apply(PRIMITIVES["abs"], (expression,))
+
+
+def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm]) -> Effect:
+    """Return the effect of a wrong form: the coefficients of the terms that a model lacks, and their slope.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Simulator of the model; it supports the parameters of the effect by name.
+    model : Model
+    terms : sequence of MissingTerm
+    """
+    theta = model.parameters
+
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        found = []
+        for term in terms:
+            size = _SCALE * abs(theta[term.base_index]) or _SCALE
+            found.append(
+                Parameter(term.name, "", 0.0, size / context.output_peak if term.has_distance else size)
+            )
+        slope = context.output_peak / context.input_peak
+        unit = f"{context.output_unit}/{context.input_unit}"
+        return (*found, Parameter(SLOPE, unit, slope, 0.02 * slope, -_MAX_SLOPE * slope, _MAX_SLOPE * slope))
+
+    def starting_points(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
+        fitted = round(context.fit_end_time / context.dt)
+        own, added = simulator.parameters, parameters(context)[:-1]
+        recordings = split_recordings(simulator, context)
+
+        moved = np.vstack([np.zeros(len(own)), _STEP * np.diag([each.scale for each in own])])
+        at_rest, *changed = _simulate_shapes(recordings, moved, [{}] * len(moved))[:, :fitted]
+        known = [(output - at_rest) / _STEP for output in changed]
+        u = context.u[:fitted]
+        regression_slope = float(np.polyfit(u, at_rest, 1)[0])
+        trials: list[tuple[float, tuple[float, ...]]] = []
+        for factor in _SLOPES:
+            slope = factor * regression_slope
+            shapes = [{SLOPE: slope, each.name: _STEP * each.scale} for each in added]
+            outputs = _simulate_shapes(recordings, np.zeros((len(shapes), len(own))), shapes)[:, :fitted]
+            columns = known + [(output - at_rest) / _STEP for output in outputs]
+            design = np.column_stack(columns)
+            if not np.isfinite(design).all():
+                continue
+            sizes = np.linalg.norm(design, axis=0) + 1e-300
+            found = np.linalg.lstsq(design / sizes, residual[:fitted], rcond=_CUTOFF)[0] / sizes
+            remaining = float(np.sum((residual[:fitted] - design @ found) ** 2))
+            scales = [each.scale for each in added]
+            trials.append((remaining, (*(found[len(own) :] * scales).tolist(), slope)))
+        return tuple(point for _, point in sorted(trials)[:_STARTING_POINTS])
+
+    return Effect(
+        name=CORE_SHAPE,
+        summary=MODEL_FORM.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        starting_points=starting_points,
+        form=None,
+        formula=_write_terms(terms),
+        source="Ikhouane and Rodellar, Systems with Hysteresis, section 2; Billings, Nonlinear System "
+        "Identification, section 2",
+        linear_parameters=len(terms),
+        extra_degrees_of_freedom=_DEGREES_OF_FREEDOM - len(terms) - 1,
+        is_applicable=lambda context: not context.has_resting_input,
+    )
+
+
+def _write_terms(terms: Sequence[MissingTerm]) -> Formula:
+    """Return the formula of terms in the equation of a model, with a number for each coefficient."""
+    symbols = tuple(f"k{number}" for number in range(1, len(terms) + 1))
+    texts = (re.sub(r"\bc\b", "{c}", each.name.removeprefix(CORE_SHAPE).strip()) for each in terms)
+    listed = " + ".join(f"{{{symbol}}}*({text})" for symbol, text in zip(symbols, texts, strict=True))
+    return Formula(symbols=(*symbols, "c"), note=f"G contains also {listed}")
+
+
+def _simulate_shapes(
+    recordings: Sequence[tuple[Simulator, SimulationContext]],
+    changes: Signal,
+    shapes: Sequence[Mapping[str, float]],
+) -> Signal:
+    """Simulate with each change of the parameters and each shape, (simulations, samples)."""
+    outputs = []
+    for simulator, part in recordings:
+        nominal = np.array([parameter.nominal for parameter in simulator.parameters])
+        runs = [
+            SimulationRun(nominal + change, part.u, shape, ())
+            for change, shape in zip(changes, shapes, strict=True)
+        ]
+        outputs.append(simulator.simulate_batch(runs, part))
+    return np.concatenate(outputs, axis=1)
+
+
+def _insert_slope(expression: Expression, slope: float) -> Expression:
+    match expression:
+        case Lagged(2, _):
+            return Constant(slope)
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(_insert_slope(argument, slope) for argument in arguments))
+    return expression
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,9 +14,9 @@ from islands.simulators.interface import (
     SimulatorWrapper,
 )
 from islands.simulators.ode.equation_parser import TIME
-from islands.simulators.ode.output_system import INPUT, SIMULATED, make_output_system
 from islands.simulators.ode.simulator import make_parameter
 from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_document import INPUT, SIMULATED, make_output_system
 
 #: Rate of the input in the equation, by central differences.
 RATE = f"rate({INPUT})"

@@ -18,8 +18,7 @@ from islands.expressions.primitives import ADD
 from islands.expressions.printing import render
 from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, substitute
 from islands.simulators.ode.equation_parser import FORCE, TIME
-from islands.simulators.ode.system import OUTPUT, OdeSystem
-from islands.simulators.ode.system_parts import OdeParameter
+from islands.simulators.ode.system import OUTPUT, OdeParameter, OdeSystem
 
 #: Functions of one signal ``a``.
 UNARY = ("a", "a**2", "a**3", "a**5", "abs(a)", "abs(a)*a", "sign(a)", "max(a, 0)", "sqrt(abs(a))*sign(a)")

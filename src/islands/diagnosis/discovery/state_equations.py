@@ -13,8 +13,8 @@ from islands.errors import RecordError
 from islands.expressions.tree import Symbol
 from islands.records.dataset import Dataset
 from islands.records.segments import fill_gaps
-from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import peak_amplitude
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator, estimate_linear
 from islands.simulators.linear_states import LinearStates, approximate_cascade, list_states

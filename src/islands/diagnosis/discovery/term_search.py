@@ -60,10 +60,10 @@ from islands.expressions.printing import render
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.expressions.tree import replace as replace_parts
 from islands.records.segments import fill_gaps
-from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.ode.output_system import SYMBOL_MEANINGS
+from islands.simulators.interface import peak_amplitude
 from islands.simulators.ode.system import OUTPUT, OdeSystem
+from islands.simulators.ode.system_document import SYMBOL_MEANINGS
 
 #: Maximum number of terms.
 MAX_TERMS = 3

@@ -9,8 +9,8 @@ import numpy as np
 from islands.records.dataset import Dataset
 from islands.records.segments import find_runs
 from islands.records.signal_ranges import compare_ranges, measure_ranges
+from islands.simulators.extended import SavedExtension
 from islands.simulators.interface import Simulator
-from islands.simulators.saved_extension import SavedExtension
 
 #: Family of gross errors in the list of causes.
 FAMILY = "gross"

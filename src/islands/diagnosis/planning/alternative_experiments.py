@@ -23,8 +23,8 @@ from islands.diagnosis.planning.planned_input import (
 from islands.effects.interface.context import Signal
 from islands.expressions.tree import Symbol
 from islands.parallel import ParallelMap
-from islands.simulators.coordinates import peak_amplitude
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.interface import peak_amplitude
 from islands.simulators.ode.simulator import OdeSimulator
 
 #: Factors of the duration of a record.

@@ -23,7 +23,7 @@ from islands.export.equations.sampled_core import read_core, read_output_system
 from islands.expressions.primitives import EQUATION_FUNCTIONS, NEG
 from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol, substitute
 from islands.records.channel_names import TEMPERATURES, parse_channel_name
-from islands.simulators.mapped_input import count_sampled_maps
+from islands.simulators.extended import count_sampled_maps
 from islands.simulators.ode.effects import (
     LAW_STATE,
     extend_system,
@@ -31,8 +31,7 @@ from islands.simulators.ode.effects import (
     list_terms,
     parse_law,
 )
-from islands.simulators.ode.system import OdeSystem
-from islands.simulators.ode.system_parts import OdeEffect
+from islands.simulators.ode.system import OdeEffect, OdeSystem
 from islands.simulators.specification.base import EffectSpec
 from islands.simulators.specification.description import read_scales
 from islands.simulators.specification.table import ExtendedSpec

@@ -16,7 +16,7 @@ from islands.expressions.tree import RATE, Apply, Expression, Symbol
 from islands.models.block import Block
 from islands.simulators.intersample import REACH, design_low_pass
 from islands.simulators.ode.equation_parser import TIME
-from islands.simulators.ode.output_system import SIMULATED
+from islands.simulators.ode.system_document import SIMULATED
 
 
 class EquationProgram(ABC):

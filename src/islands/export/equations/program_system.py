@@ -7,7 +7,7 @@ from islands.expressions.primitives import ADD, SUB
 from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.records.channel_names import parse_channel_name
 from islands.simulators.ode.equation_parser import FORCE
-from islands.simulators.ode.preparation import fill_units
+from islands.simulators.ode.simulator import fill_units
 from islands.simulators.ode.system import OdeSystem
 from islands.simulators.specification.equations import OdeSpec, read_built_in
 from islands.simulators.specification.table import SIMULATORS, ExtendedSpec, PhysicalSpec

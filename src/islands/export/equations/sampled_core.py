@@ -12,8 +12,8 @@ from islands.expressions.tree import Apply, Constant, Expression, Symbol
 from islands.models.measured_signals import measured_block
 from islands.persistence.models import model_from_json
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.ode.output_system import SIMULATED, make_output_system
 from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_document import SIMULATED, make_output_system
 from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LinearSpec, ModelSpec
 
 #: Names of the columns that a program reads besides the input: the measured and a simulated output.

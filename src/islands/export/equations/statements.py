@@ -24,8 +24,8 @@ from islands.expressions.tree import (
 )
 from islands.models.block import quote_name
 from islands.simulators.ode.equation_parser import TIME
-from islands.simulators.ode.output_system import SIMULATED
 from islands.simulators.ode.system import sort_variables
+from islands.simulators.ode.system_document import SIMULATED
 
 #: Reserved words of C, names of its macros, reserved words of MATLAB, and members of structures in programs.
 _RESERVED = frozenset(

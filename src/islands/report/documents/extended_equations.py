@@ -30,9 +30,9 @@ from islands.simulators.interface import Simulator
 from islands.simulators.intersample import ResampledSimulator
 from islands.simulators.ode.effects import list_terms
 from islands.simulators.ode.equation_parser import FORCE, TIME, is_free_name
-from islands.simulators.ode.output_system import INPUT, SIMULATED
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system import OdeSystem
+from islands.simulators.ode.system_document import INPUT, SIMULATED
 from islands.simulators.output_equation import OutputEquation
 
 #: Name of the output in the last equation, and of the signals that effects of the output need before it.

@@ -11,16 +11,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
 from islands.simulators.fmu.fmi_calls import TERMINATED, FmiFunctions
-from islands.simulators.fmu.fmi_description import FmiDescription, FmiInterface, import_fmpy, read_description
+from islands.simulators.fmu.fmi_description import (
+    FmiDescription,
+    FmiInterface,
+    import_fmpy,
+    read_description,
+    read_head,
+)
 from islands.simulators.fmu.fmi_kernel import FmuEquations, integrate, take_steps
-from islands.simulators.fmu.model_description import read_head
 from islands.simulators.ode.sampled_signal import SampledSignal
 
 #: Largest number of FMUs that a process keeps loaded.
@@ -330,3 +335,30 @@ def _find_functions(fmu: Any, description: FmiDescription) -> FmiFunctions:
         update_discrete_states=find("NewDiscreteStates", "UpdateDiscreteStates"),
         enter_continuous_time=find("EnterContinuousTimeMode"),
     )
+
+
+class LoadedFmu(Protocol):
+    """FMU that simulates, in this process or in another one."""
+
+    def simulate(self, lanes: Sequence[FmuLane], start_time: float, dt: float) -> list[FmuRun]:
+        """Simulate the outputs of equations; see `islands.simulators.fmu.instance.FmuInstance.simulate`."""
+
+
+@dataclass(frozen=True, slots=True)
+class FmuSource:
+    """Functions that describe and load FMUs.
+
+    Attributes
+    ----------
+    describe : callable
+        Takes the file and the interface, which may be empty, and returns the `FmiDescription`.
+    load : callable
+        Takes the description. Simulators that are sent to other processes contain it.
+    """
+
+    describe: Callable[[str, str], FmiDescription]
+    load: Callable[[FmiDescription], LoadedFmu]
+
+
+#: FMUs in files that this process reads and loads.
+LOCAL_FMUS = FmuSource(read_description, load_fmu)

@@ -12,8 +12,15 @@ from islands.expressions.printing import render
 from islands.expressions.tree import FMU, Apply, Expression, Symbol, find_symbols, walk
 from islands.simulators.fmu.model import FmuModel
 from islands.simulators.ode.equation_parser import FORCE, Equation, parse_equations
-from islands.simulators.ode.system import OUTPUT, OdeSystem, check_symbols, sort_variables
-from islands.simulators.ode.system_parts import OdeForce, OdeParameter, OdeState
+from islands.simulators.ode.system import (
+    OUTPUT,
+    OdeForce,
+    OdeParameter,
+    OdeState,
+    OdeSystem,
+    check_symbols,
+    sort_variables,
+)
 
 
 def make_fmu_system(

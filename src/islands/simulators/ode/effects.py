@@ -20,8 +20,7 @@ from islands.expressions.primitives import ADD
 from islands.expressions.tree import Apply, Expression, Symbol, substitute
 from islands.kernels.mechanics import WIDTH
 from islands.simulators.ode.equation_parser import FORCE
-from islands.simulators.ode.system import OdeSystem
-from islands.simulators.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeParameter
+from islands.simulators.ode.system import EFFECT_VALUE, OdeEffect, OdeParameter, OdeSystem
 
 #: Effects of the catalogue that a term can describe.
 _SUPPORTED = frozenset(each.name for each in CATALOGUE.values() if each.site == Site.CORE) - GAIN_EFFECTS

@@ -9,7 +9,7 @@ from islands.expressions.tree import Apply, Constant, Expression, Primitive, Sym
 from islands.simulators.ode.kernel import integrate
 from islands.simulators.ode.kernel_arguments import LANES, LaneRestarts, LaneSignals
 from islands.simulators.ode.lane_values import LaneInput, LaneValues
-from islands.simulators.ode.native.code import find_native_code
+from islands.simulators.ode.native_code import find_native_code
 from islands.simulators.ode.program import OdeProgram
 from islands.simulators.ode.sampled_signal import SampledSignal, chain_signals, stack_signals
 

@@ -11,8 +11,17 @@ from islands.expressions.parsing import parse_expression
 from islands.expressions.printing import render
 from islands.expressions.tree import Symbol, find_symbols
 from islands.simulators.ode.equation_parser import Equation, check_name, parse_equations
-from islands.simulators.ode.system import OUTPUT, OdeSystem, check_symbols, sort_variables
-from islands.simulators.ode.system_parts import EFFECT_VALUE, OdeEffect, OdeForce, OdeParameter, OdeState
+from islands.simulators.ode.system import (
+    EFFECT_VALUE,
+    OUTPUT,
+    OdeEffect,
+    OdeForce,
+    OdeParameter,
+    OdeState,
+    OdeSystem,
+    check_symbols,
+    sort_variables,
+)
 
 #: Largest number of states.
 MAX_STATES = 40
@@ -25,6 +34,12 @@ MAX_VARIABLES = 200
 
 #: Largest number of parameters.
 MAX_PARAMETERS = 100
+
+#: Names in the equation: the input, and the output of the simulation.
+INPUT, SIMULATED = "u", "y_sim"
+
+#: Their meaning, for texts that contain the equation.
+SYMBOL_MEANINGS = f"{SIMULATED} is the simulated output, {INPUT} the input"
 
 
 def make_system(document: Mapping[str, Any]) -> OdeSystem:
@@ -266,3 +281,36 @@ def render_equations(system: OdeSystem) -> str:
             yield f"{name} = {render(right)}"
 
     return "\n".join(lines()) + "\n"
+
+
+def make_output_system(
+    name: str, equation: str = SIMULATED, parameters: Mapping[str, Any] | None = None
+) -> OdeSystem:
+    """Make the equation of the output of a simulation.
+
+    Parameters
+    ----------
+    name : str
+        Name of the simulation.
+    equation : str
+        Output as an expression of that of the simulation ``y_sim``, its input ``u``, the time and parameters.
+    parameters : mapping, optional
+        Values or documents of the parameters by name.
+
+    Raises
+    ------
+    ModelError
+        The equation or a parameter is invalid.
+    """
+    system = OdeSystem(
+        name=name,
+        input=INPUT,
+        derivatives=(),
+        variables=(),
+        output=parse_expression(equation),
+        parameters=tuple(make_parameter(*each) for each in (parameters or {}).items()),
+        states=(),
+        simulated=(SIMULATED,),
+    )
+    check_symbols(system.output, system, f"output, {equation!r}")
+    return system

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect
 from islands.persistence.models import model_json
+from islands.simulators.extended import SavedExtension
 from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
@@ -16,7 +17,6 @@ from islands.simulators.output_equation import OutputEquation
 from islands.simulators.parametric import ParametricSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
-from islands.simulators.saved_extension import SavedExtension
 from islands.simulators.specification.base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.equations import OdeSpec, OutputEquationSpec

@@ -12,13 +12,13 @@ from pydantic_core import PydanticCustomError
 
 from islands.errors import ModelError, SettingsError
 from islands.simulators.ode.equation_parser import MAX_CHARACTERS
-from islands.simulators.ode.output_system import make_output_system
 from islands.simulators.ode.system import OdeSystem
 from islands.simulators.ode.system_document import (
     MAX_PARAMETERS,
     MAX_STATES,
     MAX_STEPS,
     describe_system,
+    make_output_system,
     make_system,
 )
 from islands.simulators.specification.base import SimulatorSpec, SpecModel

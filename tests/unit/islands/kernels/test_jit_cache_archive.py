@@ -17,7 +17,7 @@ from support.repository import ROOT
 USE = """
 from islands.facade.warm_up import use_other_kernels, warm_up
 from islands.kernels.jit_cache import cache_folder
-from islands.simulators.fmu.warm_up import compile_kernels
+from islands_service.intake.simulation_server import compile_kernels
 from support.kernels import compile_further_kernels
 
 assert not warm_up(print)

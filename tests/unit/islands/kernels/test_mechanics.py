@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from islands.effects import hysteresis
 from islands.kernels.mechanics import WIDTH, Elements, compile_law, integrate_along
-from islands.simulators.ode.interval_simulation import IntervalSimulation
 from islands.simulators.ode.lane_simulation import simulate_lanes
 from islands.simulators.ode.lane_values import LaneInput
 from islands.simulators.ode.program import generate_program
 from islands.simulators.ode.sampled_signal import SampledSignal
+from islands.simulators.ode.shooting import IntervalSimulation
 from islands.simulators.ode.system_document import make_system
 
 pytestmark = pytest.mark.ci

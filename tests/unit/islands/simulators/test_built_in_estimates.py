@@ -2,23 +2,26 @@
 
 import json
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.errors import ModelError
+from islands.errors import ModelError, SettingsError
 from islands.expressions.tree import Symbol
 from islands.records.dataset import Dataset
+from islands.simulators.built_in_estimates import FASTEST, SecondOrder, estimate_second_order
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
-from islands.simulators.ode.preparation import make_ode_simulator
-from islands.simulators.ode.simulator import OdeSimulator
-from islands.simulators.ode.system_parts import OdeEffect
+from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator
+from islands.simulators.ode.system import OdeEffect
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import SIMULATORS, LocalExtendedSpec, PhysicalSpec
@@ -26,12 +29,28 @@ from islands.systems.bouc_wen import BoucWenPiezo
 from islands.systems.bouc_wen import simulate as simulate_piezo
 from support.built_in_simulators import make_oscillator, make_piezo, make_tanks
 from support.simulated_records import made, recorded, simulate_oscillator, wave
+from support.strategies import part_of_the_examples
 
 Array = NDArray[np.float64]
 
 #: Constants and initial levels of the tanks.
 TANKS = {"k1": 0.5, "k2": 0.4, "k3": 0.3}
 LEVELS = (4.0, 5.0)
+
+#: Length of the records in samples.
+SAMPLES = 400
+
+#: Sampling time in seconds.
+DT = 0.01
+
+#: Natural frequency in Hz, damping ratio, mass, and the initial state relative to the response to the input.
+systems = st.tuples(
+    st.floats(0.8, 12.0),
+    st.floats(0.01, 0.9),
+    st.sampled_from([1e-3, 0.7, 400.0]),
+    st.floats(-1, 1),
+    st.floats(-1, 1),
+)
 
 
 def extend(simulator: OdeSimulator, u: Array, dt: float = 0.01, steps: int = 1) -> ExtendedSimulator:
@@ -223,3 +242,111 @@ def test_extended_tanks_start_from_estimated_levels_on_other_records() -> None:
     values = np.array([each.nominal for each in extended.parameters])
     spec = describe_extension(extended, values, ("u_V",), "y_V")
     assert simulate_spec(spec, record) == pytest.approx(levels, abs=1e-3)
+
+
+def make_input() -> Array:
+    walk = np.cumsum(np.random.default_rng(3).standard_normal(SAMPLES))
+    return walk - walk.mean()
+
+
+def make_system(hertz: float, damping_ratio: float, m: float, x0: float, v0: float) -> SecondOrder:
+    frequency = 2 * np.pi * hertz
+    k = m * frequency**2
+    size = 5.0 / k
+    return SecondOrder(m, 2 * damping_ratio * frequency * m, k, x0 * size, v0 * size * frequency)
+
+
+def simulate(truth: SecondOrder, u: Array) -> Array:
+    """Solve the equation exactly for a linearly interpolated input."""
+    equation = np.array([[0, 1], [-truth.stiffness / truth.mass, -truth.damping / truth.mass]])
+    state = (equation, np.array([[0], [1 / truth.mass]]), np.array([[1, 0]]), np.zeros((1, 1)))
+    _, y, _ = scipy.signal.lsim(state, u, DT * np.arange(u.size), X0=[truth.position, truth.rate])
+    return np.asarray(y).ravel()
+
+
+def assert_close(found: SecondOrder, truth: SecondOrder, rel: float = 1e-5) -> None:
+    frequency = (truth.stiffness / truth.mass) ** 0.5
+    size = 5.0 / truth.stiffness
+    assert found.mass == pytest.approx(truth.mass, rel=rel)
+    assert found.damping == pytest.approx(truth.damping, rel=rel)
+    assert found.stiffness == pytest.approx(truth.stiffness, rel=rel)
+    assert found.position == pytest.approx(truth.position, abs=rel * size)
+    assert found.rate == pytest.approx(truth.rate, abs=rel * size * frequency)
+
+
+@pytest.mark.ci
+@part_of_the_examples(10)
+@given(systems)
+def test_estimate_recovers_the_system_of_a_record(system: tuple[float, float, float, float, float]) -> None:
+    truth, u = make_system(*system), make_input()
+    assert_close(estimate_second_order(u, simulate(truth, u), DT, {}), truth)
+
+
+GIVEN = [names for count in (1, 2, 3) for names in combinations("mck", count)]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("names", GIVEN, ids="".join)
+def test_given_parameters_are_kept_and_the_others_recovered(names: tuple[str, ...]) -> None:
+    truth, u = make_system(3.0, 0.08, 0.4, 0.5, -0.7), make_input()
+    values = {"m": truth.mass, "c": truth.damping, "k": truth.stiffness}
+    chosen = {name: values[name] for name in names}
+    found = estimate_second_order(u, simulate(truth, u), DT, chosen)
+    assert_close(found, truth)
+    kept = {"m": found.mass, "c": found.damping, "k": found.stiffness}
+    assert {name: kept[name] for name in names} == chosen
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("names", ["m", "c", "k"])
+def test_wrong_given_parameters_are_kept(names: str) -> None:
+    truth, u = make_system(3.0, 0.08, 0.4, 0.5, -0.7), make_input()
+    wrong = {"m": 1.3 * truth.mass, "c": 0.6 * truth.damping, "k": 1.2 * truth.stiffness}
+    chosen = {name: wrong[name] for name in names}
+    found = estimate_second_order(u, simulate(truth, u), DT, chosen)
+    kept = {"m": found.mass, "c": found.damping, "k": found.stiffness}
+    assert {name: kept[name] for name in names} == chosen
+
+
+@pytest.mark.parametrize("name", ["c", "k"])
+def test_given_zero_does_not_determine_the_scale(name: str) -> None:
+    """Estimate the mass without a damper and without a spring."""
+    u = make_input()
+    known = {"m": 0.4, "c": 1.5, "k": 140.0, name: 0.0}
+    truth = SecondOrder(known["m"], known["c"], known["k"])
+    found = estimate_second_order(u, simulate(truth, u), DT, {name: 0.0})
+    assert (found.mass, found.damping, found.stiffness) == pytest.approx(
+        (truth.mass, truth.damping, truth.stiffness), rel=1e-4
+    )
+
+
+def test_estimate_is_not_faster_than_the_samples() -> None:
+    rng = np.random.default_rng(3)
+    u = np.cumsum(rng.standard_normal(800))
+    # A static response: any fast system explains it.
+    found = estimate_second_order(u, 0.5 * u + 0.01 * rng.standard_normal(800), 0.01, {})
+    assert found.stiffness == pytest.approx(2.0, rel=0.05)
+    assert found.damping / found.mass <= FASTEST / 0.01 * (1.0 + 1e-9)
+    assert (found.stiffness / found.mass) ** 0.5 <= FASTEST / 0.01 * (1.0 + 1e-9)
+
+
+def test_zero_mass_is_refused() -> None:
+    u = make_input()
+    with pytest.raises(SettingsError, match="a mass of zero"):
+        estimate_second_order(u, u, DT, {"m": 0.0})
+
+
+def test_initial_state_does_not_depend_on_the_level_of_the_input() -> None:
+    """The input starts at a nonzero value; there is no ramp before the first sample."""
+    truth, u = make_system(1.0, 0.2, 2.0, 0.0, 0.0), 30.0 + make_input()
+    found = estimate_second_order(u, simulate(truth, u), DT, {})
+    size = 30.0 / truth.stiffness
+    assert found.position == pytest.approx(0.0, abs=1e-6 * size)
+    assert found.rate == pytest.approx(0.0, abs=1e-5 * size)
+
+
+def test_estimate_from_a_noisy_record_is_within_one_per_cent() -> None:
+    truth, u = make_system(3.0, 0.08, 0.4, 0.5, -0.7), make_input()
+    y = simulate(truth, u)
+    noisy = y + 0.01 * y.std() * np.random.default_rng(4).standard_normal(y.size)
+    assert_close(estimate_second_order(u, noisy, DT, {}), truth, rel=0.01)

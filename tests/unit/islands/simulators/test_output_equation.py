@@ -10,8 +10,7 @@ from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import SimulationRun
-from islands.simulators.ode.system import OUTPUT
-from islands.simulators.ode.system_parts import OdeParameter
+from islands.simulators.ode.system import OUTPUT, OdeParameter
 from islands.simulators.output_equation import OutputEquation, add_output_equation
 from islands.simulators.python_function import PythonFunctionSimulator
 

@@ -12,7 +12,7 @@ from islands.diagnosis.calibration.preview import CalibrationPreview, preview_ca
 from islands.errors import ModelError
 from islands.records.dataset import Dataset
 from islands.simulators.fmu.fmi_description import read_description
-from islands.simulators.fmu.source import LOCAL_FMUS, FmuSource
+from islands.simulators.fmu.instance import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
 from islands_service.domain.uploaded_fmu import describe_fmu, read_fmu

@@ -27,8 +27,7 @@ from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
-from islands.simulators.ode.preparation import make_ode_simulator
-from islands.simulators.ode.simulator import OdeSimulator
+from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator
 from islands.simulators.ode.system_document import make_system
 from islands.simulators.recorded_output import RecordedOutput
 from support.built_in_simulators import make_oscillator, make_piezo

@@ -16,7 +16,7 @@ from islands.expressions.tree import FMU, Apply, Symbol
 from islands.simulators.fmu.fmi_description import FmiInterface, read_description
 from islands.simulators.fmu.instance import FmuInstance, FmuRun, load_fmu
 from islands.simulators.fmu.model import FmuParameterChoice, choose_variables
-from islands.simulators.fmu.simulation import simulate_fmu
+from islands.simulators.fmu.simulator import simulate_fmu
 from islands.simulators.fmu.system import make_fmu_system
 from islands.simulators.ode.lane_values import LaneInput
 from islands.simulators.ode.program import generate_program

@@ -6,8 +6,8 @@ import pytest
 
 from islands.errors import ModelError
 from islands.expressions.printing import render
+from islands.simulators.ode.system import OdeParameter
 from islands.simulators.ode.system_document import describe_system, make_system, render_equations
-from islands.simulators.ode.system_parts import OdeParameter
 
 DOCUMENT: dict[str, Any] = {
     "name": "two-mass",

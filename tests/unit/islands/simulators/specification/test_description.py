@@ -19,9 +19,8 @@ from islands.export.extension import as_json
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document, extended_json
 from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, SavedExtension
 from islands.simulators.ode.simulator import OdeSimulator
-from islands.simulators.saved_extension import SavedExtension
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import (

@@ -18,8 +18,7 @@ from islands.export.extension import export_extended
 from islands.export.fmu.compiler import find_compiler
 from islands.records.dataset import Dataset
 from islands.simulators.ode.simulator import OdeSimulator
-from islands.simulators.ode.system import OUTPUT
-from islands.simulators.ode.system_parts import OdeParameter
+from islands.simulators.ode.system import OUTPUT, OdeParameter
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LocalExtendedSpec

@@ -15,8 +15,7 @@ from islands.persistence.models import model_from_json
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.model_form import SLOPE
-from islands.simulators.narx import NarxSimulator
+from islands.simulators.narx import SLOPE, NarxSimulator
 from lab.diagnosis.cases import CASES
 from lab.diagnosis.injection.measurement import FaultyRecord, inject
 

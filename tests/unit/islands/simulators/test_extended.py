@@ -8,10 +8,9 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
 from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, map_input
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
-from islands.simulators.mapped_input import map_input
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import DT, recorded, wave
 

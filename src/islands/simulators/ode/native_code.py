@@ -1,14 +1,12 @@
-"""Machine code of a program: what the kernel interprets, with states and intermediate results in registers.
-
-An interpreted instruction waits for the result of the one before in memory. Machine code needs a quarter of
-the time, but a compilation takes 50 ms, so that programs are compiled if they run often, and stored. Machine
-code executes the same operations in the same order without contraction: every bit is that of the interpreter.
-Programs that call force laws, or functions of the C library other than the exponential, remain interpreted.
-"""
+"""Store of machine code in the cache folder, from which later processes load it in two milliseconds."""
 
 import ctypes
 from collections import OrderedDict
+from contextlib import suppress
 from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from tempfile import NamedTemporaryFile
 from threading import Lock
 from typing import Any
 
@@ -16,12 +14,17 @@ import numpy as np
 from llvmlite import binding
 from numpy.typing import NDArray
 
+from islands.kernels.jit_cache import cache_folder
 from islands.simulators.ode import kernel as ode_kernel
 from islands.simulators.ode.kernel_arguments import LANES, LaneLimits, LaneRestarts, LaneSignals
 from islands.simulators.ode.lane_values import LaneArguments
-from islands.simulators.ode.native.generator import FUNCTION, NativeGenerator, ProgramCode
-from islands.simulators.ode.native.store import is_stored, load_code, store_code
+from islands.simulators.ode.native_generator import FUNCTION, NativeGenerator, ProgramCode
 from islands.simulators.ode.program import OdeProgram
+
+#: Largest number of stored programs, about 20 kB each. If there are more, the older half is deleted.
+MAX_STORED = 2000
+
+_DIGEST = sha256().digest_size
 
 #: Interpreted instructions, once per step, after which a program is compiled: they take as long as the
 #: compilation.
@@ -38,6 +41,48 @@ _COUNTED, _KEPT = 256, 64
 
 _counts: OrderedDict[ProgramCode, float] = OrderedDict()
 _lock = Lock()
+
+
+def is_stored(program: ProgramCode) -> bool:
+    """Return whether there is machine code of a program."""
+    file = _find_file(program)
+    return file is not None and file.exists()
+
+
+def load_code(program: ProgramCode) -> bytes | None:
+    """Load the machine code of a program, an object file; None if there is none, or if it is damaged."""
+    file = _find_file(program)
+    with suppress(OSError):
+        content = file.read_bytes() if file is not None else b""
+        if content and sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
+            return content[_DIGEST:]
+    return None
+
+
+def store_code(program: ProgramCode, code: bytes) -> None:
+    """Store the machine code of a program, if the folder can be written."""
+    file = _find_file(program)
+    if file is None:
+        return
+    with suppress(OSError):  # read-only folder, full disk: the next process compiles again
+        file.parent.mkdir(exist_ok=True)
+        with NamedTemporaryFile(dir=file.parent, delete=False) as draft:
+            draft.write(sha256(code).digest() + code)
+        Path(draft.name).replace(file)
+        _delete_oldest(file.parent)
+
+
+def _find_file(program: ProgramCode) -> Path | None:
+    # The name of the cache folder depends on the processor and on the sources of the generator.
+    folder = cache_folder()
+    return None if folder is None else folder / "programs" / sha256(repr(program).encode()).hexdigest()
+
+
+def _delete_oldest(folder: Path) -> None:
+    files = list(folder.iterdir())
+    if len(files) > MAX_STORED:
+        for file in sorted(files, key=lambda each: each.stat().st_mtime)[: len(files) // 2]:
+            file.unlink(missing_ok=True)
 
 
 class NativeCode:

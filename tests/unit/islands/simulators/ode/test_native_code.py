@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from islands.expressions.tree import Symbol
-from islands.simulators.ode.interval_simulation import IntervalSimulation
+from islands.simulators.ode import native_code
 from islands.simulators.ode.lane_simulation import simulate_lanes
 from islands.simulators.ode.lane_values import LaneInput
-from islands.simulators.ode.native import code as native_code
-from islands.simulators.ode.native import store as native_store
 from islands.simulators.ode.program import OdeProgram, generate_program
 from islands.simulators.ode.sampled_signal import interpolate_linearly, make_time
+from islands.simulators.ode.shooting import IntervalSimulation
 from islands.simulators.ode.system_document import make_system
 
 pytestmark = pytest.mark.ci
@@ -41,7 +40,7 @@ ARITHMETIC = {
 @pytest.fixture(autouse=True)
 def empty_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache folder without programs, and a process that knows none."""
-    monkeypatch.setattr(native_store, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(native_code, "cache_folder", lambda: tmp_path)
     forget_programs(monkeypatch)
     return tmp_path
 
@@ -177,7 +176,7 @@ def test_programs_run_without_a_folder_to_store_them(
 ) -> None:
     program = generate_program(make_system(ARITHMETIC))
     for folder in (None, empty_store / "deleted"):
-        monkeypatch.setattr(native_store, "cache_folder", lambda folder=folder: folder)
+        monkeypatch.setattr(native_code, "cache_folder", lambda folder=folder: folder)
         forget_programs(monkeypatch)
         interpreted, native = simulate_natively(program, make_lanes(), monkeypatch)
         assert native.tobytes() == interpreted.tobytes()
@@ -186,9 +185,9 @@ def test_programs_run_without_a_folder_to_store_them(
 def test_the_older_half_of_too_many_programs_is_deleted(
     empty_store: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(native_store, "MAX_STORED", 4)
+    monkeypatch.setattr(native_code, "MAX_STORED", 4)
     for count in range(1, 6):
-        native_store.store_code(f"program {count}", b"code")
+        native_code.store_code(f"program {count}", b"code")
         assert len(list((empty_store / "programs").iterdir())) == (count if count < 5 else 3)
-    assert native_store.load_code("program 5") == b"code"
-    assert not native_store.is_stored("program 1")
+    assert native_code.load_code("program 5") == b"code"
+    assert not native_code.is_stored("program 1")

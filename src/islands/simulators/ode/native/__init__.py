@@ -1,1 +1,0 @@
-"""Machine code of programs: generated, compiled for this processor, and stored."""
