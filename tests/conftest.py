@@ -59,7 +59,7 @@ def pytest_configure(config):
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
     """Collect without garbage collection, which would visit all tests for a fifth of a second."""
-    from islands.processes.settings import freeze_garbage_collector
+    from islands.processes import freeze_garbage_collector
 
     gc.disable()
     try:

@@ -6,7 +6,7 @@ import sys
 import structlog
 
 from islands.errors import IslandsError, SettingsError
-from islands.processes.settings import freeze_garbage_collector, raise_file_limit
+from islands.processes import freeze_garbage_collector, raise_file_limit
 from islands_api.server import HTTPServer, make_server_config, open_listener
 from islands_api.web.app import create_app
 from islands_api.web.auth import make_verifier

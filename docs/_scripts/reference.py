@@ -15,13 +15,10 @@ import reference_rest
 from tables import attributes, code, codes, entries, escape, page, section, summarise, table
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES, TOPOLOGIES, WITH_DEGREE
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
-from islands.evolution.settings import Settings
+from islands.evolution.settings import FITNESSES, ISLAND_PROFILES, Settings
 from islands.export import EXPORTS, FILE_EXPORTS
 from islands.expressions.primitives import PRIMITIVES
 from islands.models.candidate_library import LIBRARIES

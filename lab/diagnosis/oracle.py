@@ -11,7 +11,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hypothesis import Hypothesis, remove_each
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.diagnosis.result import Diagnosis
-from islands.effects import model_form
+from islands.effects import catalogue
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.effect import Effect
 
@@ -60,7 +60,7 @@ def score_oracle(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str,
     oracle = found.base
     # Correcting the form of the simulator itself is not an improvement by a cause: diagnosis and oracle are
     # both compared with the simulator of corrected form.
-    for form in (effect for effect in effects if effect.name == model_form.CORE_SHAPE):
+    for form in (effect for effect in effects if effect.name == catalogue.CORE_SHAPE):
         oracle = _fit_with_effect(oracle, form, target)
     before = _rmse(found, oracle)
     for name in names:
@@ -88,7 +88,7 @@ def _compute_least_gain(oracle: CalibrationResult, target: Target, faults: int) 
     """Return the least gain of one of several faults next to the others; see `OracleScore`."""
     if oracle.noise.order:
         return None
-    effects = tuple(each for each in oracle.simulation.effects if each.name != model_form.CORE_SHAPE)
+    effects = tuple(each for each in oracle.simulation.effects if each.name != catalogue.CORE_SHAPE)
     if len(effects) < faults:
         return 0.0
     complete = Hypothesis(oracle, oracle.score, effects)

@@ -9,7 +9,7 @@ import numpy as np
 from islands.diagnosis.discovery.missing_terms import MISSING_TERM
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.procedure import diagnose
-from islands.effects import model_form
+from islands.effects import catalogue
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.free_forms import FREE_FORMS
 from islands.errors import RecordError
@@ -172,7 +172,7 @@ def run_trial(trial: Trial) -> TrialOutcome:
     simulated = CASES[trial.core]
     faulty, simulator = _draw_record(trial, simulated)
     found = diagnose(faulty.record, simulator, simulated.tolerance, trial.seed)
-    causes = [each for each in found.causes if each.name != model_form.CORE_SHAPE]
+    causes = [each for each in found.causes if each.name != catalogue.CORE_SHAPE]
     use_oracle = trial.oracle and trial.effects
     oracle = score_oracle(found, trial.effects, simulated.tolerance) if use_oracle else OracleScore()
     return TrialOutcome(
@@ -182,11 +182,11 @@ def run_trial(trial: Trial) -> TrialOutcome:
         tuple(finding.name for finding in causes),
         tuple(finding.name for finding in found.noise),
         tuple(finding.equivalents for finding in causes),
-        tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
+        tuple(each.name for each in found.candidates if each.name != catalogue.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,
         oracle.gain_share,
         oracle.least_gain,
-        any(finding.name == model_form.CORE_SHAPE for finding in found.effects),
+        any(finding.name == catalogue.CORE_SHAPE for finding in found.effects),
     )
 
 

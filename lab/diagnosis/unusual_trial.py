@@ -8,7 +8,7 @@ import numpy as np
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
-from islands.effects import model_form
+from islands.effects import catalogue
 from islands.errors import IslandsError
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.records.dataset import Dataset
@@ -217,7 +217,7 @@ def list_claims(found: Diagnosis) -> tuple[Claim, ...]:
             tuple(f"{name} = {value.value:.5g}" for name, value in each.parameters.items()),
         )
         for each in found.causes
-        if each.is_claimed and each.name != model_form.CORE_SHAPE
+        if each.is_claimed and each.name != catalogue.CORE_SHAPE
     )
 
 

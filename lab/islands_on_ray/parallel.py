@@ -18,7 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.epoch import run_epoch
+from islands.evolution.engine import run_epoch
 from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem

@@ -38,8 +38,7 @@ import ray
 
 from islands.distribution import read_version
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.engine import SerialEngine
-from islands.evolution.epoch import IslandEpoch, select_migrants
+from islands.evolution.engine import IslandEpoch, SerialEngine, select_migrants
 from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem

@@ -7,7 +7,7 @@ from html import escape
 from io import BytesIO
 from pathlib import Path
 
-from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.checkpoints import replace_file
 from islands.report.figures.style import save
 from islands.report.figures.themes import THEMES
 from lab.reproduction.section import ComparisonTable, Section, SectionFigure

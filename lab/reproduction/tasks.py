@@ -16,7 +16,7 @@ import islands
 from islands.distribution import read_version
 from islands.errors import SettingsError
 from islands.parallel import ParallelMap
-from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.checkpoints import replace_file
 from islands.progress import ProgressCallback, ignore_progress
 
 #: Result of a task as a JSON document.

@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import median
 
 from islands.errors import ModelError
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from lab.speed import compiled_c, kernel_evaluator, plain_numpy
 from lab.speed.clock import milliseconds
 from lab.speed.workload import CASE1, INTERVAL, WARM_UP, WorkloadModel

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.export.fmu.compiler import compile_library
+from islands.export.fmu import compile_library
 from islands.export.languages.c import definition
 from islands.expressions.primitives import SIGN
 from islands.models.regressor import Regressor

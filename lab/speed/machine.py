@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from islands.distribution import read_version
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from lab.speed.clock import cpu
 from lab.speed.compiled_c import compile_model
 from lab.speed.yardstick import measure_yardstick

@@ -26,7 +26,7 @@ from islands.models.coupled_narx import CoupledModel
 from islands.persistence.checkpoints import history_from_document
 from islands.persistence.ensembles import bands_from_document, ensemble_from_document
 from islands.persistence.models import any_model_from_json, model_from_json, read_validated_model
-from islands.persistence.result_models import read_criterion, read_shooting_interval
+from islands.persistence.saved_documents import read_criterion, read_shooting_interval
 from islands.progress import Failure, attempt
 from islands.records.averaging import average_samples
 from islands.records.coupled import couple, match_coupled, split_coupled

@@ -10,7 +10,7 @@ from islands.errors import ModelError as ModelError
 from islands.errors import RecordError as RecordError
 from islands.errors import SettingsError as SettingsError
 from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
-from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
+from islands.evolution.migration import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
 from islands.expressions.parsing import parse as parse
@@ -59,7 +59,7 @@ from islands.records.writer import write_record as write_record
 from islands.report.documents.monitor_state import SavedMonitor as SavedMonitor
 from islands.report.documents.monitor_state import read_monitor as read_monitor
 from islands.report.documents.monitor_state import write_monitor as write_monitor
-from islands.simulation.step_response import step_response as step_response
+from islands.simulation.input_response import step_response as step_response
 from islands.simulators.interface import Simulator as Simulator
 
 __version__: str

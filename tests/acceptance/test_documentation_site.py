@@ -14,13 +14,10 @@ import islands_api
 from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.effects.catalogue import CATALOGUE, OF_EACH
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.topology import TOPOLOGIES
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES, TOPOLOGIES
 from islands.evolution.presets import PRESETS
-from islands.evolution.settings import Settings
+from islands.evolution.settings import FITNESSES, ISLAND_PROFILES, Settings
 from islands.export import EXPORTS
 from islands.expressions.primitives import PRIMITIVES
 from islands.models.candidate_library import LIBRARIES

@@ -13,7 +13,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import evaluate_fit
 from islands.diagnosis.calibration.preparation import count_fitted_samples
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.records.writer import write_record
 from islands.report.documents.extension_json import extended_json
 from islands.simulators.context import make_context

@@ -14,12 +14,10 @@ from tables import attributes, summarise
 from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.effects.catalogue import CATALOGUE, OF_EACH
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.topology import TOPOLOGIES
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES, TOPOLOGIES
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
-from islands.evolution.settings import Settings
+from islands.evolution.settings import FITNESSES, Settings
 from islands.export import EXPORTS
 from islands.models.candidate_library import LIBRARIES
 from islands.records.reading import READERS

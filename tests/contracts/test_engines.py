@@ -12,8 +12,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.engine import SerialEngine
-from islands.evolution.epoch import run_epoch, select_migrants
+from islands.evolution.engine import SerialEngine, run_epoch, select_migrants
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings

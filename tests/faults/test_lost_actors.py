@@ -12,7 +12,7 @@ import pytest
 from islands.available_cpus import count_cpus
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.latent.problem import make_latent_problem
+from islands.evolution.latent_problem import make_latent_problem
 from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem
 from islands.progress import Steps

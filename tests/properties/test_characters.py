@@ -9,9 +9,8 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
 from islands.evolution.island import Island
-from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem
-from islands.evolution.settings import Settings
+from islands.evolution.settings import ISLAND_PROFILES, Settings
 from support.migrations import (
     SETTINGS,
     evaluator,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.epoch import next_stop, receive_migrants, run_epoch, select_migrants
+from islands.evolution.engine import next_stop, receive_migrants, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.hall_of_fame import HallOfFame

@@ -9,14 +9,13 @@ import pytest
 from islands.estimation.constrained_least_squares import constrained_least_squares, null_space
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
-from islands.evolution.settings import Settings
+from islands.evolution.settings import FITNESSES, Settings
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
-from islands.program.regressor_matrix import regressor_matrix
+from islands.program import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting

@@ -10,7 +10,7 @@ from islands.diagnosis.calibration.preparation import count_fitted_samples, sele
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import SimulationContext
 from islands.effects.interface.effect import Effect, Site
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.simulators import (
     extended,
     intersample,

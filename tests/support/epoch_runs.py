@@ -6,10 +6,9 @@ from itertools import pairwise
 from hypothesis import strategies as st
 
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.epoch import IslandEpoch
+from islands.evolution.engine import IslandEpoch
 from islands.evolution.individual import Individual
-from islands.evolution.migration.schedule import Schedule
-from islands.evolution.migration.topology import parse_topology
+from islands.evolution.migration import Schedule, parse_topology
 from islands.evolution.problem import Problem
 from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, EpochTask, schedule_islands
 from support.searches import SMALL, record

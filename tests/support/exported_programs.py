@@ -12,7 +12,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from islands.export import export, write_export
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.models.measured_signals import measured_block
 from lab.speed.compiled_c import compile_model
 from support.equation_programs import OCTAVE_FILES

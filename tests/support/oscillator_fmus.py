@@ -11,7 +11,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from islands.export.fmu.compiler import compile_library
+from islands.export.fmu import compile_library
 
 SOURCE = Path(__file__).with_name("oscillator_fmu.c")
 

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 from islands.diagnosis.procedure import LEAST_FRACTION, PHASES
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.history import HistoryPoint
 from islands.evolution.presets import AUTO, resolve_settings
-from islands.evolution.search_state import SearchState
+from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.facade.explain_residual import BEFORE_FORMULA, BEFORE_REPORT, FORMULA
 from islands.facade.identification_progress import IdentificationProgress
 from islands.progress import MIN_FRACTION, PhasedProgress, TimeLeft, report_part

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.persistence.models import model_json
 from islands.records.dataset import Dataset
 from islands.simulators.interface import Simulator

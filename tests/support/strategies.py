@@ -12,7 +12,7 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
+from islands.evolution.migration import TOPOLOGIES, WITH_DEGREE
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES
 from islands.expressions.tree import Apply, Constant, Lagged, Shift

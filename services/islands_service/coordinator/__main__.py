@@ -9,7 +9,7 @@ import sys
 from functools import partial
 
 from islands.errors import IslandsError
-from islands.processes.settings import limit_threads
+from islands.processes import limit_threads
 from islands_service.coordinator.heartbeat import restart_process
 from islands_service.coordinator.main_loop import Coordinator
 from islands_service.coordinator.metrics import CoordinatorMetrics

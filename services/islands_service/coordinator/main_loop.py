@@ -396,7 +396,7 @@ class Coordinator:
         if self._prepared:
             return
         from islands.facade.warm_up import warm_up  # noqa: PLC0415
-        from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
+        from islands.processes import freeze_garbage_collector  # noqa: PLC0415
 
         freeze_garbage_collector()  # before the compilation, which makes many objects
         warm_up(lambda line: log.info("kernels", note=line))

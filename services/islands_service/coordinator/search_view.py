@@ -14,7 +14,7 @@ import structlog
 
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.individual import AnyIndividual, AnyPopulation
-from islands.evolution.migration.topology import parse_topology
+from islands.evolution.migration import parse_topology
 from islands.evolution.protocol import SearchProblem
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings

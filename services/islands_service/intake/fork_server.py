@@ -17,7 +17,7 @@ from importlib import import_module
 from socket import recv_fds, socket
 from typing import NoReturn
 
-from islands.processes.settings import freeze_garbage_collector
+from islands.processes import freeze_garbage_collector
 from islands_service.intake import file_inspection, fmu_inspection, record_reading, sample_reading
 from islands_service.intake.reader_process import STARTED
 from islands_service.liveness import EVERY, send_heartbeat, set_parent_death_signal

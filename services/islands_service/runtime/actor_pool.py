@@ -13,12 +13,12 @@ from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
 from islands.distribution import read_version
-from islands.evolution.epoch import run_epoch
+from islands.evolution.engine import run_epoch
 from islands.evolution.island import Island
 from islands.evolution.protocol import SearchProblem
 from islands.expressions.primitives import PRIMITIVES
 from islands.facade.warm_up import warm_up
-from islands.processes.settings import freeze_garbage_collector
+from islands.processes import freeze_garbage_collector
 from islands.progress import ProgressCallback
 from islands_service.runtime import ClusterError
 from islands_service.runtime.cluster import LOSS_ERRORS, check_version, cluster_cpus, reserved_cpus

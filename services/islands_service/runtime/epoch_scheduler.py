@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import make_topology
-from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
+from islands.evolution.engine import IslandEpoch, make_topology, next_stop, select_migrants
 from islands.evolution.island import Island
 from islands.evolution.protocol import SearchProblem
 from islands.evolution.settings import Settings

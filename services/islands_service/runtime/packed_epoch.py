@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, overload
 
-from islands.evolution.epoch import IslandEpoch
+from islands.evolution.engine import IslandEpoch
 from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.island import Island, StepInfo
 from islands.evolution.protocol import Caches
@@ -36,7 +36,7 @@ class PackedEpoch:
     emigrants : bytes
         The pickled emigrants.
     steps : tuple of StepInfo
-        As in `islands.evolution.epoch.IslandEpoch`.
+        As in `islands.evolution.engine.IslandEpoch`.
     actor : str
         Id of the actor that ran the epoch.
     caches : mapping

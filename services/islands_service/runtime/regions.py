@@ -19,8 +19,7 @@ from ray.exceptions import RayError, RayTaskError
 
 from islands.distribution import read_version
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, make_topology
-from islands.evolution.epoch import next_stop
+from islands.evolution.engine import ArchipelagoEpoch, make_topology, next_stop
 from islands.evolution.individual import AnyIndividual
 from islands.evolution.island import Island, StepInfo
 from islands.evolution.protocol import Caches, SearchProblem

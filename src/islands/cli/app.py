@@ -22,7 +22,7 @@ from islands.errors import (
     command_line_names,
     suggest,
 )
-from islands.processes.settings import limit_threads
+from islands.processes import limit_threads
 
 
 class Command(NamedTuple):

@@ -117,7 +117,7 @@ def compile_kernels() -> None:
     """Compile the kernels if they are not in the cache, with a progress bar, and prepare for a long run."""
     # Imported here because other commands must start fast.
     from islands.kernels.jit_cache import are_stored  # noqa: PLC0415
-    from islands.processes.settings import freeze_garbage_collector  # noqa: PLC0415
+    from islands.processes import freeze_garbage_collector  # noqa: PLC0415
 
     if are_stored():
         freeze_garbage_collector()

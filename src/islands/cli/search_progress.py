@@ -6,8 +6,7 @@ from math import inf
 from time import monotonic
 
 from islands.cli.progress_display import Display
-from islands.evolution.history import HistoryPoint
-from islands.evolution.search_state import SearchState
+from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.evolution.settings import NARX, Settings
 from islands.facade.identification_progress import IdentificationProgress
 

@@ -2,9 +2,16 @@
 
 from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, EffectTemplate, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.formula import FormulaQuantity
-from islands.effects.interface.map_equation import MapEquation
+from islands.effects.interface.effect import (
+    Effect,
+    EffectTemplate,
+    Formula,
+    FormulaQuantity,
+    MapEquation,
+    Signal,
+    SimulationContext,
+    Site,
+)
 from islands.effects.time_variation import (
     STEP_NOTE,
     candidate_instants,

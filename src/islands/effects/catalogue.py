@@ -25,7 +25,6 @@ from islands.effects.hysteresis import (
     STICTION,
 )
 from islands.effects.interface.effect import Effect, EffectTemplate
-from islands.effects.model_form import MODEL_FORM
 from islands.effects.nonlinearity import (
     ABSOLUTE_VALUE_SENSOR,
     CUBIC_STIFFNESS,
@@ -51,6 +50,17 @@ from islands.effects.timing import (
     RESONANCE,
     SENSOR_LAG,
     VARYING_DELAY,
+)
+
+#: Name of the effect.
+CORE_SHAPE = "core-shape"
+
+MODEL_FORM = EffectTemplate(
+    CORE_SHAPE,
+    "The model lacks terms psi |y - c u|, |psi| (y - c u) or psi(k-1), where psi is one of its regressors",
+    title="wrong form of the model",
+    similar_to="second-hysteresis, coulomb-friction, exponential-creep",
+    distinguished_by="a loop that is too wide or too narrow wherever the input moves",
 )
 
 #: Effects and free forms, in the order in which maps act on a signal. Drifts and disturbances move the

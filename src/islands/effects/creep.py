@@ -6,9 +6,15 @@ import numpy as np
 
 from islands.effects.filters import low_pass
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.formula import FormulaQuantity
-from islands.effects.interface.map_equation import MapEquation
+from islands.effects.interface.effect import (
+    Effect,
+    Formula,
+    FormulaQuantity,
+    MapEquation,
+    Signal,
+    SimulationContext,
+    Site,
+)
 from islands.records.segments import is_resting
 
 #: Largest step before the first sample, times the fraction that creeps, relative to the largest output.

@@ -5,17 +5,37 @@ contains that shape approximately. It fits better only if the measured shape is 
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from math import inf
 from typing import Any
 
 import numpy as np
 
-from islands.effects import free_maps
+from islands.effects.filters import low_pass
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Formula, Map, Signal, SimulationContext, Site
-from islands.effects.interface.formula import write_curve_formula
-from islands.effects.interface.map_equation import MakeEquation, MapEquation
-from islands.kernels.curve import VALUES, interpolate, write_curve
+from islands.effects.interface.effect import (
+    Effect,
+    ForceLaw,
+    Formula,
+    MakeEquation,
+    Map,
+    MapEquation,
+    Signal,
+    SimulationContext,
+    Site,
+    write_curve_formula,
+)
+from islands.kernels.curve import PLACES, VALUES, interpolate, interpolate_curve, write_curve
+from islands.kernels.memory_operators import lag_unevenly, play_from
+
+#: Time constants of a free filter: from the sampling time to this fraction of the estimation part.
+TIME_CONSTANTS, LONGEST = 6, 0.1
+
+#: Half widths of the plays of a free memory, relative to the peak of the signal.
+HALF_WIDTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
+
+#: Labels of the time constants of a free lag.
+LAG_LABELS = ("falling fast", "falling slowly", "rising slowly", "rising fast")
 
 #: Range of the rates of a damping curve, relative to the typical rate.
 RATE_RANGE = 3.0
@@ -25,6 +45,113 @@ START, CHANGE = 0.02, 0.01
 
 _Text = Callable[[SimulationContext], str]
 _Number = Callable[[SimulationContext], float]
+
+
+def label_places(_context: SimulationContext) -> list[str]:
+    """Return the labels of the values of a curve."""
+    return [f"at {place:g}" for place in PLACES]
+
+
+def label_times(context: SimulationContext) -> list[str]:
+    """Return the labels of the values of a curve over time."""
+    return [f"at {time:.3g} s" for time in _times(context)[1:]]
+
+
+def label_half_widths(_context: SimulationContext) -> list[str]:
+    """Return the labels of the weights of plays."""
+    return [f"play {half_width:g}" for half_width in HALF_WIDTHS]
+
+
+def label_time_constants(context: SimulationContext) -> list[str]:
+    """Return the labels of the weights of low-passes."""
+    return [f"tau {tau:.3g} s" for tau in _time_constants(context)]
+
+
+def _times(context: SimulationContext) -> Signal:
+    return np.linspace(0.0, context.fit_end_time, VALUES + 2)
+
+
+def _time_constants(context: SimulationContext) -> Signal:
+    return np.geomspace(context.dt, LONGEST * context.fit_end_time, TIME_CONSTANTS)
+
+
+def add_curve(signal: Signal, values: Signal, peak: float) -> Signal:
+    """Add a curve over a signal, whose range is given by the peak."""
+    return signal + interpolate_curve(signal / peak, values)
+
+
+def write_added_curve(peak: float) -> MapEquation:
+    """Write `add_curve`."""
+    return MapEquation(f"x + {write_curve(f'x/{peak}')}")
+
+
+def add_low_passes(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    """Add what low-passes change, weighted by the values."""
+    parts = [low_pass(signal, tau, context.dt) - signal for tau in _time_constants(context)]
+    return signal + values @ np.array(parts)
+
+
+def write_low_passes(context: SimulationContext) -> MapEquation:
+    """Write `add_low_passes`."""
+    return _write_changes([("low-pass", str(tau)) for tau in _time_constants(context)])
+
+
+def _typical_rate(context: SimulationContext, peak: float) -> float:
+    """Return a typical rate of a signal per second, from scales that an extended simulation keeps."""
+    coordinate = context.force_coordinate
+    return peak * coordinate.rate / (coordinate.peak or 1.0)
+
+
+def lag_by_rate(signal: Signal, values: Signal, context: SimulationContext, peak: float) -> Signal:
+    """Lag a signal with time constants that depend on its rate, which is slow or fast for the signal."""
+    lagged: Signal = lag_unevenly(signal, context.dt, _typical_rate(context, peak), values)
+    return lagged
+
+
+def write_lag_by_rate(context: SimulationContext, peak: float) -> MapEquation:
+    """Write `lag_by_rate`."""
+    values = [f"n{place}" for place in range(len(LAG_LABELS))]
+    return MapEquation("z0", (("lag-unevenly", str(_typical_rate(context, peak)), *values),))
+
+
+def add_plays(signal: Signal, values: Signal, peak: float) -> Signal:
+    """Add what plays change, weighted by the values."""
+    return signal + values @ np.array([play_from(signal, part * peak) - signal for part in HALF_WIDTHS])
+
+
+def write_plays(peak: float) -> MapEquation:
+    """Write `add_plays`."""
+    return _write_changes([("play", str(part * peak)) for part in HALF_WIDTHS])
+
+
+def _write_changes(operators: list[tuple[str, ...]]) -> MapEquation:
+    changes = [f"n{place}*(z{place} - x)" for place in range(len(operators))]
+    return MapEquation(" + ".join(["x", *changes]), tuple(operators))
+
+
+def interpolate_time(values: Signal, context: SimulationContext) -> Signal:
+    """Return a curve over time that is zero at the start; the last value is held in the hold-out part."""
+    return np.interp(context.time, _times(context), [0.0, *values])
+
+
+def write_time_curve(context: SimulationContext) -> str:
+    """Write `interpolate_time` as an expression: a sum of ramps."""
+    times = _times(context)
+    ramps = []
+    for place, (first, last) in enumerate(pairwise(times.tolist())):
+        rise = f"(n{place} - n{place - 1})" if place else "n0"
+        ramps.append(f"{rise}*min(max((t - {first})/{last - first}, 0), 1)")
+    return f"({' + '.join(ramps)})"
+
+
+def multiply_over_time(signal: Signal, values: Signal, context: SimulationContext) -> Signal:
+    """Multiply a signal by one and a curve over time."""
+    return signal * (1.0 + interpolate_time(values, context))
+
+
+def write_time_factor(context: SimulationContext) -> MapEquation:
+    """Write `multiply_over_time`."""
+    return MapEquation(f"x*(1 + {write_time_curve(context)})")
 
 
 def _make_free_form(
@@ -70,7 +197,7 @@ def _make_free_form(
         linear_parameters=0,
         acts_between_samples=acts_between_samples,
         is_free=True,
-        depends_on_time=labels is free_maps.label_times,
+        depends_on_time=labels is label_times,
         special_cases=special_cases,
         similar_to=similar_to,
         distinguished_by=distinguished_by,
@@ -117,14 +244,14 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any slow linear dynamics of the input: a sum of low-passes with six time constants",
         "timing",
         Site.INPUT,
-        free_maps.add_low_passes,
+        add_low_passes,
         _FILTER,
         _LINEAR,
         "delay, output-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
         _FILTERED,
-        free_maps.label_time_constants,
-        equation=free_maps.write_low_passes,
+        label_time_constants,
+        equation=write_low_passes,
     ),
     _make_free_form(
         "input-lag-curve",
@@ -132,16 +259,16 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any uneven lag of the input: time constants rising and falling, above a typical rate and below",
         "timing",
         Site.INPUT,
-        lambda u, values, context: free_maps.lag_by_rate(u, values, context, context.input_peak),
+        lambda u, values, context: lag_by_rate(u, values, context, context.input_peak),
         _LAG,
         ("sensor-lag", "rate-limit", "delay"),
         "input-filter, rate-limit, output-lag-curve",
         "transients that differ between up and down, or between slow and fast changes",
         _LAGGED,
-        lambda _: free_maps.LAG_LABELS,
+        lambda _: LAG_LABELS,
         lambda _: "s",
         lambda context: context.dt / (2.0 * START),
-        lambda context: free_maps.write_lag_by_rate(context, context.input_peak),
+        lambda context: write_lag_by_rate(context, context.input_peak),
         0.0,
     ),
     _make_free_form(
@@ -150,14 +277,14 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any hysteresis of the input: a sum of plays with five half widths",
         "memory",
         Site.INPUT,
-        lambda u, values, context: free_maps.add_plays(u, values, context.input_peak),
+        lambda u, values, context: add_plays(u, values, context.input_peak),
         _MEMORY,
         _HYSTERETIC,
         "backlash, stiction, output-memory",
         "loops that do not become thinner when the input is slower",
         _HYSTERESIS,
-        free_maps.label_half_widths,
-        equation=lambda context: free_maps.write_plays(context.input_peak),
+        label_half_widths,
+        equation=lambda context: write_plays(context.input_peak),
     ),
     _make_free_form(
         "input-curve",
@@ -165,16 +292,16 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any static characteristic of the input: a curve through seven values",
         "shape",
         Site.INPUT,
-        lambda u, values, context: free_maps.add_curve(u, values, context.input_peak),
+        lambda u, values, context: add_curve(u, values, context.input_peak),
         _CURVE,
         _STATIC,
         "dead-zone, input-saturation, output-curve",
         "a curve of the residual over the input, the same in both directions",
         _ADDED,
-        free_maps.label_places,
+        label_places,
         lambda context: context.input_unit,
         lambda context: context.input_peak,
-        lambda context: free_maps.write_added_curve(context.input_peak),
+        lambda context: write_added_curve(context.input_peak),
         acts_between_samples=True,
     ),
     _make_free_form(
@@ -183,14 +310,14 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any change of the gain of the input over time: a curve through eight values",
         "change",
         Site.INPUT,
-        free_maps.multiply_over_time,
+        multiply_over_time,
         _CHANGE,
         _CHANGING,
         "gain-step, ageing, output-gain-curve",
         "a residual proportional to the input, with a factor that changes over time",
         _SCALED,
-        free_maps.label_times,
-        equation=free_maps.write_time_factor,
+        label_times,
+        equation=write_time_factor,
     ),
     _make_free_form(
         "damping-curve",
@@ -209,7 +336,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         "viscous, coulomb-friction, quadratic-drag",
         "a curve of the residual over the rate, the same at all places",
         write_curve_formula("f(v)", "a curve over the rate"),
-        free_maps.label_places,
+        label_places,
         lambda context: context.force_coordinate.force_unit,
         lambda context: context.force_coordinate.force,
     ),
@@ -229,7 +356,7 @@ FREE_FORMS: tuple[Effect, ...] = (
         "cubic-stiffness, even-nonlinearity, input-curve",
         "a curve of the residual over the coordinate, the same at all rates",
         write_curve_formula("f(x)", "a curve over the coordinate"),
-        free_maps.label_places,
+        label_places,
         lambda context: context.force_coordinate.force_unit,
         lambda context: context.force_coordinate.force,
     ),
@@ -239,14 +366,14 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any slow linear dynamics of the output: a sum of low-passes with six time constants",
         "timing",
         Site.OUTPUT,
-        free_maps.add_low_passes,
+        add_low_passes,
         _FILTER,
         _LINEAR,
         "sensor-lag, exponential-creep, input-filter",
         "amplitude and phase that change with the frequency, also at small amplitudes",
         _FILTERED,
-        free_maps.label_time_constants,
-        equation=free_maps.write_low_passes,
+        label_time_constants,
+        equation=write_low_passes,
     ),
     _make_free_form(
         "output-lag-curve",
@@ -254,16 +381,16 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any uneven lag of the output: time constants rising and falling, above a typical rate and below",
         "timing",
         Site.OUTPUT,
-        lambda y, values, context: free_maps.lag_by_rate(y, values, context, context.output_peak),
+        lambda y, values, context: lag_by_rate(y, values, context, context.output_peak),
         _LAG,
         ("sensor-lag", "delay"),
         "output-filter, input-lag-curve",
         "transients that differ between up and down, or between slow and fast changes",
         _LAGGED,
-        lambda _: free_maps.LAG_LABELS,
+        lambda _: LAG_LABELS,
         lambda _: "s",
         lambda context: context.dt / (2.0 * START),
-        lambda context: free_maps.write_lag_by_rate(context, context.output_peak),
+        lambda context: write_lag_by_rate(context, context.output_peak),
         0.0,
     ),
     _make_free_form(
@@ -272,14 +399,14 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any hysteresis of the output: a sum of plays with five half widths",
         "memory",
         Site.OUTPUT,
-        lambda y, values, context: free_maps.add_plays(y, values, context.output_peak),
+        lambda y, values, context: add_plays(y, values, context.output_peak),
         _MEMORY,
         _HYSTERETIC,
         "second-hysteresis, input-memory",
         "loops that do not become thinner when the input is slower",
         _HYSTERESIS,
-        free_maps.label_half_widths,
-        equation=lambda context: free_maps.write_plays(context.output_peak),
+        label_half_widths,
+        equation=lambda context: write_plays(context.output_peak),
     ),
     _make_free_form(
         "output-curve",
@@ -287,16 +414,16 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any static characteristic of the output: a curve through seven values",
         "shape",
         Site.OUTPUT,
-        lambda y, values, context: free_maps.add_curve(y, values, context.output_peak),
+        lambda y, values, context: add_curve(y, values, context.output_peak),
         _CURVE,
         _STATIC,
         "output-saturation, absolute-value-sensor, input-curve",
         "a curve of the residual over the output, the same in both directions",
         _ADDED,
-        free_maps.label_places,
+        label_places,
         lambda context: context.output_unit,
         lambda context: context.output_peak,
-        lambda context: free_maps.write_added_curve(context.output_peak),
+        lambda context: write_added_curve(context.output_peak),
     ),
     _make_free_form(
         "output-gain-curve",
@@ -304,14 +431,14 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any change of the gain of the output over time: a curve through eight values",
         "change",
         Site.OUTPUT,
-        free_maps.multiply_over_time,
+        multiply_over_time,
         _CHANGE,
         _CHANGING,
         "gain-step, ageing, input-gain-curve",
         "a residual proportional to the output, with a factor that changes over time",
         _SCALED,
-        free_maps.label_times,
-        equation=free_maps.write_time_factor,
+        label_times,
+        equation=write_time_factor,
     ),
     _make_free_form(
         "baseline-curve",
@@ -319,15 +446,15 @@ FREE_FORMS: tuple[Effect, ...] = (
         "Any drift of the output: a curve over time through eight values",
         "baseline",
         Site.OUTPUT,
-        lambda y, values, context: y + free_maps.interpolate_time(values, context),
+        lambda y, values, context: y + interpolate_time(values, context),
         _CHANGE,
         _DRIFTING,
         "linear-drift, jump, thermal-drift",
         "a slow residual that depends on the time alone",
         write_curve_formula("x + f(t)", "a curve over the time"),
-        free_maps.label_times,
+        label_times,
         lambda context: context.output_unit,
         lambda context: context.output_peak,
-        lambda context: MapEquation(f"x + {free_maps.write_time_curve(context)}"),
+        lambda context: MapEquation(f"x + {write_time_curve(context)}"),
     ),
 )

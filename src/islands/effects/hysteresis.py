@@ -5,8 +5,15 @@ from typing import Any
 import numpy as np
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.map_equation import MapEquation
+from islands.effects.interface.effect import (
+    Effect,
+    ForceLaw,
+    Formula,
+    MapEquation,
+    Signal,
+    SimulationContext,
+    Site,
+)
 from islands.kernels.memory_operators import jumper, play_from, slider
 from islands.records.segments import MAX_RANGE_AT_REST
 

@@ -10,13 +10,13 @@ from islands.effects.interface.effect import (
     Effect,
     EffectTemplate,
     Formula,
+    FormulaQuantity,
+    MapEquation,
     Signal,
     SimulationContext,
     Site,
 )
 from islands.effects.interface.force import ForceLaw
-from islands.effects.interface.formula import FormulaQuantity
-from islands.effects.interface.map_equation import MapEquation
 
 
 def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:

@@ -3,9 +3,7 @@
 import numpy as np
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, Site
-from islands.effects.interface.formula import Formula
-from islands.effects.interface.map_equation import MapEquation
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
 
 #: Width of the ramp between two levels, relative to the step. A jump would have no derivatives.
 _RAMP = 0.005

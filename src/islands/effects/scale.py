@@ -1,8 +1,15 @@
 """Effects on scale: gain errors of input and output, and wrong parameters."""
 
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, EffectTemplate, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.map_equation import MapEquation
+from islands.effects.interface.effect import (
+    Effect,
+    EffectTemplate,
+    Formula,
+    MapEquation,
+    Signal,
+    SimulationContext,
+    Site,
+)
 
 
 def _input_gain_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:

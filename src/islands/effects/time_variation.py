@@ -8,9 +8,15 @@ import scipy
 
 from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
 from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Formula, Signal, SimulationContext, Site
-from islands.effects.interface.formula import FormulaQuantity
-from islands.effects.interface.map_equation import MapEquation
+from islands.effects.interface.effect import (
+    Effect,
+    Formula,
+    FormulaQuantity,
+    MapEquation,
+    Signal,
+    SimulationContext,
+    Site,
+)
 
 #: Names of the effects that change the gain.
 GAIN_EFFECTS = frozenset(("gain-step", "ageing"))

@@ -14,19 +14,17 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.err_targets import ERR_TARGETS
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_index import ZERO, GeneIndex
 from islands.evolution.gene_structure import STRUCTURES
 from islands.evolution.individual import Individual
 from islands.evolution.offspring import Offspring, Parents
-from islands.evolution.settings import Settings
+from islands.evolution.settings import ERR_TARGETS, FITNESSES, Settings
 from islands.evolution.structure_table import UNKNOWN, StructureTable
 from islands.expressions.tree import Lagged
 from islands.kernels import population as kernel
 from islands.kernels.breeding import UNUSED, Individuals
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
-from islands.program.regressor_matrix import select_rows
+from islands.program import select_rows
 from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status

@@ -1,7 +1,7 @@
 """Generations of an island whose individuals are vectors of genes."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import inf
 from typing import cast
@@ -15,17 +15,57 @@ from islands.evolution.individual import Individual, Population, unique_niches, 
 from islands.evolution.island import Island, StepInfo
 from islands.evolution.offspring import Offspring, Parents, join, read_fitness
 from islands.evolution.rng import Purpose, Stream
-from islands.evolution.selection import run_tournaments
 from islands.evolution.settings import Settings
 from islands.evolution.variation import Genes, breed, random_individuals, repair_genes
 from islands.expressions.tree import Expression
 from islands.kernels.breeding import Individuals, take
+
+#: Evaluates abandoned individuals, given by their places, completely; returns their fitness.
+EvaluateAbandoned = Callable[[NDArray[np.int64]], NDArray[np.float64]]
 
 #: Quantile of the parents' fitness that defines the abandon threshold.
 _THRESHOLD_QUANTILE = 0.8
 
 #: Part of the first population that seeds may take, if there are more seeds than sizes.
 _SEEDED = 0.25
+
+
+def run_tournaments(
+    fitness: NDArray[np.float64],
+    abandoned: NDArray[np.bool_],
+    count: int,
+    contestants: int,
+    rng: Stream,
+    abandon_threshold: float,
+    evaluate_abandoned: EvaluateAbandoned,
+) -> NDArray[np.int64]:
+    """Run tournaments among contestants drawn with replacement and return the places of the winners.
+
+    The fittest contestant wins; the first drawn wins a tie.
+
+    Parameters
+    ----------
+    fitness : ndarray of float64, shape (individuals,)
+        Infinite for abandoned individuals and failures.
+    abandoned : ndarray of bool, shape (individuals,)
+        Individuals whose evaluation was abandoned.
+    count : int
+        Number of tournaments.
+    contestants : int
+        Contestants of each tournament.
+    abandon_threshold : float
+        Lower bound on the fitness of abandoned individuals.
+    evaluate_abandoned : callable
+        Evaluates abandoned individuals completely. It is called only for those that may win, so the winners
+        do not depend on which individuals were abandoned.
+    """
+    drawn = (rng.draw(count * contestants) * len(fitness)).astype(np.int64).reshape(count, contestants)
+    is_open = fitness[drawn].min(axis=1) > abandon_threshold
+    undecided = np.unique(drawn[is_open][abandoned[drawn[is_open]]])
+    known = fitness.copy()
+    known[undecided] = evaluate_abandoned(undecided)
+    first = known[drawn].argmin(axis=1, keepdims=True)
+    return np.take_along_axis(drawn, first, axis=1)[:, 0]
 
 
 def first_generation(

@@ -15,9 +15,8 @@ from islands.evolution.gene_structure import with_phi
 from islands.evolution.generation import first_generation, select_elite, step
 from islands.evolution.individual import AnyIndividual, Individual, Population, require_genes
 from islands.evolution.island import Island, StepInfo
-from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.protocol import Caches
-from islands.evolution.settings import Settings
+from islands.evolution.settings import ISLAND_PROFILES, Settings
 from islands.evolution.swap_search import swap_search
 from islands.evolution.variation import Genes
 from islands.expressions.tree import Expression, height

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from islands.estimation.structure_selection.certificate import Certificate
-from islands.evolution.fitness import FITNESS_MODES
-from islands.evolution.history import HistoryPoint
+from islands.evolution.search_state import HistoryPoint
+from islands.evolution.settings import FITNESS_MODES
 from islands.expressions.printing import plain_factor
 from islands.models.equations import equation
 from islands.models.narx import Model

@@ -8,10 +8,30 @@ from math import inf
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.history import HistoryPoint
 from islands.evolution.island import Island
 from islands.evolution.protocol import Caches
 from islands.evolution.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryPoint:
+    """Best fitness at one generation.
+
+    Attributes
+    ----------
+    generation : int
+    evaluations : int
+        Individuals evaluated up to this generation.
+    best : mapping
+        Best fitness (mean squared shooting error) of every model size.
+    islands : tuple of float
+        Best fitness of every island; infinite if the island has no model yet.
+    """
+
+    generation: int
+    evaluations: int
+    best: Mapping[int, float]
+    islands: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Settings of an evolution. With the record and the seed they determine its result."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -11,13 +11,15 @@ from islands.estimation.constraints.parser import FORMS
 from islands.estimation.estimator_table import ESTIMATORS, REFITS
 from islands.estimation.parameter_constraints import CONSTRAINTS, check_latent_constraints, constraint
 from islands.estimation.structure_selection.input_delays import Delays
-from islands.evolution.err_targets import ERR_TARGETS
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.schedule import Schedule, parse_schedule
-from islands.evolution.migration.topology import TOPOLOGIES, parse_topology
+from islands.evolution.migration import (
+    REPLACEMENT_POLICIES,
+    SELECTION_POLICIES,
+    TOPOLOGIES,
+    Schedule,
+    parse_schedule,
+    parse_topology,
+)
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.expressions.user_primitive import primitive_table
@@ -26,6 +28,26 @@ from islands.models.latent import ZERO_BLOCKS, LatentModel
 from islands.records.averaging import check_average
 from islands.records.input_lead import check_feedthrough
 from islands.settings_schema import AS_INTEGER, Integer, setting, settings_class
+
+#: Returns the samples of a shooting interval, given the setting ``shooting``; None means a free run.
+ShootingInterval = Callable[[int], int | None]
+
+#: Targets by name, with their codes in `islands.kernels.err_selection`: settings are read without Numba. The
+#: paper refers the ERR to y(k). On an oversampled record y(k-1) explains nearly all of y(k), so that pruning
+#: with the paper's tolerance leaves one or two terms of any model. ``increment`` refers it to increments of
+#: the output in the null space of the constraints. ``output-single`` refers it to y(k), for each term alone:
+#: without orthogonalisation, whose effect it serves to measure.
+ERR_TARGETS: Mapping[str, int] = MappingProxyType({"output": 0, "increment": 1, "output-single": 2})
+
+ISLAND_PROFILES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "plain": {},
+        "explorer": {"mutation": 1.0, "outer": 0.9, "tournament": 2},
+        "exploiter": {"outer": 0.1, "tournament": 6},
+        "recombiner": {"crossover": 0.9, "high_level": 0.8},
+        "pruner": {"prune": 0.8},
+    }
+)
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000
@@ -51,6 +73,31 @@ STRUCTURES_OF: Mapping[str, Mapping[str, Any]] = MappingProxyType({NARX: STRUCTU
 
 #: Default of an option in the help.
 _OF_PRESET = "that of the preset"
+
+
+def _one_step_ahead(_shooting: int) -> int | None:
+    """Error of the one-step-ahead prediction."""
+    return 1
+
+
+def _shooting(shooting: int) -> int | None:
+    """Error of multiple shooting over intervals of ``shooting`` samples."""
+    return shooting
+
+
+def _free_run(_shooting: int) -> int | None:
+    """Error of the free run over the whole record."""
+    return None
+
+
+FITNESSES: Mapping[str, ShootingInterval] = MappingProxyType(
+    {"one-step": _one_step_ahead, "shooting": _shooting, "free-run": _free_run}
+)
+
+#: Kind of simulation whose error a fitness function is, an entry of `islands.validation.assessment.MODES`.
+FITNESS_MODES: Mapping[str, str] = MappingProxyType(
+    {"one-step": "one_step_ahead", "shooting": "multiple_shooting", "free-run": "free_run"}
+)
 
 
 def _refuse_function(entry: Any) -> Any:

@@ -11,13 +11,11 @@ from types import MappingProxyType
 from typing import TypeAlias, TypeVar
 
 from islands.errors import IslandsError, ModelError, SettingsError, lookup
-from islands.export.fmu.archive import fmu2, fmu3
-from islands.export.languages.c import c_source
-from islands.export.languages.matlab import matlab_source
-from islands.export.languages.matlab_system import matlab_system_source
+from islands.export.fmu import fmu2, fmu3
+from islands.export.languages.c import c_source, s_function_source
+from islands.export.languages.matlab import matlab_source, matlab_system_source
 from islands.export.languages.modelica import modelica_source
 from islands.export.languages.python import python_source
-from islands.export.languages.s_function import s_function_source
 from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block

@@ -18,12 +18,11 @@ from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import Refinement, begin_refinement, refine
 from islands.estimation.structure_selection.deviations import Offsets, add_offsets, subtract_offsets
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual, require_genes, unique_structures
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
-from islands.evolution.settings import Settings
+from islands.evolution.settings import FITNESSES, Settings
 from islands.facade.trials.library import make_trial_library
 from islands.models.narx import require_narx
 from islands.models.protocol import DynamicModel

@@ -12,7 +12,7 @@ from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front, meet_conditions
 from islands.estimation.quantity_errors import with_quantity_errors
 from islands.evolution.engine import Engine
-from islands.evolution.latent.problem import LatentProblem, make_latent_problem
+from islands.evolution.latent_problem import LatentProblem, make_latent_problem
 from islands.evolution.presets import LATENT_SETTINGS
 from islands.evolution.search_result import (
     SearchResult,

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.effects.catalogue import CORE_SHAPE, MODEL_FORM
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect, Formula, Site
 from islands.effects.interface.force import sum_output_forces
-from islands.effects.model_form import CORE_SHAPE, MODEL_FORM
 from islands.errors import ModelError
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.printing import plain

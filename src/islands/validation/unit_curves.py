@@ -16,7 +16,7 @@ from islands.models.latent import LatentModel
 from islands.models.unit_functions import evaluate_curve
 from islands.records.dataset import Dataset
 from islands.rounding import ROUNDING
-from islands.simulation.unit_arguments import UnitRun, simulate_units
+from islands.simulation.blocks import UnitRun, simulate_units
 from islands.validation.ensemble import Ensemble
 
 #: Points of a curve.

@@ -21,9 +21,8 @@ from islands.diagnosis.inference.stepwise_search import MIN_GAIN, eliminate_back
 from islands.diagnosis.inference.strategies import SearchOutcome, assess_evidence, make_outcome
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.catalogue import catalogue_order
+from islands.effects.catalogue import CORE_SHAPE, catalogue_order
 from islands.effects.interface.effect import Effect
-from islands.effects.model_form import CORE_SHAPE
 
 
 class JointResult(NamedTuple):

@@ -20,7 +20,7 @@ from islands.diagnosis.inference.hypothesis import (
 )
 from islands.diagnosis.inference.screening import SCORE_TIE, ScreenedEffect, count_degrees
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects import model_form
+from islands.effects import catalogue
 from islands.effects.interface.effect import Effect
 from islands.parallel import ParallelMap
 
@@ -195,7 +195,7 @@ def _extend_beam(
 
 def _count_causes(hypothesis: Hypothesis) -> int:
     """Count the effects of a hypothesis, not counting the model-form error of an identified model."""
-    return sum(effect.cause != model_form.CORE_SHAPE for effect in hypothesis.effects)
+    return sum(effect.cause != catalogue.CORE_SHAPE for effect in hypothesis.effects)
 
 
 def refit_with_ar_noise(

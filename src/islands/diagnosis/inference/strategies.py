@@ -41,8 +41,8 @@ from islands.diagnosis.inference.verdict import (
     withdraw_effects,
 )
 from islands.diagnosis.run import DiagnosisRun
+from islands.effects.catalogue import CORE_SHAPE
 from islands.effects.interface.effect import Effect
-from islands.effects.model_form import CORE_SHAPE
 from islands.parallel import memoised_map
 from islands.records.noise_model import estimate_effective_samples
 

@@ -3,16 +3,151 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.force import ForceLaw
-from islands.effects.interface.formula import Formula
-from islands.effects.interface.map_equation import MakeEquation
 from islands.errors import SettingsError
 
+#: Operators by name, with their arguments. The result is a signal, or a number if it is the same at all
+#: samples.
+#:
+#: * ``low-pass`` (time constant in s): `islands.effects.filters.low_pass`
+#: * ``resonance`` (period in s, damping ratio): mode in series with the signal
+#: * ``play`` (half width): `islands.kernels.memory_operators`
+#: * ``slider`` (breakaway): `islands.effects.hysteresis.stick`
+#: * ``limit-rate`` (inverse of the rate per second): `islands.kernels.memory_operators`
+#: * ``lag-unevenly`` (rate per second, four time constants in s): `islands.kernels.memory_operators`
+#: * ``lag-by-gap`` (time constant in s, inverse of the rate per second): `islands.kernels.memory_operators`
+#: * ``interpolate`` (e, tau in s, cosine in s, sine in s, f in Hz): the signal at the time
+#:   ``t (1 + e) - tau - cosine cos(2 pi f t) - sine sin(2 pi f t)``
+#: * ``first``: number, the first sample
+#: * ``rests``: number, 1 if the signal is constant over the estimation part, otherwise 0
+#: * ``temperature``: the first temperature among the channels, relative to its first value
+#: * ``coupled``: the first other channel
+#:
+#: Without a positive first argument, the first six return the signal itself.
+OPERATORS = (
+    "low-pass",
+    "resonance",
+    "play",
+    "slider",
+    "limit-rate",
+    "lag-unevenly",
+    "lag-by-gap",
+    "interpolate",
+    "first",
+    "rests",
+    "temperature",
+    "coupled",
+)
+
 __all__ = ["Effect", "EffectTemplate", "ForceLaw", "Formula", "Signal", "SimulationContext", "Site"]
+
+
+class FormulaQuantity(NamedTuple):
+    """A number in a formula.
+
+    Attributes
+    ----------
+    symbol : str
+    value : float
+    unit : str
+    parameter : str
+        Name of the parameter whose value it is; empty if it is computed from one.
+    """
+
+    symbol: str
+    value: float
+    unit: str
+    parameter: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """Formula of an effect.
+
+    Programs and simulations compute ``equation`` and ``form`` of an effect. They contain smoothed steps and
+    values relative to a peak, and the formula contains what these mean: ``F*sign(v)``, ``clip(x, -L, L)``.
+
+    Attributes
+    ----------
+    text : str
+        Signal after a map as an expression of the signal ``x`` before it; force as one of the coordinate
+        ``x`` and its rate ``v``. ``t`` is the time, and ``at(x, t - tau)`` the signal at another time.
+        Functions may have any name. Empty if the equations of the simulation contain the term, or if the
+        effect limits a state.
+    symbols : tuple of str
+        Names of the values, without those that are initial states; by default the names of the parameters.
+    quantities : callable or None
+        ``(values, context) -> quantities``: the numbers of the formula if they are not the values.
+    states : tuple of (str, str)
+        States of the effect with their derivatives.
+    conditions : tuple of str
+        Limits of the state ``x`` that the effect is named after.
+    names : tuple of str
+        Further signals and functions in ``text``, which the note explains.
+    note : str
+        Sentence on the formula without a period, as a format string with the names in braces.
+    """
+
+    text: str = ""
+    symbols: tuple[str, ...] = ()
+    quantities: Callable[[Signal, SimulationContext], Sequence[FormulaQuantity]] | None = None
+    states: tuple[tuple[str, str], ...] = ()
+    conditions: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    note: str = ""
+
+    def list_quantities(
+        self, parameters: Sequence[Parameter], values: Signal, context: SimulationContext
+    ) -> tuple[FormulaQuantity, ...]:
+        """Return the numbers of the formula, given the parameters of the effect and their values."""
+        if self.quantities is not None:
+            return tuple(self.quantities(values, context))
+        given = [
+            (each, float(value))
+            for each, value in zip(parameters, values, strict=False)  # copies of initial states follow
+            if not each.initial
+        ]
+        symbols = self.symbols or tuple(each.name for each, _ in given)
+        return tuple(
+            FormulaQuantity(symbol, value, each.unit, each.name)
+            for symbol, (each, value) in zip(symbols, given, strict=True)
+        )
+
+
+def write_curve_formula(text: str, what: str) -> Formula:
+    """Return the formula of a free form, whose function ``f`` is drawn, and is not given by a few numbers."""
+    return Formula(
+        text,
+        quantities=lambda _values, _context: (),
+        names=("f",),
+        note=f"{{f}} is {what}, whose values are in the figure of the free forms",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class MapEquation:
+    """Equation of a map.
+
+    Attributes
+    ----------
+    equation : str
+        Signal after the map as an expression of the signal ``x`` before it, the time ``t``, the values
+        ``n0``, ``n1``, ... of the effect, and the results ``z0``, ``z1``, ... of operators on ``x``.
+    operators : tuple of tuple of str
+        Name of each operator in `OPERATORS`, then its arguments as expressions of the values.
+    """
+
+    equation: str
+    operators: tuple[tuple[str, ...], ...] = ()
+
+
+#: ``context -> equation``: the scales of the context are numbers in the equation.
+MakeEquation: TypeAlias = Callable[[SimulationContext], MapEquation]
 
 
 class Site(StrEnum):

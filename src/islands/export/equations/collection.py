@@ -18,8 +18,13 @@ from islands.export.equations.extended_system import (
     SignalMap,
     StateLimit,
 )
-from islands.export.equations.program_system import drop_force, read_system, refuse
-from islands.export.equations.sampled_core import read_core, read_output_system
+from islands.export.equations.sampled_core import (
+    drop_force,
+    read_core,
+    read_output_system,
+    read_system,
+    refuse,
+)
 from islands.expressions.primitives import EQUATION_FUNCTIONS, NEG
 from islands.expressions.tree import Apply, Constant, Expression, Primitive, Symbol, substitute
 from islands.records.channel_names import TEMPERATURES, parse_channel_name

@@ -60,7 +60,7 @@ gain_between, band_limit : str
     pointer, rates : str, mapping
         Functions that differentiate or delay a signal by name, and the text before them.
     operators : mapping
-        Operators of maps that are functions; see `islands.effects.interface.map_equation.OPERATORS`.
+        Operators of maps that are functions; see `islands.effects.interface.effect.OPERATORS`.
     definitions : mapping
         Functions of expressions that the language does not have.
     """

@@ -18,7 +18,7 @@ from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel, coupled_signals
-from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.checkpoints import replace_file
 from islands.persistence.ensembles import (
     bands_document,
     bands_from_document,

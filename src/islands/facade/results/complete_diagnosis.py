@@ -16,7 +16,7 @@ from islands.errors import ModelError, lookup
 from islands.facade.results.notebook_html import render_sentences
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.parallel import ParallelMap
-from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.checkpoints import replace_file
 from islands.progress import Steps
 from islands.records.writer import input_csv
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document

@@ -23,9 +23,9 @@ from islands.models.sympy_expression import to_sympy
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
 from islands.report.text.facts import BEFORE_REFIT, is_refitted
+from islands.simulation.input_response import StepResponse, step_response
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
-from islands.simulation.step_response import StepResponse, step_response
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks

@@ -13,8 +13,12 @@ from islands.expressions.tree import Primitive
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.persistence.ensembles import bands_from_document, ensemble_from_document
-from islands.persistence.result_models import check_single_output, read_shooting_interval
-from islands.persistence.saved_documents import find_recommended, read_listed_model
+from islands.persistence.saved_documents import (
+    check_single_output,
+    find_recommended,
+    read_listed_model,
+    read_shooting_interval,
+)
 from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Exclusion, Recommendation
 

@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.inference.finding import Finding, Value
-from islands.effects.interface.effect import Effect, ForceLaw, Formula, Site
-from islands.effects.interface.formula import FormulaQuantity
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, FormulaQuantity, Site
 from islands.effects.time_variation import GAIN_EFFECTS
-from islands.expressions.equation_printing import SIMULATION, EquationMathmlPrinter, EquationTextPrinter
 from islands.expressions.parsing import parse_formula
 from islands.expressions.primitives import ADD, DIV, MUL, NEG, SUB
+from islands.expressions.printing import SIMULATION, EquationMathmlPrinter, EquationTextPrinter
 from islands.expressions.tree import (
     RATE,
     Apply,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
-from islands.effects import model_form
+from islands.effects import catalogue
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
 from islands.records.signal_ranges import measure_ranges
@@ -36,13 +36,13 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
     shape = {
         parameter.name: float(value)
         for effect, part in parts
-        if effect.name == model_form.CORE_SHAPE
+        if effect.name == catalogue.CORE_SHAPE
         for parameter, value in zip(simulation.parameters[part], values[part], strict=True)
     }
     found = [
         make_effect_spec(effect, simulation.parameters[part], values[part])
         for effect, part in parts
-        if effect.site != Site.PARAMETER and effect.name != model_form.CORE_SHAPE
+        if effect.site != Site.PARAMETER and effect.name != catalogue.CORE_SHAPE
     ]
     signals = (record.input_names, record.output_name)
     spec = make_extended_spec(

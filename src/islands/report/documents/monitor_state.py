@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from islands.diagnosis.monitoring.record_follower import MonitoredRecord, MonitorState
 from islands.errors import SettingsError
-from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.checkpoints import replace_file
 from islands.simulators.specification.table import LocalSpec
 
 SCHEMA = "islands.monitor-state/1"

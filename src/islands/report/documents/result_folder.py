@@ -23,7 +23,7 @@ from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
-from islands.persistence.checkpoints.writing import replace_file
+from islands.persistence.checkpoints import replace_file
 from islands.persistence.ensembles import bands_document, ensemble_document
 from islands.persistence.models import model_json, terms_document, write_model
 from islands.progress import Steps

@@ -15,7 +15,7 @@ from islands.models.protocol import DynamicModel
 from islands.records.channel_names import parse_unit
 from islands.records.dataset import Dataset
 from islands.report.figures.style import MEASURED, SIMULATED, blank, finish, house_style, label
-from islands.simulation.step_response import StepResponse, step_response
+from islands.simulation.input_response import StepResponse, step_response
 
 #: Points of a characteristic; the equilibria of models with functions such as roots are searched.
 POINTS = 25

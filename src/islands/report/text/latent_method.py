@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from islands.estimation.latent_models import ORDERS
-from islands.evolution.latent.variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
+from islands.evolution.latent_variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
 from islands.evolution.settings import LATENT
 from islands.models.latent import STRUCTURE_SUMMARIES
 

@@ -1,4 +1,10 @@
-"""Store of machine code in the cache folder, from which later processes load it in two milliseconds."""
+"""Machine code of a program: what the kernel interprets, with states and intermediate results in registers.
+
+An interpreted instruction waits for the result of the one before in memory. Machine code needs a quarter of
+the time, but a compilation takes 50 ms, so that programs are compiled if they run often, and stored. Machine
+code executes the same operations in the same order without contraction: every bit is that of the interpreter.
+Programs that call force laws, or functions of the C library other than the exponential, remain interpreted.
+"""
 
 import ctypes
 from collections import OrderedDict

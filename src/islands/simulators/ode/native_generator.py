@@ -1,4 +1,4 @@
-"""Generator of machine code for rows: values of all lanes, as LLVM vectors."""
+"""Generator of the machine code of a program: a loop over the samples whose rows are values."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

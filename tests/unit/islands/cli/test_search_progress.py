@@ -11,8 +11,7 @@ from islands.cli import progress_display
 from islands.cli import search_progress as showing
 from islands.cli.search_progress import SearchDisplay
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.history import HistoryPoint
-from islands.evolution.search_state import SearchState
+from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.evolution.settings import Settings
 
 

@@ -6,8 +6,14 @@ from scipy.signal import cont2discrete, lfilter
 
 import islands
 from islands.effects.interface.context import SimulationContext
-from islands.effects.sweep import SWEPT_DISTURBANCE, SWEPT_INTERFERENCE
-from islands.effects.sweep_search import compute_response, find_sweep, measure_line, respond
+from islands.effects.sweep import (
+    SWEPT_DISTURBANCE,
+    SWEPT_INTERFERENCE,
+    compute_response,
+    find_sweep,
+    measure_line,
+    respond,
+)
 from lab.diagnosis.trial import Trial, run_trial
 
 DT, SAMPLES = 0.005, 2000

@@ -7,15 +7,14 @@ import pytest
 
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
-from islands.evolution.err_targets import ERR_TARGETS
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.presets import PRESETS
-from islands.evolution.settings import Settings
+from islands.evolution.settings import ERR_TARGETS, Settings
 from islands.expressions.parsing import parse
 from islands.expressions.tree import height
 from islands.kernels.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
-from islands.program.regressor_matrix import regressor_matrix
+from islands.program import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import multiple_shooting

@@ -9,9 +9,8 @@ from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.evolution.gene_structure import with_phi
 from islands.evolution.individual import make_regressor
-from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.settings import Settings
+from islands.evolution.settings import ISLAND_PROFILES, Settings
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, height, walk

@@ -3,7 +3,11 @@
 import pytest
 
 from islands.errors import SettingsError
-from islands.evolution.settings import Settings
+from islands.evolution.settings import FITNESS_MODES, FITNESSES, Settings
+from islands.validation.assessment import MODES
+
+#: Samples between two starts of each kind of simulation, if those of a shooting interval are 70.
+INTERVALS = {"one_step_ahead": 1, "multiple_shooting": 70, "free_run": None}
 
 
 @pytest.mark.parametrize(
@@ -132,3 +136,10 @@ def test_maximum_lag_is_that_of_a_leaf_under_back_shifts(changes, maximum_lag):
 )
 def test_elite_is_a_fraction_of_the_population_and_never_empty(population, elite, elites):
     assert Settings(population=population, elite=elite).elites == elites
+
+
+def test_fitness_simulates_as_the_assessment_of_its_mode() -> None:
+    assert FITNESS_MODES.keys() == FITNESSES.keys()
+    assert INTERVALS.keys() == set(MODES)
+    for name, interval in FITNESSES.items():
+        assert interval(70) == INTERVALS[FITNESS_MODES[name]], name

@@ -10,8 +10,7 @@ from islands.expressions.tree import Constant, Lagged
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK
 from islands.models.regressor import regressor
-from islands.program.regressor_matrix import arrange_rows
-from islands.program.term_pool import link
+from islands.program import arrange_rows, link
 
 TERMS = [
     "y(k-1)",

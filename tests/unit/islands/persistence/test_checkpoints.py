@@ -20,12 +20,12 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Apply, Constant
 from islands.expressions.user_primitive import primitive
 from islands.models.narx import canonical_order
+from islands.persistence import checkpoints
 from islands.persistence.checkpoints import (
     HALL_SCHEMA,
     SCHEMA,
     checkpoint_text,
     compressed_checkpoint,
-    json_reader,
     read_archipelago,
     read_checkpoint,
     write_checkpoint,
@@ -104,7 +104,7 @@ def test_an_archipelago_is_read_back_exactly(path):
 @pytest.mark.parametrize("size", [1, 7, 1 << 20])
 @pytest.mark.parametrize("indent", [None, 1])
 def test_a_checkpoint_is_read_in_pieces_of_any_size(document, path, monkeypatch, size, indent):
-    monkeypatch.setattr(json_reader, "_PIECE", size)
+    monkeypatch.setattr(checkpoints, "_PIECE", size)
     path.write_text(json.dumps({"number": 10**30, **document}, indent=indent))
     assert read_checkpoint(path) == (archipelago(), ABOUT)
     for damage in ("]", ",", "{}", '"'):
@@ -114,7 +114,7 @@ def test_a_checkpoint_is_read_in_pieces_of_any_size(document, path, monkeypatch,
 
 
 def test_islands_are_read_one_by_one(monkeypatch):
-    monkeypatch.setattr(json_reader, "_PIECE", 1)
+    monkeypatch.setattr(checkpoints, "_PIECE", 1)
     stream, places = io.StringIO(checkpoint_text(empty_archipelago(20, 5), {})), []
 
     def keep(islands):

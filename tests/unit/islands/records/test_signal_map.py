@@ -17,8 +17,8 @@ from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_inputs
 from islands.records.preprocessing import preprocess
 from islands.records.signal_map import map_signals, match_rate
+from islands.simulation.input_response import step_response
 from islands.simulation.predictors import free_run
-from islands.simulation.step_response import step_response
 
 STEPS = (
     {"detrend": "constant"},

@@ -8,7 +8,7 @@ import pytest
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.calibration.target import Target
-from islands.effects.model_form import CORE_SHAPE
+from islands.effects.catalogue import CORE_SHAPE
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.persistence.models import model_from_json

@@ -11,11 +11,10 @@ import pytest
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.history import HistoryPoint
 from islands.evolution.individual import AnyIndividual, Individual
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
-from islands.evolution.search_state import SearchState
+from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, canonical_order

@@ -6,8 +6,7 @@ from dataclasses import replace
 import pytest
 
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.engine import SerialEngine
-from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
+from islands.evolution.engine import IslandEpoch, SerialEngine, run_epoch, select_migrants
 from islands.evolution.individual import Individual
 from islands.evolution.problem import make_problem
 from islands_service.runtime.epoch_scheduler import EpochTask, schedule_islands

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.epoch import IslandEpoch
-from islands.evolution.migration.topology import parse_topology
+from islands.evolution.engine import IslandEpoch
+from islands.evolution.migration import parse_topology
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 from islands_service.runtime.regions import REGION_SIZE, count_regions
 from support.epoch_runs import (

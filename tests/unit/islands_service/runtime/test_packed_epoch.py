@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.epoch import IslandEpoch
+from islands.evolution.engine import IslandEpoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.island import StepInfo

@@ -29,7 +29,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.kernels.lagrange import interpolate_at
 from islands.records.dataset import Dataset

@@ -9,7 +9,7 @@ import pytest
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError
 from islands.export.extension import export_extended
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.persistence.models import model_json
 from islands.records.input_lead import advance_all_inputs
 from islands.simulation.predictors import free_run

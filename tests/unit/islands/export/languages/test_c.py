@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from lab.speed.compiled_c import compile_model
-from support.exported_programs import FLAGS, needs_compiler, pointer, run_c
+from support.block_cases import OF_STATES, start_from_record
+from support.exported_programs import FLAGS, build_s_function, needs_compiler, pointer, run_c
 from support.levels import nightly_but
 from support.programs import (
     CASES,
@@ -184,3 +186,20 @@ def test_a_primitive_with_an_invalid_identifier_is_refused(name, kind):
     known = PRIMITIVES | {name: primitive(name, saturation, c="return a;", matlab="r = a;")}
     with pytest.raises(ModelError, match="name it with at most 60 of the characters A-Z, a-z, 0-9 and _"):
         export(model({f"{name}(u(k-1))": 1.0}, primitives=known), kind)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("count", "is_double"), [(3, True), (5, True), (4, False)])
+def test_a_parameter_of_another_size_or_class_is_refused(count, is_double, tmp_path):
+    simulate = build_s_function(OF_STATES["published 12"], tmp_path)
+    run, _ = start_from_record("published 12")
+    with pytest.raises(AssertionError, match=r"has to be \[\] or a vector of 4 samples of class double"):
+        simulate(replace(run, past=np.zeros(count)), is_double)
+
+
+def test_the_file_lists_ports_and_past_samples():
+    text = export(OF_STATES["several inputs"], "s-function")
+    assert text.isascii()
+    assert max(map(len, text.splitlines())) <= 112
+    assert "Input ports: u1, u2, u3." in text
+    assert "y(k-1), u1(k-1), u2(k-1), u3(k-1), u3(k-2)" in text

@@ -10,6 +10,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
+from support.block_cases import OF_STATES
 from support.exported_programs import needs_octave, octave, run_matlab
 from support.levels import nightly_but
 from support.programs import CASES, at_the_edges, model, record, record_of
@@ -128,3 +129,13 @@ def test_a_user_defined_primitive_runs_with_its_body(tmp_path):
         programs.append((model(terms, primitives=PRIMITIVES | OWN), record()))
     for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
         np.testing.assert_allclose(theirs[2:], free_run(exported, data).y[2:], rtol=1e-12)
+
+
+def test_the_class_declares_what_simulink_asks_for():
+    text = export(OF_STATES["at once"], "matlab-system")
+    assert text.isascii()
+    assert text.startswith("classdef narx_system < matlab.System\n% NARX_SYSTEM")
+    assert "varargout = {true, false};" in text
+    assert "'SampleTime', 0.1);" in text
+    assert "size = [1 3];" in text
+    assert "%   y(k-1), u2(k-1), u2(k-2)" in text

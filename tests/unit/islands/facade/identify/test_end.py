@@ -6,9 +6,8 @@ from math import inf, nextafter
 import pytest
 
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.history import HistoryPoint
 from islands.evolution.presets import resolve_settings
-from islands.evolution.search_state import SearchState, stop_reason
+from islands.evolution.search_state import HistoryPoint, SearchState, stop_reason
 from islands.progress import StoppedError
 from support.identifications import BUDGET, RecordingEngine, identify, record_states
 

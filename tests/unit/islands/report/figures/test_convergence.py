@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from islands.evolution.history import HistoryPoint
+from islands.evolution.search_state import HistoryPoint
 from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
 
 

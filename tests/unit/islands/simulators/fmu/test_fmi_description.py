@@ -8,7 +8,7 @@ import pytest
 
 from islands.errors import ModelError, SettingsError
 from islands.export import write_export
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.simulators.fmu.fmi_description import read_description
 from islands.systems.published_models import PUBLISHED
 from support.oscillator_fmus import write_oscillator

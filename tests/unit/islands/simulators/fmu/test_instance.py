@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.expressions.tree import FMU, Apply, Symbol
 from islands.simulators.fmu.fmi_description import FmiInterface, read_description
 from islands.simulators.fmu.instance import FmuInstance, FmuRun, load_fmu

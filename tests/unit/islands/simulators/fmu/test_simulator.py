@@ -17,7 +17,7 @@ from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.export import write_export
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.models.narx import Model
 from islands.persistence.models import model_from_json
 from islands.records.dataset import Dataset

@@ -21,7 +21,7 @@ from islands.effects.interface.effect import Effect, Site
 from islands.effects.interface.force import ForceLaw
 from islands.errors import ModelError
 from islands.export.closed_form import closed_form
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.context import make_context

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from islands.errors import SettingsError
-from islands.export.fmu.compiler import find_compiler
+from islands.export.fmu import find_compiler
 from islands.simulators.fmu.system import make_fmu_system
 from islands.simulators.specification.code import FmuParameterSpec, FmuSpec
 from islands.simulators.specification.table import parse_spec

@@ -11,8 +11,7 @@ from islands.cli.runs import identify as command
 from islands.cli.runs import timed_engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.history import HistoryPoint
-from islands.evolution.search_state import SearchState
+from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.persistence.checkpoints import read_checkpoint, state_document, write_checkpoint
 from islands.records.writer import write_record
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused

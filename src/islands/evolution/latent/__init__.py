@@ -1,1 +1,0 @@
-"""Evolution of state spaces with static units."""

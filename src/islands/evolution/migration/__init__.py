@@ -1,1 +1,0 @@
-"""Migration between islands: topology, policies, schedule. Read `topology` first."""

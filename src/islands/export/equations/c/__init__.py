@@ -1,1 +1,0 @@
-"""Programs of extended simulations in C99."""

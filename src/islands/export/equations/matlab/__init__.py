@@ -1,1 +1,0 @@
-"""Programs of extended simulations in MATLAB, which also run in Octave."""

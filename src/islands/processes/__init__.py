@@ -1,1 +1,0 @@
-"""Processes: their threads and garbage collection, pools of them, signals that do not reach them."""

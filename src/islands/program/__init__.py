@@ -1,1 +1,0 @@
-"""Translation of expressions to the flat programs that the kernels execute. Read `term_pool` first."""
