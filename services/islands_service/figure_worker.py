@@ -49,9 +49,9 @@ from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.blobs import BlobNotFoundError, Blobs, DataFolderUnavailableError
+from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import StorageFullError, StoreError
-from islands_service.store.object_store import ObjectStoreError
 from islands_service.store.results import StoredModel
 
 #: Bytes of address space for the libraries and the figures, in addition to the records.

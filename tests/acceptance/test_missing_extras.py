@@ -23,8 +23,8 @@ from islands.facade.engine_choice import open_engine
 from islands.simulators.fmu.fmi_description import import_fmpy
 from islands_api.web.auth import make_verifier
 from islands_service.settings import ServiceSettings
+from islands_service.store.buckets import ObjectStore
 from islands_service.store.dialect import make_engine
-from islands_service.store.object_store import ObjectStore
 from islands_service.telemetry import Traces
 from support.repository import ROOT
 

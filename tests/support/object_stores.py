@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
-from islands_service.store.object_store import ObjectNotFoundError, ObjectStoreError
+from islands_service.store.buckets import ObjectNotFoundError, ObjectStoreError
 
 #: Credentials that the simulated store accepts, like all others.
 ACCESS = {"AWS_ACCESS_KEY_ID": "islands", "AWS_SECRET_ACCESS_KEY": "a secret", "AWS_REGION": "us-east-1"}

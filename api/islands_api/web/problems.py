@@ -28,10 +28,10 @@ from islands_service.domain.monitoring import MonitorNotFoundError
 from islands_service.domain.webhook import WebhookNotFoundError
 from islands_service.outbound.addresses import OutboundFailedError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
+from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, FmuNotFoundError
 from islands_service.store.keys import KeyNotFoundError
-from islands_service.store.object_store import ObjectStoreError
 from islands_service.store.owners import OwnerNotFoundError
 
 MEDIA_TYPE = "application/problem+json"

@@ -34,8 +34,8 @@ from islands_service.outbound.addresses import OutboundFailedError, OutboundRefu
 from islands_service.outbound.checked_client import MAX_URL, is_listed
 from islands_service.settings import ServiceSettings, split_list
 from islands_service.store.blobs import translate_disk_full
+from islands_service.store.buckets import ObjectNotFoundError, ObjectStore
 from islands_service.store.datasets import StoredDataset
-from islands_service.store.object_store import ObjectNotFoundError, ObjectStore
 
 #: Number of bytes that are copied at once.
 CHUNK_BYTES = 1 << 20

@@ -41,9 +41,9 @@ from islands_service.logs import OutageLog
 from islands_service.runtime import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import StoreError
-from islands_service.store.object_store import ObjectStoreError
 from islands_service.telemetry import Traces
 
 #: Runs a job of one kind and returns its outcome.

@@ -14,7 +14,7 @@ import structlog
 from islands.errors import SettingsError
 from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import PART, BlobNotFoundError, Blobs, hash_file, translate_folder_errors
-from islands_service.store.object_store import (
+from islands_service.store.buckets import (
     ObjectNotFoundError,
     ObjectStore,
     ObjectStoreError,

@@ -37,8 +37,8 @@ from islands_service.domain.job import (
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.confined_process import REQUESTS
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
+from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.database import StorageFullError, StoreUnavailableError
-from islands_service.store.object_store import ObjectStoreError
 from islands_service.store.results import StoredModel
 
 log = structlog.get_logger()

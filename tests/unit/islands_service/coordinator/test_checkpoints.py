@@ -20,8 +20,8 @@ from islands_service.domain.job import ISLANDS_VERSION, Job, Lease, LeaseLostErr
 from islands_service.runtime import ClusterError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.database import CommitUnknownError, StoreUnavailableError
-from islands_service.store.object_store import ObjectStoreError
 from islands_service.store.tables import jobs
 from support.job_runs import make_run
 from support.stores import ALICE

@@ -22,8 +22,8 @@ from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import EXTENDED, Job, JobState
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
+from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
-from islands_service.store.object_store import ObjectStoreError
 from support.command_line import write_offset
 from support.diagnosis_jobs import claim, run_job, submit_diagnosis
 from support.job_runs import make_run

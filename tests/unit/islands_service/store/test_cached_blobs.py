@@ -10,11 +10,11 @@ from islands.errors import SettingsError
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import cached_blobs
 from islands_service.store.blobs import BlobNotFoundError
-from islands_service.store.cached_blobs import CachedBlobs, open_blobs
-from islands_service.store.object_store import (
+from islands_service.store.buckets import (
     ObjectStoreError,
     ObjectStoreRefusedError,
 )
+from islands_service.store.cached_blobs import CachedBlobs, open_blobs
 from support.object_stores import MemoryObjects
 
 LIMIT = 1000

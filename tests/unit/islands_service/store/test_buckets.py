@@ -7,15 +7,15 @@ from time import monotonic, time
 
 import pytest
 
-from islands_service.store import object_store
+from islands_service.store import buckets
 from islands_service.store.blobs import BlobNotFoundError
-from islands_service.store.cached_blobs import CachedBlobs
-from islands_service.store.object_store import (
+from islands_service.store.buckets import (
     ObjectNotFoundError,
     ObjectStore,
     ObjectStoreError,
     ObjectStoreRefusedError,
 )
+from islands_service.store.cached_blobs import CachedBlobs
 from support.object_stores import (
     ACCESS,
     CuttingProxy,
@@ -39,7 +39,7 @@ def endpoint():
 
 @pytest.fixture(autouse=True)
 def short_pauses(monkeypatch):
-    monkeypatch.setattr(object_store, "RETRY_PAUSES", (0.01, 0.02))
+    monkeypatch.setattr(buckets, "RETRY_PAUSES", (0.01, 0.02))
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_objects_are_stored_listed_renamed_and_deleted(kind, endpoint, file, tmp
 
 
 def test_large_objects_are_transferred_in_parts(endpoint, tmp_path, monkeypatch):
-    monkeypatch.setattr(object_store, "_PART_BYTES", 5 * 2**20)
+    monkeypatch.setattr(buckets, "_PART_BYTES", 5 * 2**20)
     blobs = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9)
     data = os.urandom(12 * 2**20)
     blob = blobs.write(data)
@@ -146,7 +146,7 @@ def test_a_store_that_is_absent_at_the_start_and_returns(proxy, tmp_path):
 
 
 def test_attempts_end_after_a_while(proxy, file, monkeypatch):
-    monkeypatch.setattr(object_store, "RETRY_SECONDS", -1.0)
+    monkeypatch.setattr(buckets, "RETRY_SECONDS", -1.0)
     proxy.refuse = True
     seen = []
     objects = ObjectStore(URL)
