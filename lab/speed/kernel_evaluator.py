@@ -23,7 +23,8 @@ from islands.kernels.pair_table import clear, pair_table
 from islands.kernels.population import PopulationContext, SelectedTerms, empty_results, empty_terms, evaluate
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import COMPLETE, Layout, simulate
-from islands.program import link, select_rows
+from islands.program.regressor_matrix import select_rows
+from islands.program.term_pool import link
 from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound

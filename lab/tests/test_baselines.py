@@ -8,7 +8,7 @@ from islands.estimation.structure_selection.froe import froe
 from islands.export.fmu import find_compiler
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model
-from islands.program import gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import multiple_shooting
 from lab.speed import compiled_c, plain_numpy

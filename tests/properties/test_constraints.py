@@ -15,7 +15,7 @@ from islands.expressions.tree import Lagged
 from islands.models.clusters import OUTPUT_AT_REST, steady_state
 from islands.models.narx import make_model
 from islands.models.regressor import regressor
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run

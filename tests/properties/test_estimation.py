@@ -20,7 +20,7 @@ from islands.estimation.least_squares import least_squares
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.regressor import regressor
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from support.regressions import problem, seeds, squares
@@ -336,7 +336,7 @@ from islands.estimation.least_squares import factorise, least_squares
 from islands.expressions.tree import (Lagged)
 from islands.models.regressor import regressor
 from islands.expressions.parsing import parse
-from islands.program import gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 
 texts = ["y(k-1)", "y(k-2)", "u(k-1)", "u(k-1)*y(k-1)", "u(k-2)^3", "sign(u(k-1) - u(k-2))"]
 terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]

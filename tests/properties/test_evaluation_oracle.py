@@ -15,7 +15,7 @@ from islands.evolution.settings import FITNESSES, Settings
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting

@@ -17,7 +17,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.kernels import err_selection
 from islands.models.regressor import regressor
-from islands.program import gram_matrix
+from islands.program.regressor_matrix import gram_matrix
 from islands.records.dataset import Dataset
 from support.regressions import problem, seeds, squares
 

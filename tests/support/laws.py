@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 

@@ -13,7 +13,7 @@ from islands.estimation.parameter_constraints import constraint
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import Regressor
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 

@@ -15,7 +15,7 @@ from islands.estimation.refinement import refine
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, require_narx
 from islands.models.protocol import DynamicModel
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 

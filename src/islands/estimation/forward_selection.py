@@ -17,7 +17,7 @@ from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.froe import froe
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor
-from islands.program import gram_matrix
+from islands.program.regressor_matrix import gram_matrix
 from islands.records.dataset import Dataset
 from islands.rounding import ROUNDING
 from islands.simulation.outcome import EvaluationOutcome

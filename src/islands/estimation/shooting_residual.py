@@ -7,7 +7,7 @@ from islands.estimation.damped_least_squares import Residual, approximate_jacobi
 from islands.kernels.simulate import DIVERGED, Layout, simulate
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
-from islands.program import link
+from islands.program.term_pool import link
 from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.dataset import Dataset
 from islands.simulation.blocks import make_simulator

@@ -24,7 +24,7 @@ from islands.expressions.tree import Lagged
 from islands.kernels import population as kernel
 from islands.kernels.breeding import UNUSED, Individuals
 from islands.kernels.pair_table import PLACE_BYTES, clear, complete_pairs, pair_table
-from islands.program import select_rows
+from islands.program.regressor_matrix import select_rows
 from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status

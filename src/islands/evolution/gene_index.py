@@ -16,7 +16,7 @@ from islands.kernels.gene_table import NO_ROOM, UNKNOWN, empty_table, number_cod
 from islands.kernels.parameter_reduction import Groups
 from islands.kernels.population import SelectedTerms
 from islands.models.regressor import CanonicalForms, Regressor
-from islands.program import Term, TermPool
+from islands.program.term_pool import Term, TermPool
 
 #: Approximate size of a gene in the index, in bytes.
 _GENE_BYTES = 700

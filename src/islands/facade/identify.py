@@ -47,7 +47,7 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.candidate_library import full_set
-from islands.program import row_address
+from islands.program.primitive_functions import row_address
 from islands.progress import (
     ProgressCallback,
     Steps,

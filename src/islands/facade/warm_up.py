@@ -37,7 +37,7 @@ from islands.kernels.population import (
 )
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
-from islands.program import row_address
+from islands.program.primitive_functions import row_address
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run

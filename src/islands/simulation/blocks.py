@@ -16,7 +16,7 @@ from islands.models.block import Block
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
-from islands.program import link
+from islands.program.term_pool import link
 from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.dataset import Dataset
 from islands.records.signal_map import map_signals

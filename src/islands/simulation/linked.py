@@ -10,7 +10,7 @@ from islands.errors import RecordError
 from islands.kernels.interpreter import Program
 from islands.kernels.simulate_block import LANES, MANY_LANES, simulate_block
 from islands.models.regressor import Regressor
-from islands.program import link
+from islands.program.term_pool import link
 from islands.simulation.predictors import BOUND, divergence_bound_of_range
 
 

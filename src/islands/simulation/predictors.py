@@ -14,7 +14,7 @@ from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
-from islands.program import link
+from islands.program.term_pool import link
 from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.dataset import Dataset
 from islands.records.signal_map import map_coupled_signals, map_signals

@@ -10,7 +10,7 @@ from islands.expressions.primitives import MUL
 from islands.expressions.tree import Apply, Constant, Expression
 from islands.kernels.sensitivities import WIDTHS, Slopes, SparseDirections, compute_sensitivities
 from islands.models.regressor import Regressor
-from islands.program import link
+from islands.program.term_pool import link
 from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 

@@ -14,7 +14,7 @@ from islands.evolution.settings import ERR_TARGETS, Settings
 from islands.expressions.parsing import parse
 from islands.expressions.tree import height
 from islands.kernels.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import Status
 from islands.simulation.predictors import multiple_shooting

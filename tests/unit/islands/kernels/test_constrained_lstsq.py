@@ -25,7 +25,8 @@ from islands.kernels.constrained_lstsq import (
 )
 from islands.kernels.parameter_reduction import expand
 from islands.models.regressor import regressor
-from islands.program import arrange_rows, gram_matrix, link, regressor_matrix, select_rows
+from islands.program.regressor_matrix import arrange_rows, gram_matrix, regressor_matrix, select_rows
+from islands.program.term_pool import link
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import OK
 

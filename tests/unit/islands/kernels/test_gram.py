@@ -13,7 +13,8 @@ from islands.kernels.gram import gram, gram_of_residual, inner_products
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
-from islands.program import arrange_rows, link
+from islands.program.regressor_matrix import arrange_rows
+from islands.program.term_pool import link
 from support.oracles import side_by_side
 
 #: The constant is also one on padding rows after the end of a segment, which must not count.

@@ -32,7 +32,8 @@ from islands.kernels.population import (
 from islands.models.clusters import OUTPUT_AT_REST, clusters, steady_state
 from islands.models.narx import Model
 from islands.models.regressor import regressor
-from islands.program import TermPool, gram_matrix, regressor_matrix, select_rows
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
+from islands.program.term_pool import TermPool
 from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound, multiple_shooting

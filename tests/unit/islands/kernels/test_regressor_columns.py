@@ -10,7 +10,8 @@ from islands.expressions.tree import Constant, Lagged
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK
 from islands.models.regressor import regressor
-from islands.program import arrange_rows, link
+from islands.program.regressor_matrix import arrange_rows
+from islands.program.term_pool import link
 
 TERMS = [
     "y(k-1)",

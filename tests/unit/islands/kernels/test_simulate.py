@@ -12,7 +12,7 @@ from islands.expressions.parsing import parse
 from islands.kernels.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
 from islands.models.narx import make_model
-from islands.program import link
+from islands.program.term_pool import link
 from islands.records.dataset import Dataset
 from islands.simulation.layout import layout
 

@@ -33,9 +33,9 @@ from islands.expressions.tree import (Lagged)
 from islands.models.narx import Model
 from islands.expressions.parsing import parse
 from islands.models.regressor import regressor
-from islands.program import gram_matrix, regressor_matrix, select_rows
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.kernels.pair_table import pair_table
-from islands.program import TermPool
+from islands.program.term_pool import TermPool
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound, multiple_shooting
 

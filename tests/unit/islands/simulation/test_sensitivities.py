@@ -5,7 +5,7 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset, join
 from islands.simulation.predictors import multiple_shooting
 from islands.simulation.sensitivities import make_sensitivities

@@ -17,7 +17,7 @@ from islands.estimation.forward_selection import make_selection_problem, select_
 from islands.estimation.structure_selection.certificate import SubsetSearch, combine_certificates
 from islands.expressions.tree import Lagged
 from islands.models.candidate_library import candidates
-from islands.program import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
 from islands.report.text.summary import method_text

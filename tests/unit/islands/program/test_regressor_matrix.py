@@ -1,0 +1,216 @@
+"""The regressor matrix has the value of each expression per row; the Gram matrix its inner products."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from islands.errors import RecordError, SettingsError
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Constant, Lagged
+from islands.expressions.user_primitive import primitive
+from islands.kernels.summation import CHUNK, dot
+from islands.models.regressor import regressor
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
+from islands.records.dataset import Dataset
+from support.oracles import side_by_side
+from support.strategies import INPUTS, nearly, records, regressors, settled_value
+
+
+def of(text, table=PRIMITIVES):
+    return regressor(parse(text, table))[1]
+
+
+def ramp(segments):
+    """Return a record with the sample index as output and a hundred times the index as input."""
+    numbers = np.arange(sum(segments), dtype=float)
+    return Dataset(100.0 * numbers, numbers, 0.1, segments=segments)
+
+
+def noise(samples, segments=(), inputs=1):
+    rng = np.random.default_rng(7)
+    return Dataset(rng.normal(size=(samples, inputs)), rng.normal(size=samples), 0.1, segments=segments)
+
+
+@given(records(longest=30), st.lists(regressors(), min_size=1, max_size=3))
+def test_regressor_matrix_has_the_value_of_each_term_on_every_row(record, terms):
+    warm_up = max(item.maximum_lag for item in terms)
+    spans = [(begin + warm_up, end) for begin, end in record.bounds]
+    samples = [sample for first, end in spans for sample in range(first, end)]
+    assume(samples)
+    channels = np.vstack([record.y, record.u.T])
+    found = regressor_matrix(terms, record, warm_up)
+    assert found.shape == (len(terms), len(samples))
+    for item, column in zip(terms, found.tolist(), strict=True):
+        for sample, number in zip(samples, column, strict=True):
+            expected = settled_value(
+                item.expression,
+                lambda channel, lag, at=sample: float(channels[channel, at - lag]),
+                perturbations=2,
+            )
+            assert expected is None or nearly(number, expected)
+
+
+def test_rows_start_after_the_warm_up_of_every_segment():
+    found = regressor_matrix([of("u(k-2)"), of("y(k-1)"), Lagged(0, 0)], ramp((5, 4)), 3)
+    assert found.tolist() == [[100.0, 200.0, 600.0], [2.0, 3.0, 7.0], [3.0, 4.0, 8.0]]
+
+
+def test_segments_no_longer_than_the_warm_up_have_no_rows():
+    assert regressor_matrix([Lagged(0, 0)], ramp((3, 5, 2, 4)), 3).tolist() == [[6.0, 7.0, 13.0]]
+
+
+def test_row_reads_nothing_of_another_segment():
+    record = noise(60, (20, 40))
+    terms = [of("y(k-1)*u(k-3)"), of("exp(u(k-5))")]
+    spoiled = Dataset(
+        np.vstack([record.u[:20] + 7.0, record.u[20:]]),
+        np.append(record.y[:20] - 7.0, record.y[20:]),
+        0.1,
+        segments=(20, 40),
+    )
+    before, after = (regressor_matrix(terms, each, 5) for each in (record, spoiled))
+    np.testing.assert_array_equal(before[:, 15:], after[:, 15:])
+    assert not np.any(before[:, :15] == after[:, :15])
+
+
+def test_rows_do_not_read_the_present_or_the_future():
+    record, terms = noise(40), [of("y(k-1)*u(k-2)"), of("tanh(u(k-1) - y(k-4))")]
+    later = Dataset(
+        np.append(record.u[:30, 0], record.u[30:, 0] + 9.0),
+        np.append(record.y[:30], record.y[30:] - 9.0),
+        0.1,
+    )
+    before, after = (regressor_matrix(terms, each, 4) for each in (record, later))
+    np.testing.assert_array_equal(before[:, :27], after[:, :27])
+    assert before[0, 27] != after[0, 27]
+
+
+@pytest.mark.parametrize("samples", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 5])
+def test_stretches_of_rows_are_contiguous(samples):
+    record = noise(samples + 2)
+    found = regressor_matrix([of("y(k-1)*u(k-2)"), of("u(k-1) - u(k-2)"), of("3")], record, 2)
+    y, u = record.y, record.u[:, 0]
+    np.testing.assert_array_equal(found, [y[1:-1] * u[:-2], u[1:-1] - u[:-2], np.ones(samples)])
+
+
+def test_terms_may_have_many_factors_and_constants():
+    record = noise(30)
+    found = regressor_matrix([of("y(k-1)^3*u(k-1)^3"), of("abs(2*y(k-1) + 0.5)")], record, 1)
+    y, u = record.y[:-1], record.u[:-1, 0]
+    np.testing.assert_allclose(found, [(y * u) ** 3, 2.0 * np.abs(y + 0.25) / 2.0], rtol=1e-14)
+
+
+def test_user_defined_primitive_equals_its_python_function():
+    def backlash(a, b):
+        return a - math.tanh(b) if a > b else a * b
+
+    table = {**PRIMITIVES, "backlash": primitive("backlash", backlash)}
+    record = noise(300, inputs=2)
+    found = regressor_matrix([of("backlash(u1(k-1), y(k-2))*u2(k-1)", table)], record, 2)
+    expected = [
+        backlash(u, y) * v
+        for u, y, v in zip(
+            record.u[1:-1, 0].tolist(), record.y[:-2].tolist(), record.u[1:-1, 1].tolist(), strict=True
+        )
+    ]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-15)
+
+
+SEGMENTS = ((1000,), (100, 300, 7, 593), (CHUNK + 3, CHUNK + 3, CHUNK + 3), (3 + CHUNK // 2,) * 4)
+
+
+def products(terms, record, warm_up):
+    """Return the inner products of the columns, in the order of 32 padded stretches per segment."""
+    columns = regressor_matrix(terms, record, warm_up)
+    rows = [end - begin - warm_up for begin, end in record.bounds if end - begin > warm_up]
+    filled = side_by_side(columns, rows)
+    return [[dot(one, 0, other, 0, one.size) for other in filled] for one in filled]
+
+
+@pytest.mark.parametrize("segments", SEGMENTS)
+def test_gram_matrix_equals_the_inner_products_bit_for_bit(segments):
+    record = noise(sum(segments), segments, inputs=2)
+    terms = [
+        of("y(k-1)"),
+        of("u1(k-3)*y(k-2)^2"),
+        of("exp(u2(k-1))"),
+        of("1"),
+        of("sign(u1(k-1) - u1(k-2))"),
+        Lagged(0),
+    ]
+    np.testing.assert_array_equal(gram_matrix(terms, record, 3), products(terms, record, 3))
+
+
+@pytest.mark.ci
+@given(records(longest=400), st.lists(regressors(height=2), min_size=1, max_size=3))
+def test_gram_matrix_equals_the_inner_products_for_any_segments(record, terms):
+    warm_up = max(item.maximum_lag for item in terms)
+    assume(max(record.segments) > warm_up)
+    np.testing.assert_array_equal(gram_matrix(terms, record, warm_up), products(terms, record, warm_up))
+
+
+def test_estimation_rows_follow_the_warm_up_of_every_segment():
+    found = select_rows(ramp((3, 5, 2, 4)), 3)
+    assert found.count == 3
+    # A stretch has at most one row: two rows in two lanes, and one; a chunk per segment.
+    assert found.apart.tolist() == [1, 1]
+    assert found.lanes.tolist() == [[2, *[0] * 7], [1, *[0] * 7]]
+    assert found.row[:, 0].tolist() == [0, 2]
+    for begin, sample in zip(found.offset, (6, 13), strict=True):
+        assert begin % 32 == 0
+        y, u = found.signals[:, begin - 3 * 32 : begin + 32 : 32]
+        assert y.tolist() == [sample - 3, sample - 2, sample - 1, sample]
+        assert u.tolist() == [100.0 * k for k in y]
+    assert found.signals[0, found.offset[0] + 1] == 7.0
+
+
+def test_gram_matrix_of_a_ramp_equals_a_hand_calculation():
+    # Rows 1 .. 3: y(k) = 1, 2, 3 and u(k-1) = 0, 100, 200.
+    assert gram_matrix([of("u(k-1)"), Lagged(0, 0)], ramp((4,)), 1).tolist() == [
+        [50000.0, 800.0],
+        [800.0, 14.0],
+    ]
+
+
+@pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
+def test_missing_output_is_refused_with_its_sample(matrix):
+    y = np.arange(10.0)
+    y[[6, 8]] = np.nan
+    with pytest.raises(
+        RecordError, match="x is missing at sample 6: estimation needs every sample, cut the record"
+    ):
+        matrix([of("u(k-1)")], Dataset(np.ones(10), y, 0.1, output_name="x"), 1)
+
+
+@pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
+def test_record_shorter_than_the_warm_up_is_refused_with_both_lengths(matrix):
+    with pytest.raises(
+        RecordError, match="the longest recording has 5 samples and 5 are needed before the first row"
+    ):
+        matrix([of("u(k-5)")], ramp((3, 5)), 5)
+
+
+@pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
+@pytest.mark.parametrize("warm_up", [-1, 0, 4])
+def test_warm_up_shorter_than_the_largest_lag_is_refused(matrix, warm_up):
+    with pytest.raises(SettingsError, match=f"the terms read 5 samples back, the warm-up has {warm_up}"):
+        matrix([of("y(k-1)"), of("exp(u(k-5))")], ramp((20,)), warm_up)
+
+
+@pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
+def test_missing_input_is_refused(matrix):
+    with pytest.raises(RecordError, match=f"the terms read input {INPUTS}, the record has 1"):
+        matrix([of(f"y(k-1)*u{INPUTS}(k-1)")], ramp((20,)), 1)
+
+
+def test_constant_needs_no_warm_up():
+    assert regressor_matrix([Constant(2.5)], ramp((2, 1)), 0).tolist() == [[2.5, 2.5, 2.5]]
+
+
+def test_empty_list_of_terms_gives_no_columns():
+    assert regressor_matrix([], ramp((4,)), 1).shape == (0, 3)
+    assert gram_matrix([], ramp((4,)), 1).shape == (0, 0)

@@ -1,0 +1,188 @@
+"""The pool recognises equal expressions, so that each is computed once."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from islands.expressions.evaluation import value
+from islands.expressions.parsing import parse
+from islands.expressions.primitives import PRIMITIVES
+from islands.expressions.tree import Apply, Constant, Lagged
+from islands.expressions.user_primitive import primitive
+from islands.kernels import codegen
+from islands.kernels.codegen import CONSTANT, LAGGED
+from islands.kernels.interpreter import (
+    CALL,
+    MAX_FACTORS,
+    SIGN,
+)
+from islands.models.regressor import regressor
+from islands.program import term_pool
+from islands.program.primitive_functions import row_address
+from islands.program.term_pool import TermPool, link
+from support.oracles import NUMBERS
+from support.strategies import regressors, signals
+
+several = st.lists(regressors(), min_size=1, max_size=5)
+
+
+def made(text, table=PRIMITIVES):
+    return regressor(parse(text, table))[1]
+
+
+def used_nodes(pool):
+    """Return the nodes of the pool as tuples, without unused ones."""
+    nodes = pool.nodes
+    count = len(pool._indices)
+    columns = (nodes.operation, nodes.first, nodes.second, nodes.address, nodes.value)
+    return list(zip(*(column[:count].tolist() for column in columns), strict=True))
+
+
+def node_values(pool, signal):
+    """Evaluate every node on single values."""
+    called = {row_address(entry): entry for entry in PRIMITIVES.values()}
+    found = []
+    for operation, first, second, address, number in used_nodes(pool):
+        if operation == LAGGED:
+            found.append(signal(first, second))
+        elif operation == CONSTANT:
+            found.append(number)
+        elif operation == CALL:
+            found.append(called[address].scalar(*(found[first], found[second])[: called[address].arity]))
+        else:
+            operands = (found[first],) if operation == SIGN else (found[first], found[second])
+            found.append(NUMBERS[operation](*operands))
+    return found
+
+
+@pytest.mark.ci
+@given(several, signals())
+def test_factors_of_a_term_multiply_to_the_value_of_the_expression(terms, signal):
+    try:
+        expected = [value(item.expression, signal) for item in terms]
+    except ValueError:  # the sine of an infinite value
+        assume(False)
+    pool = TermPool()
+    indices = pool.terms(terms)
+    nodes = node_values(pool, signal)
+    for number, wanted in zip(indices, expected, strict=True):
+        degree = pool.nodes.degree[number]
+        assert 1 <= degree <= MAX_FACTORS
+        found = math.prod(nodes[factor] for factor in pool.nodes.factors[number, :degree])
+        np.testing.assert_array_equal(found, wanted)
+
+
+@given(several)
+def test_equal_expressions_share_a_node_and_operands_precede_readers(terms):
+    pool = TermPool()
+    pool.terms(terms)
+    nodes = used_nodes(pool)
+    assert len(set(nodes)) == len(nodes)
+    for number, (operation, first, second, *_) in enumerate(nodes):
+        if operation >= 0:
+            assert max(first, second) < number
+
+
+@given(several, several)
+def test_known_terms_keep_their_index_and_add_no_node(terms, others):
+    pool = TermPool()
+    indices = pool.terms(terms).tolist()
+    pool.terms(others)
+    size, nodes = len(pool), len(used_nodes(pool))
+    assert pool.terms(terms).tolist() == indices
+    assert (len(pool), len(used_nodes(pool))) == (size, nodes)
+    texts = [item.text for item in terms]
+    assert len(set(indices)) == len(set(texts))
+    assert size == len({item.text for item in (*terms, *others)})
+
+
+@pytest.mark.ci
+@given(several, several)
+def test_program_does_not_depend_on_other_terms_of_the_pool(terms, others):
+    """The nodes have other indices, the program is the same."""
+    pool = TermPool()
+    pool.terms(others)
+    indices = pool.terms(terms)
+    operand_index = np.full(pool.nodes.operation.size, -1, np.int64)
+    for found, expected in zip(
+        codegen.generate_program(pool.nodes, indices, operand_index), link(terms), strict=True
+    ):
+        np.testing.assert_array_equal(found, expected)
+    assert (operand_index == -1).all()
+
+
+@pytest.mark.ci
+def test_pool_grows_and_keeps_its_terms():
+    pool = TermPool()
+    texts = [f"exp({factor}*u(k-{lag})) + y(k-1)" for factor in range(2, 30) for lag in range(1, 40)]
+    indices = pool.terms([made(text) for text in texts]).tolist()
+    assert indices == list(range(len(texts)))
+    assert len(pool) == len(texts) > 1024
+    assert len(used_nodes(pool)) > 4 * 256
+    values = node_values(pool, lambda channel, lag: 1.0 / lag if channel else 2.0)
+    for number, text in ((0, texts[0]), (500, texts[500]), (len(texts) - 1, texts[-1])):
+        expected = value(made(text).expression, lambda channel, lag: 1.0 / lag if channel else 2.0)
+        assert values[pool.nodes.factors[number, 0]] == expected
+
+
+def test_deep_expression_and_many_nodes_give_a_program():
+    """The expression is deeper than the initial stack, and has more nodes than the initial array."""
+    text = "u(k-1)"
+    for lag in range(1, 60):
+        text = f"tanh({text} - y(k-{lag}))"
+    assert len(link([made(text)]).code) == 2 * 59
+    wide = link([made(" + ".join(f"abs(u(k-{lag}) - 1)" for lag in range(1, 200)))])
+    assert len(wide.code) == 199 + 199 + 198
+
+
+def test_expression_and_its_regressor_have_the_same_index():
+    pool, item = TermPool(), made("y(k-1)*exp(u(k-1))")
+    assert pool.term(item) == pool.term(item.expression) == 0
+    assert pool.term(Lagged(0, 0)) == 1
+    assert pool.term(Constant(2.5)) == 2
+    assert pool.terms([]).shape == (0,)
+
+
+def test_functions_with_one_name_in_two_pools_keep_their_addresses():
+    one, other = primitive("own", lambda a: a + 1.0), primitive("own", lambda a: a + 2.0)
+    found = [
+        link([made("own(u(k-1))", {**PRIMITIVES, "own": entry})]).addresses.tolist() for entry in (one, other)
+    ]
+    assert found == [[row_address(one)], [row_address(other)]]
+    assert found[0] != found[1]
+
+
+@given(several, several)
+def test_program_does_not_depend_on_earlier_programs(terms, others):
+    """Programs share a pool of recent terms, which has other indices than a new pool."""
+    link(others)
+    pool = TermPool()
+    indices = pool.terms(terms)
+    expected = codegen.generate_program(pool.nodes, indices, np.full(pool.nodes.operation.size, -1, np.int64))
+    for again in (link(terms), link(terms)):
+        for found, column in zip(again, expected, strict=True):
+            np.testing.assert_array_equal(found, column)
+
+
+def test_function_with_the_name_of_a_built_in_one_keeps_its_address():
+    item, own = made("tanh(u(k-1))"), replace(primitive("mine", lambda a: a + 1.0), name="tanh")
+    link([item])
+    assert link([Apply(own, (Lagged(1, 1),))]).addresses.tolist() == [row_address(own)]
+    assert link([item]).addresses.tolist() == [row_address(PRIMITIVES["tanh"])]
+
+
+def test_zeros_of_both_signs_keep_their_sign():
+    for zero in (0.0, -0.0, 0.0):
+        (found,) = link([Apply(PRIMITIVES["max"], (Lagged(1, 1), Constant(zero)))]).constants
+        assert math.copysign(1.0, found) == math.copysign(1.0, zero)
+
+
+def test_pool_of_recent_terms_is_bounded():
+    for lag in range(1, 3 * term_pool._MOST_NODES):
+        link([Lagged(1, lag)])
+    assert len(term_pool._RECENT.pool) <= term_pool._MOST_NODES + 1
+    assert term_pool._RECENT.pool.nodes.operation.size <= 2 * term_pool._MOST_NODES
