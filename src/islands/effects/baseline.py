@@ -8,8 +8,6 @@ from islands.effects.interface.effect import (
     Formula,
     FormulaQuantity,
     MapEquation,
-    Signal,
-    SimulationContext,
     Site,
 )
 from islands.effects.time_variation import (
@@ -20,28 +18,15 @@ from islands.effects.time_variation import (
     write_step,
 )
 
-
-def _offset_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return y + values[0]
-
-
-def _offset_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
-
-
-def _offset_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * context.output_peak,),)
-
-
 OFFSET = Effect(
     name="offset",
     title="offset of the output",
     summary="Zero offset of the output: y + c",
     family="baseline",
     site=Site.OUTPUT,
-    parameters=_offset_parameters,
-    starting_points=_offset_starting_points,
-    form=_offset_form,
+    parameters=lambda context: (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),),
+    starting_points=lambda context, _: ((0.01 * context.output_peak,),),
+    form=lambda y, values, _: y + values[0],
     equation=lambda _: MapEquation("x + n0"),
     formula=Formula("x + c"),
     source="Doebelin, Measurement Systems, section 3",
@@ -58,19 +43,15 @@ def input_offset(state: str, unit: str = "", size: float = 0.0) -> Effect:
     """
     label = f"{INPUT_OFFSET.name}:{state}"
 
-    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, unit or context.input_unit, 0.0, 0.01 * (size or context.input_peak)),)
-
-    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return ((0.02 * (size or context.input_peak),),)
-
     return Effect(
         name=label,
         summary=INPUT_OFFSET.summary,
         family="baseline",
         site=Site.CORE,
-        parameters=parameters,
-        starting_points=starting_points,
+        parameters=lambda context: (
+            Parameter(label, unit or context.input_unit, 0.0, 0.01 * (size or context.input_peak)),
+        ),
+        starting_points=lambda context, _: ((0.02 * (size or context.input_peak),),),
         form=None,
         formula=Formula(symbols=(f"offset_{state}",)),
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
@@ -88,29 +69,15 @@ INPUT_OFFSET = EffectTemplate(
 )
 
 
-def _linear_drift_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * context.time / context.duration
-
-
-def _linear_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
-
-
-def _linear_drift_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * context.output_peak,),)
-
-
 LINEAR_DRIFT = Effect(
     name="linear-drift",
     title="linear drift of the output",
     summary="Linear drift of the output: y + c t / T over the record's duration T",
     family="baseline",
     site=Site.OUTPUT,
-    parameters=_linear_drift_parameters,
-    starting_points=_linear_drift_starting_points,
-    form=_linear_drift_form,
+    parameters=lambda context: (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),),
+    starting_points=lambda context, _: ((0.01 * context.output_peak,),),
+    form=lambda y, values, context: y + values[0] * context.time / context.duration,
     equation=lambda context: MapEquation(f"x + n0*t/{context.duration}"),
     formula=Formula(
         "x + c*t/T",
@@ -127,30 +94,20 @@ LINEAR_DRIFT = Effect(
 )
 
 
-def _jump_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * smooth_step(context, values[1])
-
-
-def _jump_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),
-        Parameter("instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
-    )
-
-
-def _jump_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02 * context.output_peak, instant) for instant in candidate_instants(context))
-
-
 JUMP = Effect(
     name="jump",
     title="jump of the output",
     summary="Jump of the output's zero: y + c after an instant",
     family="baseline",
     site=Site.OUTPUT,
-    parameters=_jump_parameters,
-    starting_points=_jump_starting_points,
-    form=_jump_form,
+    parameters=lambda context: (
+        Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),
+        Parameter("instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
+    ),
+    starting_points=lambda context, _: tuple(
+        (0.02 * context.output_peak, instant) for instant in candidate_instants(context)
+    ),
+    form=lambda y, values, context: y + values[0] * smooth_step(context, values[1]),
     equation=lambda context: MapEquation(f"x + n0*{write_step(context, 'n1')}"),
     formula=Formula("x + c*step(t - t0)", symbols=("c", "t0"), note=STEP_NOTE),
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
@@ -162,36 +119,22 @@ JUMP = Effect(
 )
 
 
-def _thermal_drift_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * channel(context, True)
-
-
-def _thermal_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "k",
-            f"{context.output_unit}/{channel_unit(context, True)}",
-            0.0,
-            0.01 * context.output_peak / channel_range(context, True),
-        ),
-    )
-
-
-def _thermal_drift_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.output_peak / channel_range(context, True),),)
-
-
 THERMAL_DRIFT = Effect(
     name="thermal-drift",
     title="thermal drift of the output",
     summary="The output follows a temperature: y + k (T - T(0)), where T is a given channel",
     family="baseline",
     site=Site.OUTPUT,
-    parameters=_thermal_drift_parameters,
-    starting_points=_thermal_drift_starting_points,
-    form=_thermal_drift_form,
+    parameters=lambda context: (
+        Parameter(
+            "k",
+            f"{context.output_unit}/{channel_unit(context, True)}",
+            0.0,
+            0.01 * context.output_peak / channel_range(context, True),
+        ),
+    ),
+    starting_points=lambda context, _: ((0.02 * context.output_peak / channel_range(context, True),),),
+    form=lambda y, values, context: y + values[0] * channel(context, True),
     equation=lambda _: MapEquation("x + n0*z0", (("temperature",),)),
     formula=Formula("x + k*(T - T_0)", names=("T", "T_0"), note=TEMPERATURE_NOTE),
     source="Doebelin, Measurement Systems, section 2",

@@ -58,17 +58,6 @@ def _limit_tau(context: SimulationContext) -> tuple[float, float]:
     return 5 * context.dt, 1.5 * context.fit_end_time
 
 
-def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * _creep(y, [float(np.exp(values[1]))], context)
-
-
-def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter("kappa", "", 0.0, 0.02, *_limit_kappa(context, -0.5, 1.0)),
-        Parameter("log_tau", "ln s", 0.0, 0.3, *np.log(_limit_tau(context))),
-    )
-
-
 def _exponential_creep_starting_points(
     context: SimulationContext, _residual: Signal
 ) -> tuple[tuple[float, ...], ...]:
@@ -82,9 +71,12 @@ EXPONENTIAL_CREEP = Effect(
     summary="Exponential creep of the output: y + kappa times y after a low-pass with time constant tau",
     family="memory",
     site=Site.OUTPUT,
-    parameters=_exponential_creep_parameters,
+    parameters=lambda context: (
+        Parameter("kappa", "", 0.0, 0.02, *_limit_kappa(context, -0.5, 1.0)),
+        Parameter("log_tau", "ln s", 0.0, 0.3, *np.log(_limit_tau(context))),
+    ),
     starting_points=_exponential_creep_starting_points,
-    form=_exponential_creep_form,
+    form=lambda y, values, context: y + values[0] * _creep(y, [float(np.exp(values[1]))], context),
     equation=lambda context: _write_creep(["exp(n1)"], context),
     formula=Formula(
         "x + kappa*(z - z(0))",
@@ -116,29 +108,15 @@ def _resolves_logarithm(context: SimulationContext) -> bool:
     return sum(lower <= tau <= upper for tau in TAUS) >= _MIN_RESOLVED_TAUS
 
 
-def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return y + values[0] * _creep(y, TAUS, context)
-
-
-def _logarithmic_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("kappa", "", 0.0, 0.005, *_limit_kappa(context, -0.3, 0.3)),)
-
-
-def _logarithmic_creep_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.01,),)
-
-
 LOGARITHMIC_CREEP = Effect(
     name="logarithmic-creep",
     title="logarithmic creep",
     summary="Logarithmic creep of the output: y + kappa times a sum of low-passes, two per decade",
     family="memory",
     site=Site.OUTPUT,
-    parameters=_logarithmic_creep_parameters,
-    starting_points=_logarithmic_creep_starting_points,
-    form=_logarithmic_creep_form,
+    parameters=lambda context: (Parameter("kappa", "", 0.0, 0.005, *_limit_kappa(context, -0.3, 0.3)),),
+    starting_points=lambda _context, _residual: ((0.01,),),
+    form=lambda y, values, context: y + values[0] * _creep(y, TAUS, context),
     equation=lambda context: _write_creep(list(map(str, TAUS)), context),
     formula=Formula(
         "x + kappa*f(x)",

@@ -49,31 +49,21 @@ SECOND_INPUT = Effect(
 )
 
 
-def _cross_coupling_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "k",
-            f"{context.output_unit}/{channel_unit(context, False)}",
-            0.0,
-            0.01 * context.output_peak / channel_range(context, False),
-        ),
-    )
-
-
-def _cross_coupling_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.output_peak / channel_range(context, False),),)
-
-
 CROSS_COUPLING = Effect(
     name="cross-coupling",
     title="coupling of a channel into the output",
     summary="Another signal couples into the output: y + k w, where w is a given channel",
     family="disturbance",
     site=Site.OUTPUT,
-    parameters=_cross_coupling_parameters,
-    starting_points=_cross_coupling_starting_points,
+    parameters=lambda context: (
+        Parameter(
+            "k",
+            f"{context.output_unit}/{channel_unit(context, False)}",
+            0.0,
+            0.01 * context.output_peak / channel_range(context, False),
+        ),
+    ),
+    starting_points=lambda context, _: ((0.02 * context.output_peak / channel_range(context, False),),),
     form=_add_channel,
     equation=lambda _: MapEquation("x + n0*z0", (("coupled",),)),
     formula=Formula("x + k*w", names=("w",), note=CHANNEL_NOTE),
@@ -95,16 +85,6 @@ def _make_waves(frequency: float, start: float, dt: float, samples: int) -> tupl
     """Return the cosine and the sine of a frequency over time; most derivatives have it in common."""
     angle = 2 * np.pi * frequency * (start + dt * np.arange(samples, dtype=np.float64))
     return np.cos(angle), np.sin(angle)
-
-
-def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter("cosine", context.output_unit, 0.0, 0.005 * context.output_peak),
-        Parameter("sine", context.output_unit, 0.0, 0.005 * context.output_peak),
-        Parameter(
-            "frequency", "Hz", 0.0, 0.1 / context.fit_end_time, 2.0 / context.fit_end_time, 0.499 / context.dt
-        ),
-    )
 
 
 def _find_input_harmonics(
@@ -145,7 +125,13 @@ PERIODIC_DISTURBANCE = Effect(
     summary="Sinusoidal disturbance of unknown frequency, added to the output",
     family="disturbance",
     site=Site.OUTPUT,
-    parameters=_periodic_disturbance_parameters,
+    parameters=lambda context: (
+        Parameter("cosine", context.output_unit, 0.0, 0.005 * context.output_peak),
+        Parameter("sine", context.output_unit, 0.0, 0.005 * context.output_peak),
+        Parameter(
+            "frequency", "Hz", 0.0, 0.1 / context.fit_end_time, 2.0 / context.fit_end_time, 0.499 / context.dt
+        ),
+    ),
     starting_points=_periodic_disturbance_starting_points,
     form=_periodic_disturbance_form,
     equation=lambda _: MapEquation(f"x + n0*cos({2 * np.pi}*n2*t) + n1*sin({2 * np.pi}*n2*t)"),

@@ -179,9 +179,6 @@ def _make_free_form(
         change = CHANGE * size(context)
         return tuple(Parameter(label, unit(context), 0.0, change, lower) for label in labels(context))
 
-    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return tuple(map(tuple, (START * size(context) * np.eye(len(labels(context)))).tolist()))
-
     return Effect(
         name=name,
         title=title,
@@ -189,7 +186,9 @@ def _make_free_form(
         family=family,
         site=site,
         parameters=parameters,
-        starting_points=starting_points,
+        starting_points=lambda context, _: tuple(
+            map(tuple, (START * size(context) * np.eye(len(labels(context)))).tolist())
+        ),
         form=form,
         source=source,
         equation=equation,

@@ -21,12 +21,6 @@ def _coulomb_friction_parameters(context: SimulationContext) -> tuple[Parameter,
     return (Parameter("F", coordinate.force_unit, 0.0, 0.005 * coordinate.force, coordinate.lower_bound),)
 
 
-def _coulomb_friction_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * context.force_coordinate.force,),)
-
-
 COULOMB_FRICTION = Effect(
     name="coulomb-friction",
     title="dry friction",
@@ -34,7 +28,7 @@ COULOMB_FRICTION = Effect(
     family="memory",
     site=Site.FORCE,
     parameters=_coulomb_friction_parameters,
-    starting_points=_coulomb_friction_starting_points,
+    starting_points=lambda context, _: ((0.01 * context.force_coordinate.force,),),
     form=ForceLaw(
         _coulomb_friction_force,
         constants=_coulomb_friction_constants,
@@ -130,12 +124,6 @@ def _quadratic_drag_parameters(context: SimulationContext) -> tuple[Parameter, .
     return (Parameter("c", unit, 0.0, 0.01 * coordinate.force / coordinate.rate**2, coordinate.lower_bound),)
 
 
-def _quadratic_drag_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate**2,),)
-
-
 QUADRATIC_DRAG = Effect(
     name="quadratic-drag",
     title="quadratic drag",
@@ -143,7 +131,9 @@ QUADRATIC_DRAG = Effect(
     family="shape",
     site=Site.FORCE,
     parameters=_quadratic_drag_parameters,
-    starting_points=_quadratic_drag_starting_points,
+    starting_points=lambda context, _: (
+        (0.02 * context.force_coordinate.force / context.force_coordinate.rate**2,),
+    ),
     form=ForceLaw(_quadratic_drag_force, is_dissipative=True, equation="n0*abs(v)*v"),
     formula=Formula("c*abs(v)*v"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",

@@ -106,16 +106,6 @@ def _backlash_form(u: Signal, values: Signal, _context: SimulationContext) -> Si
     return play_from(u, values[0]) if values[0] > 0.0 else u
 
 
-def _backlash_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter("b", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak),
-    )
-
-
-def _backlash_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * context.input_peak,) for part in _HALF_WIDTHS)
-
-
 #: Formula of a play of an input or of an output.
 _PLAY = Formula("play(x, b)", note="play({x}, {b}) is a play of half width {b}")
 
@@ -125,8 +115,10 @@ BACKLASH = Effect(
     summary="Backlash of the input: a play of half width b",
     family="memory",
     site=Site.INPUT,
-    parameters=_backlash_parameters,
-    starting_points=_backlash_starting_points,
+    parameters=lambda context: (
+        Parameter("b", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak),
+    ),
+    starting_points=lambda context, _: tuple((part * context.input_peak,) for part in _HALF_WIDTHS),
     form=_backlash_form,
     equation=lambda _: MapEquation("z0", (("play", "n0"),)),
     acts_between_samples=True,
@@ -144,12 +136,6 @@ def _sensor_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter
     return (Parameter("b", context.output_unit, 0.0, 0.005 * peak, 0.0, 0.3 * peak),)
 
 
-def _sensor_hysteresis_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * context.output_peak,) for part in _HALF_WIDTHS)
-
-
 SENSOR_HYSTERESIS = Effect(
     name="sensor-hysteresis",
     title="play of the sensor",
@@ -157,7 +143,7 @@ SENSOR_HYSTERESIS = Effect(
     family="memory",
     site=Site.OUTPUT,
     parameters=_sensor_hysteresis_parameters,
-    starting_points=_sensor_hysteresis_starting_points,
+    starting_points=lambda context, _: tuple((part * context.output_peak,) for part in _HALF_WIDTHS),
     form=_backlash_form,
     equation=lambda _: MapEquation("z0", (("play", "n0"),)),
     formula=_PLAY,
@@ -169,24 +155,14 @@ SENSOR_HYSTERESIS = Effect(
 )
 
 
-def _relaxation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),)
-
-
-def _relaxation_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.1,), (1.0,))
-
-
 RELAXATION = Effect(
     name="relaxation",
     title="decay of the hysteresis",
     summary="The hysteretic state decays: - h / tau in h'",
     family="memory",
     site=Site.CORE,
-    parameters=_relaxation_parameters,
-    starting_points=_relaxation_starting_points,
+    parameters=lambda _: (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),),
+    starting_points=lambda _context, _residual: ((0.1,), (1.0,)),
     form=None,
     formula=Formula(symbols=("r",)),
     source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
@@ -196,8 +172,13 @@ RELAXATION = Effect(
 )
 
 
-def _rate_dependent_loop_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
+RATE_DEPENDENT_LOOP = Effect(
+    name="rate-dependent-loop",
+    title="hysteresis that depends on the rate",
+    summary="The shape of the loop depends on the rate: beta and gamma times (1 + k |u'|)",
+    family="memory",
+    site=Site.CORE,
+    parameters=lambda context: (
         Parameter(
             "rate-dependent-loop",
             f"s/{context.input_unit}",
@@ -206,23 +187,8 @@ def _rate_dependent_loop_parameters(context: SimulationContext) -> tuple[Paramet
             -0.6 / context.force_coordinate.rate,
             5.0 / context.force_coordinate.rate,
         ),
-    )
-
-
-def _rate_dependent_loop_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.1 / context.force_coordinate.rate,),)
-
-
-RATE_DEPENDENT_LOOP = Effect(
-    name="rate-dependent-loop",
-    title="hysteresis that depends on the rate",
-    summary="The shape of the loop depends on the rate: beta and gamma times (1 + k |u'|)",
-    family="memory",
-    site=Site.CORE,
-    parameters=_rate_dependent_loop_parameters,
-    starting_points=_rate_dependent_loop_starting_points,
+    ),
+    starting_points=lambda context, _: ((0.1 / context.force_coordinate.rate,),),
     form=None,
     formula=Formula(symbols=("k",)),
     source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
@@ -232,8 +198,13 @@ RATE_DEPENDENT_LOOP = Effect(
 )
 
 
-def _loop_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
+LOOP_ASYMMETRY = Effect(
+    name="loop-asymmetry",
+    title="asymmetric hysteresis",
+    summary="The loop is not symmetric: - delta |u'| |h| in h'",
+    family="memory",
+    site=Site.CORE,
+    parameters=lambda context: (
         Parameter(
             "loop-asymmetry",
             f"1/{context.input_unit}",
@@ -242,23 +213,8 @@ def _loop_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, .
             -0.35 / context.input_peak,
             0.35 / context.input_peak,
         ),
-    )
-
-
-def _loop_asymmetry_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.04 / context.input_peak,),)
-
-
-LOOP_ASYMMETRY = Effect(
-    name="loop-asymmetry",
-    title="asymmetric hysteresis",
-    summary="The loop is not symmetric: - delta |u'| |h| in h'",
-    family="memory",
-    site=Site.CORE,
-    parameters=_loop_asymmetry_parameters,
-    starting_points=_loop_asymmetry_starting_points,
+    ),
+    starting_points=lambda context, _: ((0.04 / context.input_peak,),),
     form=None,
     formula=Formula(symbols=("delta",)),
     source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",

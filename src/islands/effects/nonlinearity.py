@@ -35,12 +35,6 @@ def _cubic_stiffness_parameters(context: SimulationContext) -> tuple[Parameter, 
     )
 
 
-def _cubic_stiffness_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.force_coordinate.force / context.force_coordinate.peak**3,),)
-
-
 CUBIC_STIFFNESS = Effect(
     name="cubic-stiffness",
     title="cubic stiffness",
@@ -48,7 +42,9 @@ CUBIC_STIFFNESS = Effect(
     family="shape",
     site=Site.FORCE,
     parameters=_cubic_stiffness_parameters,
-    starting_points=_cubic_stiffness_starting_points,
+    starting_points=lambda context, _: (
+        (0.02 * context.force_coordinate.force / context.force_coordinate.peak**3,),
+    ),
     form=ForceLaw(_cubic_stiffness_force, equation="n0*x*x*x"),
     formula=Formula("k*x**3"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
@@ -74,12 +70,6 @@ def _even_nonlinearity_parameters(context: SimulationContext) -> tuple[Parameter
     )
 
 
-def _even_nonlinearity_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.force_coordinate.force / context.force_coordinate.peak**2,),)
-
-
 EVEN_NONLINEARITY = Effect(
     name="even-nonlinearity",
     title="even nonlinearity",
@@ -87,7 +77,9 @@ EVEN_NONLINEARITY = Effect(
     family="shape",
     site=Site.FORCE,
     parameters=_even_nonlinearity_parameters,
-    starting_points=_even_nonlinearity_starting_points,
+    starting_points=lambda context, _: (
+        (0.02 * context.force_coordinate.force / context.force_coordinate.peak**2,),
+    ),
     form=ForceLaw(_even_nonlinearity_force, equation="n0*x*x"),
     formula=Formula("k*x**2"),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
@@ -98,29 +90,6 @@ EVEN_NONLINEARITY = Effect(
 
 #: A dead zone is searched for only if the input comes closer to zero than this fraction of its peak.
 _DEAD_ZONE_NEAR = 0.05
-
-
-def _dead_zone_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
-
-
-def _dead_zone_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "d",
-            context.input_unit,
-            0.0,
-            0.005 * context.input_peak,
-            -0.2 * context.input_peak,
-            0.3 * context.input_peak,
-        ),
-    )
-
-
-def _dead_zone_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * context.input_peak,) for part in (0.0075, 0.025, 0.075))
 
 
 def _approaches_zero(context: SimulationContext) -> bool:
@@ -134,9 +103,18 @@ DEAD_ZONE = Effect(
     summary="Dead zone of the input: |u| is reduced by d, and u is zero if |u| < d",
     family="shape",
     site=Site.INPUT,
-    parameters=_dead_zone_parameters,
-    starting_points=_dead_zone_starting_points,
-    form=_dead_zone_form,
+    parameters=lambda context: (
+        Parameter(
+            "d",
+            context.input_unit,
+            0.0,
+            0.005 * context.input_peak,
+            -0.2 * context.input_peak,
+            0.3 * context.input_peak,
+        ),
+    ),
+    starting_points=lambda context, _: tuple((part * context.input_peak,) for part in (0.0075, 0.025, 0.075)),
+    form=lambda u, values, _: np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0),
     equation=lambda _: MapEquation("sign(x)*max(abs(x) - n0, 0)"),
     is_applicable=_approaches_zero,
     acts_between_samples=True,
@@ -178,17 +156,13 @@ def _input_saturation_form(u: Signal, values: Signal, context: SimulationContext
     return np.clip(u, -level, level)
 
 
-def _input_saturation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("cut", "", 0.0, 0.02, 0.0, _MAX_CUT),)
-
-
 INPUT_SATURATION = Effect(
     name="input-saturation",
     title="saturation of the input",
     summary="Saturation of the amplifier: u is limited to (1 - cut) times its peak",
     family="shape",
     site=Site.INPUT,
-    parameters=_input_saturation_parameters,
+    parameters=lambda _: (Parameter("cut", "", 0.0, 0.02, 0.0, _MAX_CUT),),
     starting_points=lambda _context, _residual: tuple((cut,) for cut in _INPUT_CUTS),
     form=_input_saturation_form,
     equation=lambda context: MapEquation(_write_limit(context.input_peak, "max(n0, 0)")),
@@ -246,29 +220,15 @@ OUTPUT_SATURATION = Effect(
 )
 
 
-def _absolute_value_sensor_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return y + values[0] * np.abs(y)
-
-
-def _absolute_value_sensor_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("k", "", 0.0, 0.01, -0.8, 0.8),)
-
-
-def _absolute_value_sensor_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02,),)
-
-
 ABSOLUTE_VALUE_SENSOR = Effect(
     name="absolute-value-sensor",
     title="sensor gain that differs with the sign",
     summary="The sensor adds a fraction of the absolute value: y + k |y|",
     family="shape",
     site=Site.OUTPUT,
-    parameters=_absolute_value_sensor_parameters,
-    starting_points=_absolute_value_sensor_starting_points,
-    form=_absolute_value_sensor_form,
+    parameters=lambda _: (Parameter("k", "", 0.0, 0.01, -0.8, 0.8),),
+    starting_points=lambda _context, _residual: ((0.02,),),
+    form=lambda y, values, _: y + values[0] * np.abs(y),
     equation=lambda _: MapEquation("x + n0*abs(x)"),
     formula=Formula("x + k*abs(x)"),
     source="Doebelin, Measurement Systems, section 3",
@@ -283,10 +243,6 @@ _NEAR_ZERO, _OFF_ZERO = 0.1, 0.3
 
 #: Least number of times that an output without sign comes close to zero.
 _MIN_RETURNS = 3
-
-
-def _unsigned_sensor_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return (1.0 - values[0]) * y + values[0] * np.abs(y)
 
 
 def _is_unsigned(context: SimulationContext) -> bool:
@@ -309,7 +265,7 @@ UNSIGNED_SENSOR = Effect(
     site=Site.OUTPUT,
     parameters=lambda _: (Parameter("k", "", 0.0, 0.01, 0.0, 1.5),),
     starting_points=lambda _context, _residual: ((1.0,), (0.5,)),
-    form=_unsigned_sensor_form,
+    form=lambda y, values, _: (1.0 - values[0]) * y + values[0] * np.abs(y),
     equation=lambda _: MapEquation("(1 - n0)*x + n0*abs(x)"),
     is_applicable=_is_unsigned,
     formula=Formula("(1 - k)*x + k*abs(x)"),
@@ -325,19 +281,15 @@ def outflow_law(state: str) -> Effect:
     """Return the linear outflow of one state as an effect; its value is in 1/s."""
     label = f"{OUTFLOW_LAW.name}:{state}"
 
-    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, "1/s", 0.0, 1.0 / context.fit_end_time),)
-
-    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return tuple((times / context.fit_end_time,) for times in (1.0, 5.0, 25.0))
-
     return Effect(
         name=label,
         summary=OUTFLOW_LAW.summary,
         family="shape",
         site=Site.CORE,
-        parameters=parameters,
-        starting_points=starting_points,
+        parameters=lambda context: (Parameter(label, "1/s", 0.0, 1.0 / context.fit_end_time),),
+        starting_points=lambda context, _: tuple(
+            (times / context.fit_end_time,) for times in (1.0, 5.0, 25.0)
+        ),
         form=None,
         formula=Formula(symbols=(f"l_{state}",)),
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",

@@ -79,10 +79,6 @@ def _centre(values: Signal, context: SimulationContext) -> Signal:
     return np.array([step, step * np.average(parts, weights=widths)])
 
 
-def _takes_many_values(context: SimulationContext) -> bool:
-    return np.unique(context.u).size >= _MIN_VALUES
-
-
 def _write_equation(_context: SimulationContext) -> MapEquation:
     ramp = f"(max({_DISTANCE} - {_EDGE}, 0) + min({_DISTANCE} + {_EDGE}, 0))/{_RAMP}"
     return MapEquation(f"where(n0, x - n0*{_DISTANCE} + n0*{ramp}, x)")
@@ -95,11 +91,11 @@ QUANTISED_INPUT = Effect(
     family="shape",
     site=Site.INPUT,
     parameters=_list_parameters,
-    starting_points=lambda context, _residual: tuple((part * context.input_peak, 0.0) for part in _STEPS),
+    starting_points=lambda context, _: tuple((part * context.input_peak, 0.0) for part in _STEPS),
     form=_quantise,
     equation=_write_equation,
     formula=Formula("o + q*round((x - o)/q)", symbols=("q", "o")),
-    is_applicable=_takes_many_values,
+    is_applicable=lambda context: np.unique(context.u).size >= _MIN_VALUES,
     centre=_centre,
     acts_between_samples=True,
     source="Widrow and Kollar, Quantization Noise, section 1",

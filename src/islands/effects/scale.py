@@ -6,25 +6,8 @@ from islands.effects.interface.effect import (
     EffectTemplate,
     Formula,
     MapEquation,
-    Signal,
-    SimulationContext,
     Site,
 )
-
-
-def _input_gain_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return (1.0 + values[0]) * u
-
-
-def _input_gain_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
-
-
-def _input_gain_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02,),)
-
 
 INPUT_GAIN = Effect(
     name="input-gain",
@@ -32,9 +15,9 @@ INPUT_GAIN = Effect(
     summary="Gain error of the amplifier: (1 + k) u",
     family="scale",
     site=Site.INPUT,
-    parameters=_input_gain_parameters,
-    starting_points=_input_gain_starting_points,
-    form=_input_gain_form,
+    parameters=lambda _: (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),),
+    starting_points=lambda _context, _residual: ((0.02,),),
+    form=lambda u, values, _: (1.0 + values[0]) * u,
     equation=lambda _: MapEquation("(1 + n0)*x"),
     formula=Formula("(1 + k)*x"),
     source="Doebelin, Measurement Systems, section 3",
@@ -45,29 +28,15 @@ INPUT_GAIN = Effect(
 )
 
 
-def _sensor_gain_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return (1.0 + values[0]) * y
-
-
-def _sensor_gain_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
-
-
-def _sensor_gain_starting_points(
-    _context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02,),)
-
-
 SENSOR_GAIN = Effect(
     name="sensor-gain",
     title="gain error of the sensor",
     summary="Gain error of the sensor: (1 + k) y",
     family="scale",
     site=Site.OUTPUT,
-    parameters=_sensor_gain_parameters,
-    starting_points=_sensor_gain_starting_points,
-    form=_sensor_gain_form,
+    parameters=lambda _: (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),),
+    starting_points=lambda _context, _residual: ((0.02,),),
+    form=lambda y, values, _: (1.0 + values[0]) * y,
     equation=lambda _: MapEquation("(1 + n0)*x"),
     formula=Formula("(1 + k)*x"),
     source="Doebelin, Measurement Systems, section 3",
@@ -82,19 +51,13 @@ def wrong_parameter(parameter: Parameter) -> Effect:
     """Return the effect of one wrong parameter: its true value is (1 + r) times the nominal one."""
     label = f"{WRONG_PARAMETER.name}:{parameter.name}"
 
-    def parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, "", 0.0, 0.02, -0.8, 4.0),)
-
-    def starting_points(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return ((0.05,), (-0.05,))
-
     return Effect(
         name=label,
         summary=WRONG_PARAMETER.summary,
         family="scale",
         site=Site.PARAMETER,
-        parameters=parameters,
-        starting_points=starting_points,
+        parameters=lambda _: (Parameter(label, "", 0.0, 0.02, -0.8, 4.0),),
+        starting_points=lambda _context, _residual: ((0.05,), (-0.05,)),
         form=None,
         formula=Formula("x*(1 + r)", symbols=("r",)),
         source="Ljung, System Identification, 2nd ed., section 7",

@@ -160,10 +160,6 @@ def _list_parameters(context: SimulationContext, unit: str, peak: float) -> tupl
     )
 
 
-def _input_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return _list_parameters(context, context.input_unit, context.input_peak)
-
-
 def _output_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return _list_parameters(context, context.output_unit, context.output_peak)
 
@@ -220,7 +216,7 @@ SWEPT_DISTURBANCE = Effect(
     summary="Disturbance that acts where the input does, with a frequency that changes at a constant rate",
     family="disturbance",
     site=Site.INPUT,
-    parameters=_input_parameters,
+    parameters=lambda context: _list_parameters(context, context.input_unit, context.input_peak),
     starting_points=partial(_starting_points, site=Site.INPUT),
     form=_form,
     equation=lambda _: MapEquation(_EQUATION),

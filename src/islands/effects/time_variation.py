@@ -75,27 +75,17 @@ def gain_over_time(effect_parameters: Mapping[str, float], context: SimulationCo
     return gain
 
 
-def _gain_step_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter("gain-step", "", 0.0, 0.01, -0.9, 2.0),
-        Parameter("gain-step instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
-    )
-
-
-def _gain_step_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02, instant) for instant in candidate_instants(context))
-
-
 GAIN_STEP = Effect(
     name="gain-step",
     title="step of the gain",
     summary="Step of the gain at an instant: gain (1 + k) after it",
     family="change",
     site=Site.CORE,
-    parameters=_gain_step_parameters,
-    starting_points=_gain_step_starting_points,
+    parameters=lambda context: (
+        Parameter("gain-step", "", 0.0, 0.01, -0.9, 2.0),
+        Parameter("gain-step instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
+    ),
+    starting_points=lambda context, _: tuple((0.02, instant) for instant in candidate_instants(context)),
     form=None,
     formula=Formula("x*(1 + k*step(t - t0))", symbols=("k", "t0"), note=STEP_NOTE),
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
@@ -108,22 +98,14 @@ GAIN_STEP = Effect(
 )
 
 
-def _ageing_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("ageing", "", 0.0, 0.01, -0.9, 2.0),)
-
-
-def _ageing_starting_points(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02,),)
-
-
 AGEING = Effect(
     name="ageing",
     title="drift of the gain",
     summary="Drift of the gain: gain (1 + k t / T) over the record's duration T",
     family="change",
     site=Site.CORE,
-    parameters=_ageing_parameters,
-    starting_points=_ageing_starting_points,
+    parameters=lambda _: (Parameter("ageing", "", 0.0, 0.01, -0.9, 2.0),),
+    starting_points=lambda _context, _residual: ((0.02,),),
     form=None,
     formula=Formula(
         "x*(1 + k*t/T)",
@@ -141,29 +123,17 @@ AGEING = Effect(
 )
 
 
-def _temperature_gain_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return u * (1.0 + values[0] * channel(context, True))
-
-
-def _temperature_gain_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("k", f"1/{channel_unit(context, True)}", 0.0, 0.01 / channel_range(context, True)),)
-
-
-def _temperature_gain_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 / channel_range(context, True),),)
-
-
 TEMPERATURE_GAIN = Effect(
     name="temperature-gain",
     title="gain that depends on the temperature",
     summary="The gain depends on a temperature: u (1 + k (T - T(0))), where T is a given channel",
     family="change",
     site=Site.INPUT,
-    parameters=_temperature_gain_parameters,
-    starting_points=_temperature_gain_starting_points,
-    form=_temperature_gain_form,
+    parameters=lambda context: (
+        Parameter("k", f"1/{channel_unit(context, True)}", 0.0, 0.01 / channel_range(context, True)),
+    ),
+    starting_points=lambda context, _: ((0.02 / channel_range(context, True),),),
+    form=lambda u, values, context: u * (1.0 + values[0] * channel(context, True)),
     equation=lambda _: MapEquation("x*(1 + n0*z0)", (("temperature",),)),
     formula=Formula("x*(1 + k*(T - T_0))", names=("T", "T_0"), note=TEMPERATURE_NOTE),
     source="Doebelin, Measurement Systems, section 2",

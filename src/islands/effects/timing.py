@@ -15,10 +15,6 @@ from islands.kernels.memory_operators import lag_by_gap, limit_rate
 _LONGEST_LEAD = 1.2
 
 
-def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return interpolate_at(u, np.arange(u.size) - values[0] / context.dt)
-
-
 def _delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
@@ -32,10 +28,6 @@ def _delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _delay_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.5 * context.dt,), (2 * context.dt,), (6 * context.dt,))
-
-
 DELAY = Effect(
     name="delay",
     title="delay of the input",
@@ -43,8 +35,8 @@ DELAY = Effect(
     family="timing",
     site=Site.INPUT,
     parameters=_delay_parameters,
-    starting_points=_delay_starting_points,
-    form=_delay_form,
+    starting_points=lambda context, _: ((0.5 * context.dt,), (2 * context.dt,), (6 * context.dt,)),
+    form=lambda u, values, context: interpolate_at(u, np.arange(u.size) - values[0] / context.dt),
     equation=lambda _: MapEquation("z0", (("interpolate", "0", "n0", "0", "0", "0"),)),
     formula=Formula("at(x, t - tau)"),
     source="Ljung, System Identification, 2nd ed., section 16",
@@ -134,29 +126,20 @@ VARYING_DELAY = Effect(
 )
 
 
-def _clock_skew_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
-    return interpolate_at(u, np.arange(u.size) * (1.0 + values[0]))
-
-
-def _clock_skew_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("e", "", 0.0, 0.01 * context.dt / context.fit_end_time, -0.02, 0.02),)
-
-
-def _clock_skew_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.5 * context.dt / context.fit_end_time,), (-0.5 * context.dt / context.fit_end_time,))
-
-
 CLOCK_SKEW = Effect(
     name="clock-skew",
     title="different clock rates",
     summary="The clocks of input and output differ in rate: u(t (1 + e))",
     family="timing",
     site=Site.INPUT,
-    parameters=_clock_skew_parameters,
-    starting_points=_clock_skew_starting_points,
-    form=_clock_skew_form,
+    parameters=lambda context: (
+        Parameter("e", "", 0.0, 0.01 * context.dt / context.fit_end_time, -0.02, 0.02),
+    ),
+    starting_points=lambda context, _: (
+        (0.5 * context.dt / context.fit_end_time,),
+        (-0.5 * context.dt / context.fit_end_time,),
+    ),
+    form=lambda u, values, _: interpolate_at(u, np.arange(u.size) * (1.0 + values[0])),
     equation=lambda _: MapEquation("z0", (("interpolate", "n0", "0", "0", "0", "0"),)),
     formula=Formula("at(x, t*(1 + e))"),
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
@@ -231,29 +214,15 @@ RATE_LIMIT = Effect(
 )
 
 
-def _sensor_lag_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
-    return low_pass(y, values[0], context.dt) if values[0] > 0.0 else y
-
-
-def _sensor_lag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("tau", "s", 0.0, context.dt, 0.0, context.fit_end_time / 4),)
-
-
-def _sensor_lag_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return ((0.3 * context.dt,), (2 * context.dt,), (6 * context.dt,))
-
-
 SENSOR_LAG = Effect(
     name="sensor-lag",
     title="lag of the sensor",
     summary="First-order lag of the sensor: tau y' + y = v",
     family="timing",
     site=Site.OUTPUT,
-    parameters=_sensor_lag_parameters,
-    starting_points=_sensor_lag_starting_points,
-    form=_sensor_lag_form,
+    parameters=lambda context: (Parameter("tau", "s", 0.0, context.dt, 0.0, context.fit_end_time / 4),),
+    starting_points=lambda context, _: ((0.3 * context.dt,), (2 * context.dt,), (6 * context.dt,)),
+    form=lambda y, values, context: low_pass(y, values[0], context.dt) if values[0] > 0.0 else y,
     equation=lambda _: MapEquation("z0", (("low-pass", "n0"),)),
     formula=Formula("y", states=(("y", "(x - y)/tau"),)),
     source="Doebelin, Measurement Systems, section 3",
@@ -322,29 +291,19 @@ def _resonance_form(y: Signal, values: Signal, context: SimulationContext) -> Si
     return out
 
 
-def _resonance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    return (
-        Parameter("period", "s", 0.0, context.dt, 0.0, context.fit_end_time / 8),
-        Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
-    )
-
-
-def _resonance_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
-    return tuple(
-        (period * context.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
-    )
-
-
 RESONANCE = Effect(
     name="resonance",
     title="resonance at the output",
     summary="Second-order mode in series with the output: y'' + 2 zeta w y' + w^2 y = w^2 v",
     family="timing",
     site=Site.OUTPUT,
-    parameters=_resonance_parameters,
-    starting_points=_resonance_starting_points,
+    parameters=lambda context: (
+        Parameter("period", "s", 0.0, context.dt, 0.0, context.fit_end_time / 8),
+        Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
+    ),
+    starting_points=lambda context, _: tuple(
+        (period * context.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
+    ),
     form=_resonance_form,
     equation=lambda _: MapEquation("z0", (("resonance", "n0", "n1"),)),
     formula=Formula(
