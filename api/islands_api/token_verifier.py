@@ -28,8 +28,7 @@ from islands_api.bearer_token import (
     read_header,
 )
 from islands_service.logs import OutageLog
-from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
-from islands_service.outbound.checked_client import CheckedClient, read_body
+from islands_service.outbound import CheckedClient, OutboundFailedError, OutboundRefusedError, read_body
 from islands_service.settings import ServiceSettings, split_list
 
 log = structlog.get_logger()

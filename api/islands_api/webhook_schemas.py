@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from islands_api.schemas import ResponseModel
 from islands_service.domain.webhook import EVENT_NAMES
-from islands_service.outbound.checked_client import MAX_URL
+from islands_service.outbound import MAX_URL
 
 
 class WebhookRequest(BaseModel):

@@ -27,8 +27,7 @@ from islands.diagnosis.gross_errors.closed_loop import find_closed_loop  # noqa:
 from islands.diagnosis.gross_errors.explanation import GrossError  # noqa: E402
 from islands.diagnosis.gross_errors.search import find_gross_errors  # noqa: E402
 from islands.records.dataset import Dataset  # noqa: E402
-from islands.simulators.context import make_context  # noqa: E402
-from islands.simulators.extended import ExtendedSimulator  # noqa: E402
+from islands.simulators.extended import ExtendedSimulator, make_context  # noqa: E402
 from islands.simulators.interface import Simulator  # noqa: E402
 from islands.simulators.linear import estimate_linear  # noqa: E402
 from islands.simulators.specification.factory import make_simulator  # noqa: E402

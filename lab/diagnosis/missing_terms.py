@@ -25,8 +25,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
 from islands.report.documents.extension_json import extended_json
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 
 STEPS = 10

@@ -17,9 +17,8 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import Island, empty_archipelago
 from islands.evolution.engine import run_epoch
-from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.systems.catalogue import make_record

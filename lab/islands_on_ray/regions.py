@@ -37,9 +37,8 @@ import numpy as np
 import ray
 
 from islands.distribution import read_version
-from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.archipelago import Archipelago, Island, empty_archipelago
 from islands.evolution.engine import IslandEpoch, SerialEngine, select_migrants
-from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import SearchState, advance

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from islands.evolution.archipelago import Island, StepInfo
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.island import Island, StepInfo
 from islands.evolution.paper_search import list_models, rank_models, run_island
 from islands.evolution.presets import resolve_settings, with_tuples
 from islands.expressions.parsing import parse

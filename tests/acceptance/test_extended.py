@@ -16,8 +16,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.export.fmu import find_compiler
 from islands.records.writer import write_record
 from islands.report.documents.extension_json import extended_json
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from support.command_line import fail, succeed
 from support.simulated_records import EQUATIONS, made, write_fmu
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands_service.domain.diagnosis_outputs import write_outputs
 from islands_service.domain.job import EXTENDED, OUTPUTS, REPORT, JobOutcome, JobState, ProgressReport
+from islands_service.domain.plot_envelopes import write_outputs
 from islands_service.store.blobs import Blobs
 from support.diagnosis_documents import CAUSE, GAIN, make_document
 from support.played import stored

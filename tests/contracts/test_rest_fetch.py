@@ -14,8 +14,8 @@ import trustme
 from islands.errors import SettingsError
 from islands_api.client import Client
 from islands_api.web import uploads
-from islands_service.outbound import checked_client
-from islands_service.outbound.checked_client import CheckedClient
+from islands_service import outbound
+from islands_service.outbound import CheckedClient
 from islands_service.settings import service_settings
 from support.object_stores import make_bucket, s3_server
 from support.service import Service, csv, problem_of
@@ -96,7 +96,7 @@ def service(serve: Any, authority: trustme.CA) -> Iterator[Service]:
         async def resolve(_host: str, _port: int, _threads: object) -> tuple[str, ...]:
             return ("127.0.0.1",)
 
-        patch.setattr(checked_client, "resolve", resolve)
+        patch.setattr(outbound, "resolve", resolve)
         state = running.app.state.islands
         running.app.state.islands = replace(state, outbound=CheckedClient((HOST, OTHER), (), tls))
         yield running

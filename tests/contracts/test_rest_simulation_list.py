@@ -3,7 +3,7 @@
 import pytest
 
 from islands.simulators.specification.table import SIMULATORS
-from islands_service.intake import job_fmu
+from islands_service.intake import job_inputs
 from support.service import problem_of
 
 VALID = """
@@ -29,7 +29,7 @@ def test_the_list_says_why_fmus_are_refused(service, monkeypatch):
         return service.client.get("/v1/simulations").json()["items"][-1]["refusal"]
 
     assert get_refusal() == ""
-    monkeypatch.setattr(job_fmu, "find_gaps", lambda: ("Landlock", "seccomp"))
+    monkeypatch.setattr(job_inputs, "find_gaps", lambda: ("Landlock", "seccomp"))
     assert "a machine that can confine them, which needs Landlock and seccomp" in get_refusal()
 
 

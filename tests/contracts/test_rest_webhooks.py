@@ -11,8 +11,8 @@ from sqlalchemy import update
 
 from islands_api.client import Client
 from islands_api.web.auth import LOCAL_OWNER
+from islands_service import delivery_sender
 from islands_service.domain.job import JobState
-from islands_service.outbound import delivery_sender
 from islands_service.store.tables import deliveries as deliveries_table
 from support.processes import eventually
 from support.receivers import receiving

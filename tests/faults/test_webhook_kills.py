@@ -6,10 +6,10 @@ from contextlib import suppress
 
 import pytest
 
+from islands_service import delivery_sender
+from islands_service.delivery_sender import DeliverySender
 from islands_service.domain.job import JobState
-from islands_service.outbound import delivery_sender
-from islands_service.outbound.checked_client import CheckedClient
-from islands_service.outbound.delivery_sender import DeliverySender
+from islands_service.outbound import CheckedClient
 from islands_service.store import Store
 from support.processes import eventually
 from support.receivers import receiving
@@ -30,8 +30,8 @@ os.kill(os.getpid(), signal.SIGKILL)
 #: Sends deliveries until it is killed.
 SEND = """
 import asyncio, sys
-from islands_service.outbound.checked_client import CheckedClient
-from islands_service.outbound.delivery_sender import DeliverySender
+from islands_service.outbound import CheckedClient
+from islands_service.delivery_sender import DeliverySender
 from islands_service.store import Store
 store = Store(sys.argv[1])
 client = CheckedClient(("127.0.0.1",), ("127.0.0.1",))

@@ -5,10 +5,10 @@ from math import inf
 
 import pytest
 
+from islands.evolution.archipelago import Island
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
-from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.evolution.settings import ISLAND_PROFILES, Settings
 from support.migrations import (

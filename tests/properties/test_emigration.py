@@ -8,12 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import Island, empty_archipelago
 from islands.evolution.engine import SerialEngine, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import select_elite
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.island import Island
 from islands.evolution.migration import SELECTION_POLICIES
 from islands.evolution.problem import Problem
 from islands.evolution.rng import Purpose, Stream

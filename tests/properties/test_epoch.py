@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from islands.evolution.archipelago import Island
 from islands.evolution.engine import next_stop, receive_migrants, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.island import Island
 from islands.evolution.problem import GeneEvolution, Problem, make_problem
 from support.migrations import (
     SETTINGS,

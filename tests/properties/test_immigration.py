@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import Island, empty_archipelago
 from islands.evolution.engine import receive_migrants, run_epoch
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.generation import select_elite
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
-from islands.evolution.island import Island
 from islands.evolution.migration import REPLACEMENT_POLICIES, parse_topology
 from islands.evolution.problem import GeneEvolution, Problem
 from islands.evolution.rng import Purpose, Stream

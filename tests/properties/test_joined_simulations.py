@@ -11,8 +11,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.effects.interface.effect import Effect
 from islands.records.dataset import Dataset, join
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec

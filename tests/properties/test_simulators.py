@@ -21,8 +21,7 @@ from islands.simulators import (
     python_function,
     recorded_output,
 )
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.fmu import simulator as fmu
 from islands.simulators.interface import Simulator
 from islands.simulators.ode import simulator as ode

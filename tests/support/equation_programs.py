@@ -19,8 +19,7 @@ from islands.export.equations.collection import collect_equations
 from islands.export.extension import export_extended
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.table import LocalExtendedSpec

@@ -8,12 +8,12 @@ from math import isfinite
 import pytest
 from hypothesis import strategies as st
 
+from islands.evolution.archipelago import Island
 from islands.evolution.engine import run_epoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import select_elite
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual
-from islands.evolution.island import Island
 from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.problem import GeneEvolution, Problem
 from support.searches import SMALL, islands_of, record

@@ -17,8 +17,8 @@ from islands_api.web.middleware import BodyLimit, HeadRequests, RequestLogging, 
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.requests import FormRoute
 from islands_api.web.routes import ROUTERS
+from islands_service.delivery_sender import DeliverySender
 from islands_service.liveness import EVERY, send_heartbeat
-from islands_service.outbound.delivery_sender import DeliverySender
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.telemetry import Traces

@@ -21,7 +21,7 @@ from islands_api.web.responses import QueuePlaces
 from islands_service.domain.owner import Quotas, default_quotas
 from islands_service.intake.file_inspection import count_slots
 from islands_service.logs import OutageLog
-from islands_service.outbound.checked_client import CheckedClient, make_checked_client
+from islands_service.outbound import CheckedClient, make_checked_client
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

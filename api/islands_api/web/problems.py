@@ -26,7 +26,7 @@ from islands_service.domain.job import (
 )
 from islands_service.domain.monitoring import MonitorNotFoundError
 from islands_service.domain.webhook import WebhookNotFoundError
-from islands_service.outbound.addresses import OutboundFailedError
+from islands_service.outbound import OutboundFailedError
 from islands_service.store.blobs import BlobNotFoundError, DataFolderUnavailableError
 from islands_service.store.buckets import ObjectStoreError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError

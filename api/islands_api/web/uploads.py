@@ -30,8 +30,7 @@ from islands_service.intake.file_inspection import (
 )
 from islands_service.intake.fmu_inspection import inspect_fmu
 from islands_service.intake.job_inputs import link_blob
-from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
-from islands_service.outbound.checked_client import MAX_URL, is_listed
+from islands_service.outbound import MAX_URL, OutboundFailedError, OutboundRefusedError, is_listed
 from islands_service.settings import ServiceSettings, split_list
 from islands_service.store.blobs import translate_disk_full
 from islands_service.store.buckets import ObjectNotFoundError, ObjectStore

@@ -29,7 +29,6 @@ from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.checkpoints import CHECKPOINT_SHARE, DiagnosisCheckpoints, DiagnosisState
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_run import JobRun
-from islands_service.domain.diagnosis_outputs import write_outputs
 from islands_service.domain.job import (
     EXTENDED,
     NEXT_EXPERIMENT,
@@ -40,8 +39,8 @@ from islands_service.domain.job import (
     ProgressReport,
 )
 from islands_service.domain.job_spec import Discrepancy, parse_discrepancy
-from islands_service.intake.job_fmu import open_fmu
-from islands_service.intake.job_inputs import read_record_and_columns
+from islands_service.domain.plot_envelopes import write_outputs
+from islands_service.intake.job_inputs import open_fmu, read_record_and_columns
 from islands_service.logs import OutageLog
 from islands_service.runtime.parallel_map import ray_map
 from islands_service.settings import service_settings

@@ -25,8 +25,7 @@ from islands_service.store.database import StoreError
 
 if TYPE_CHECKING:
     from islands.evolution.archipelago import Archipelago
-    from islands.evolution.engine import ArchipelagoEpoch, Engine
-    from islands.evolution.protocol import SearchProblem
+    from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem
     from islands.progress import Stop
 
 log = structlog.get_logger()

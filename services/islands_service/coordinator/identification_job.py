@@ -11,9 +11,8 @@ from time import monotonic
 from typing import Any
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Engine
+from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem
 from islands.evolution.presets import AUTO
-from islands.evolution.protocol import SearchProblem
 from islands.evolution.search_result import (
     COMPARISON,
     ResultCallback,

@@ -6,8 +6,7 @@ from sys import maxsize
 import structlog
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Engine, SerialEngine
-from islands.evolution.protocol import SearchProblem
+from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem, SerialEngine
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.identification_progress import estimate_state_space_seconds
 from islands.persistence.models import NARX

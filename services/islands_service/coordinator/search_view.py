@@ -13,9 +13,9 @@ from typing import Any
 import structlog
 
 from islands.estimation.fitted_state_space import FittedStateSpace
+from islands.evolution.engine import SearchProblem
 from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.migration import parse_topology
-from islands.evolution.protocol import SearchProblem
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation

@@ -18,7 +18,7 @@ from socket import recv_fds, socket
 from typing import NoReturn
 
 from islands.processes import freeze_garbage_collector
-from islands_service.intake import file_inspection, fmu_inspection, record_reading, sample_reading
+from islands_service.intake import file_inspection, fmu_inspection, record_reading
 from islands_service.intake.reader_process import STARTED
 from islands_service.liveness import EVERY, send_heartbeat, set_parent_death_signal
 from islands_service.settings import service_settings
@@ -27,8 +27,8 @@ from islands_service.settings import service_settings
 PROGRAMS: Mapping[str, Callable[[], None]] = {
     "file_inspection": file_inspection.main,
     "fmu_inspection": fmu_inspection.main,
-    "record_reading": record_reading.main,
-    "sample_reading": sample_reading.main,
+    "record_reading": record_reading.write_record,
+    "column_reading": record_reading.write_columns,
 }
 
 #: Modules that the programs import when they run, so that the API does not import them. Those of single

@@ -29,7 +29,7 @@ from islands_service.domain.search_limits import (
     resolve_job_settings,
 )
 from islands_service.intake.file_inspection import InspectionRequest
-from islands_service.intake.job_fmu import check_allowed, check_fmu
+from islands_service.intake.job_inputs import check_allowed, check_fmu
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.datasets import StoredDataset

@@ -13,9 +13,8 @@ from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
 from islands.distribution import read_version
-from islands.evolution.engine import run_epoch
-from islands.evolution.island import Island
-from islands.evolution.protocol import SearchProblem
+from islands.evolution.archipelago import Island
+from islands.evolution.engine import SearchProblem, run_epoch
 from islands.expressions.primitives import PRIMITIVES
 from islands.facade.warm_up import warm_up
 from islands.processes import freeze_garbage_collector

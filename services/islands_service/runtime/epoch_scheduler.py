@@ -9,10 +9,8 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import IslandEpoch, make_topology, next_stop, select_migrants
-from islands.evolution.island import Island
-from islands.evolution.protocol import SearchProblem
+from islands.evolution.archipelago import Archipelago, Island
+from islands.evolution.engine import IslandEpoch, SearchProblem, make_topology, next_stop, select_migrants
 from islands.evolution.settings import Settings
 
 #: Data that is kept of an island's epoch.

@@ -6,7 +6,7 @@ import ray
 from ray.actor import ActorHandle
 from ray.exceptions import RayTaskError
 
-from islands.evolution.protocol import Caches
+from islands.evolution.engine import Caches
 from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOSS_ERRORS
 from islands_service.runtime.epoch_scheduler import EpochDeadlines, EpochScheduler, EpochTask

@@ -15,10 +15,9 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, overload
 
-from islands.evolution.engine import IslandEpoch
+from islands.evolution.archipelago import Island, StepInfo
+from islands.evolution.engine import Caches, IslandEpoch
 from islands.evolution.individual import AnyIndividual, AnyPopulation
-from islands.evolution.island import Island, StepInfo
-from islands.evolution.protocol import Caches
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 

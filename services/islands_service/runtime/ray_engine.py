@@ -5,8 +5,7 @@ from collections.abc import Callable, Generator, Mapping
 from ray.exceptions import RayError
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch
-from islands.evolution.protocol import SearchProblem
+from islands.evolution.engine import ArchipelagoEpoch, SearchProblem
 from islands.expressions.tree import Primitive
 from islands.progress import ProgressCallback, Stop, ignore_progress
 from islands_service.runtime import ClusterError

@@ -18,11 +18,9 @@ from ray.actor import ActorHandle
 from ray.exceptions import RayError, RayTaskError
 
 from islands.distribution import read_version
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, make_topology, next_stop
+from islands.evolution.archipelago import Archipelago, Island, StepInfo
+from islands.evolution.engine import ArchipelagoEpoch, Caches, SearchProblem, make_topology, next_stop
 from islands.evolution.individual import AnyIndividual
-from islands.evolution.island import Island, StepInfo
-from islands.evolution.protocol import Caches, SearchProblem
 from islands.progress import ProgressCallback
 from islands_service.runtime import ClusterError
 from islands_service.runtime.actor_pool import IslandActorPool, ignore_placement, put_problem

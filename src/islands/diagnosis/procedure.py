@@ -66,8 +66,7 @@ from islands.errors import IslandsError, RecordError
 from islands.parallel import ParallelMap
 from islands.progress import Phase, PhasedProgress, ProgressCallback, ignore_progress
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.output_equation import add_output_equation
 

@@ -9,10 +9,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.evolution.archipelago import Island, StepInfo
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual, Population, unique_niches, unique_structures
-from islands.evolution.island import Island, StepInfo
 from islands.evolution.offspring import Offspring, Parents, join, read_fitness
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings

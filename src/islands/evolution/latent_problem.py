@@ -15,11 +15,11 @@ from threadpoolctl import threadpool_limits
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import find_front, fit_linear_systems, make_latent_model, make_odd
+from islands.evolution.archipelago import Island, StepInfo
+from islands.evolution.engine import Caches
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import AnyIndividual, AnyPopulation, unique_structures
-from islands.evolution.island import Island, StepInfo
 from islands.evolution.latent_variation import begin_system, cross, mutate
-from islands.evolution.protocol import Caches
 from islands.evolution.rng import Purpose
 from islands.evolution.settings import Settings
 from islands.models.latent import LatentModel

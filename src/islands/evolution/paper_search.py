@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from islands.errors import RecordError
 from islands.estimation.estimate import FittedStructure, estimate
+from islands.evolution.archipelago import Island, StepInfo
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.individual import require_genes
-from islands.evolution.island import Island, StepInfo
 from islands.models.equations import plain_text
 from islands.models.narx import Model
 from islands.records.dataset import Dataset

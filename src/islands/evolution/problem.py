@@ -10,12 +10,12 @@ from islands.estimation.forward_selection import make_selection_problem, select_
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.deviations import Offsets
 from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.evolution.archipelago import Island, StepInfo
+from islands.evolution.engine import Caches
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import with_phi
 from islands.evolution.generation import first_generation, select_elite, step
 from islands.evolution.individual import AnyIndividual, Individual, Population, require_genes
-from islands.evolution.island import Island, StepInfo
-from islands.evolution.protocol import Caches
 from islands.evolution.settings import ISLAND_PROFILES, Settings
 from islands.evolution.swap_search import swap_search
 from islands.evolution.variation import Genes

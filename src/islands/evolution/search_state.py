@@ -5,11 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
 
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch
+from islands.evolution.archipelago import Archipelago, Island
+from islands.evolution.engine import ArchipelagoEpoch, Caches
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.island import Island
-from islands.evolution.protocol import Caches
 from islands.evolution.settings import Settings
 
 

@@ -5,8 +5,7 @@ from contextlib import closing
 
 from islands.errors import SettingsError
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.engine import Engine
-from islands.evolution.protocol import SearchProblem
+from islands.evolution.engine import Engine, SearchProblem
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
 from islands.progress import Steps

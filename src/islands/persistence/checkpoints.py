@@ -18,10 +18,9 @@ from typing import Any, TextIO
 
 from islands.errors import ModelError
 from islands.estimation.fitted_state_space import FittedStateSpace
-from islands.evolution.archipelago import Archipelago
+from islands.evolution.archipelago import Archipelago, Island
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import AnyIndividual, Individual
-from islands.evolution.island import Island
 from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES

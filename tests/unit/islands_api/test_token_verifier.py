@@ -12,7 +12,7 @@ import structlog
 
 from islands.errors import SettingsError
 from islands_api.bearer_token import MAX_TOKEN, IssuerUnavailableError, TokenRefusedError, is_token
-from islands_service.outbound.addresses import OutboundFailedError
+from islands_service.outbound import OutboundFailedError
 from islands_service.settings import ServiceSettings
 from support.issuers import AUDIENCE, Issuer, encode_part, make_claims, make_key, sign
 

@@ -46,7 +46,7 @@ from islands_api.web.uploads import (
 from islands_service.domain.job_spec import Name
 from islands_service.domain.plot_envelopes import describe_envelopes
 from islands_service.intake.file_inspection import InspectionRequest
-from islands_service.intake.sample_reading import read_columns
+from islands_service.intake.record_reading import read_columns
 from islands_service.store.datasets import StoredDataset
 
 

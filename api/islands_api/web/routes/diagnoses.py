@@ -32,8 +32,8 @@ from islands_api.web.requests import (
 from islands_api.web.responses import JSONDocument
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import EXPORT_RESPONSES, ExportFormat, export_response
-from islands_service.domain.diagnosis_outputs import describe_outputs
 from islands_service.domain.job import DISCREPANCY, EXTENDED, NEXT_EXPERIMENT, OUTPUTS
+from islands_service.domain.plot_envelopes import describe_outputs
 
 router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)
 

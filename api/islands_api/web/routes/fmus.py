@@ -21,7 +21,7 @@ from islands_api.web.requests import (
 from islands_api.web.responses import JSONDocument, dataset_document
 from islands_api.web.uploads import parse_fmu_name, store_fmu
 from islands_service.domain.uploaded_fmu import read_fmu
-from islands_service.intake.job_fmu import check_allowed
+from islands_service.intake.job_inputs import check_allowed
 from islands_service.store.datasets import StoredDataset
 
 

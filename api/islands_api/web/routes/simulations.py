@@ -25,8 +25,7 @@ from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
 from islands_api.web.responses import JSONDocument
 from islands_api.web.uploads import open_stored
-from islands_service.intake.job_fmu import check_allowed, check_fmu, explain_refusal
-from islands_service.intake.job_inputs import link_blob
+from islands_service.intake.job_inputs import check_allowed, check_fmu, explain_refusal, link_blob
 from islands_service.intake.job_validation import check_discrepancy
 from islands_service.intake.reader_process import SIMULATION_SERVER
 from islands_service.intake.simulation_preview import SimulationPreviewRequest, preview_simulation

@@ -10,7 +10,7 @@ from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
 from islands_api.web.responses import JSONDocument, delivery_document, webhook_document
 from islands_api.webhook_schemas import CreatedWebhook, DeliveryPage, WebhookPage, WebhookRequest
-from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
+from islands_service.outbound import OutboundFailedError, OutboundRefusedError
 
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES, route_class=JSONRoute)
 

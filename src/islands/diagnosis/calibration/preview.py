@@ -9,8 +9,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target, validate_prior
 from islands.records.dataset import Dataset
 from islands.records.segments import fill_gaps
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 
 #: Largest number of samples of a preview.

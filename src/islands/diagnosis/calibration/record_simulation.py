@@ -13,8 +13,7 @@ from islands.errors import ExtrapolationWarning
 from islands.records.compatibility import ColumnReference, match_record
 from islands.records.dataset import Dataset
 from islands.records.signal_ranges import compare_ranges, measure_ranges
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ExtendedSpec, LocalExtendedSpec, LocalSpec, SimulationSpec

@@ -17,8 +17,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.correction import Correction
 from islands.effects.interface.effect import Signal
 from islands.errors import RecordError
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 
 Computed = TypeVar("Computed")

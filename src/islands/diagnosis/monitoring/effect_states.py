@@ -27,8 +27,7 @@ from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
 from islands.records.noise_model import NoiseModel
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 
 #: Fraction of a response that calibration must leave, so that the effect can be monitored.

@@ -18,8 +18,7 @@ from islands.records.dataset import Dataset
 from islands.records.noise_model import fit_noise
 from islands.records.split import estimation_part
 from islands.rounding import ROUNDING
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 
 

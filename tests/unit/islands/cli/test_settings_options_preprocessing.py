@@ -5,8 +5,7 @@ import islands
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
 from islands.records.signal_map import match_rate
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from support.command_line import fail, succeed
 from support.exported_programs import run_c

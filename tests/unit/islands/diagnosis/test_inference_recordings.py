@@ -20,8 +20,8 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.records.dataset import join
 from islands.records.noise_model import fit_noise
-from islands.simulators.context import make_context as make_record_context
 from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import make_context as make_record_context
 from islands.simulators.interface import input_coordinate, output_coordinate
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.specification.factory import make_simulator

@@ -146,7 +146,7 @@ def test_only_the_improbable_cause_of_several_is_not_claimed(monkeypatch: pytest
 
 def _nominal(record: Dataset) -> tuple:
     from islands.diagnosis.calibration.preparation import count_fitted_samples
-    from islands.simulators.context import make_context
+    from islands.simulators.extended import make_context
 
     core = make_piezo()
     context = make_context(record, core, count_fitted_samples(record))

@@ -7,8 +7,7 @@ import pytest
 
 import islands
 from islands.effects.catalogue import CATALOGUE
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded, wave
 

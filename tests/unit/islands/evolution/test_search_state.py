@@ -5,9 +5,8 @@ from math import inf
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import StepInfo, empty_archipelago
 from islands.evolution.engine import ArchipelagoEpoch
-from islands.evolution.island import StepInfo
 from islands.evolution.search_state import SearchState, advance
 
 #: Best errors of two islands at every generation; infinite if an island has no model yet.

@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 
 from islands.errors import ModelError
-from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.archipelago import Archipelago, Island, empty_archipelago
 from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
 from islands.evolution.individual import Individual, make_regressor
-from islands.evolution.island import Island
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Apply, Constant

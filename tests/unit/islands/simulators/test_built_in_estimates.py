@@ -17,8 +17,7 @@ from islands.errors import ModelError, SettingsError
 from islands.expressions.tree import Symbol
 from islands.records.dataset import Dataset
 from islands.simulators.built_in_estimates import FASTEST, SecondOrder, estimate_second_order
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator
 from islands.simulators.ode.system import OdeEffect

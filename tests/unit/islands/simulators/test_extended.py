@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator, map_input
+from islands.simulators.extended import ExtendedSimulator, make_context, map_input
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from support.built_in_simulators import make_oscillator

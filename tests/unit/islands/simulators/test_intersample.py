@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.preparation import count_fitted_samples
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator, resample_input
 from islands.simulators.ode.simulator import OdeSimulator

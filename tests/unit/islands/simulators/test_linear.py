@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.specification.description import describe_extension
 from support.noise_records import make_noisy_record

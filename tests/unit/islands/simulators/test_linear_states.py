@@ -5,8 +5,7 @@ import pytest
 
 from islands.effects.interface.effect import Signal
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.linear_states import LinearStates, approximate_cascade, list_states

@@ -13,8 +13,7 @@ from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.persistence.models import model_from_json
 from islands.report.documents.extension_json import extended_document
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.narx import SLOPE, NarxSimulator
 from lab.diagnosis.cases import CASES
 from lab.diagnosis.injection.measurement import FaultyRecord, inject

@@ -7,8 +7,7 @@ import pytest
 
 from islands.effects.interface.effect import Signal
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import SimulationRun
 from islands.simulators.ode.system import OUTPUT, OdeParameter
 from islands.simulators.output_equation import OutputEquation, add_output_equation

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_model_simulator
 from support.latent_systems import make_model, spring_record
 

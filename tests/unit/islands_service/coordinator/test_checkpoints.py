@@ -9,9 +9,8 @@ from typing import IO, Any
 import pytest
 from sqlalchemy import update
 
-from islands.evolution.archipelago import Archipelago
+from islands.evolution.archipelago import Archipelago, Island
 from islands.evolution.engine import ArchipelagoEpoch, SerialEngine
-from islands.evolution.island import Island
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.checkpoints import SEARCH_RESTARTED, JobCheckpoints
 from islands_service.coordinator.identification_job import run_identification_job

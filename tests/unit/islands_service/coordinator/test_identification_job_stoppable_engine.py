@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.archipelago import Archipelago, Island, empty_archipelago
 from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.island import Island
 from islands.evolution.settings import Settings
 from islands_service.coordinator.identification_job import StoppableEngine
 

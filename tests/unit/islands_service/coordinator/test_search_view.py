@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from islands.estimation.fitted_state_space import FittedStateSpace
-from islands.evolution.archipelago import Archipelago
+from islands.evolution.archipelago import Archipelago, Island
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import AnyIndividual, Individual
-from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.evolution.settings import Settings

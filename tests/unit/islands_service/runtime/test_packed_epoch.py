@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.archipelago import Archipelago, StepInfo, empty_archipelago
 from islands.evolution.engine import IslandEpoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, make_regressor
-from islands.evolution.island import StepInfo
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Apply, Lagged
 from islands_service.runtime import packed_epoch

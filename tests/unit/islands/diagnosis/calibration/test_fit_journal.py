@@ -18,8 +18,7 @@ from islands.diagnosis.calibration.starts_calibrator import (
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
 from islands.records.noise_model import NoiseModel
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.recorded_output import RecordedOutput
 from support.simulated_records import recorded, wave
 

@@ -23,8 +23,7 @@ from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.timing import DELAY
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator

@@ -10,8 +10,7 @@ from islands.effects.baseline import JUMP
 from islands.effects.hysteresis import STICTION
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.effects.time_variation import GAIN_STEP, instant_bounds
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import DT, recorded, wave
 

@@ -11,8 +11,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import calibrate, minimis
 from islands.diagnosis.calibration.problem import CalibrationProblem, simulate_together
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.ode.shooting import ShotSimulation
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec

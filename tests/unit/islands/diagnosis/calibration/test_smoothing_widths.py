@@ -15,8 +15,7 @@ from islands.effects.friction import COULOMB_FRICTION
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.table import LocalExtendedSpec
 from support.built_in_simulators import make_oscillator

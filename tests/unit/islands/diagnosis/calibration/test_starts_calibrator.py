@@ -4,8 +4,7 @@ import numpy as np
 
 from islands.diagnosis.calibration.starts_calibrator import StartsCalibrator
 from islands.diagnosis.calibration.target import Target
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded, wave
 

@@ -24,8 +24,7 @@ from islands.effects.interface.effect import Signal
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.kernels.memory_operators import play_from
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.output_equation import add_output_equation
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator

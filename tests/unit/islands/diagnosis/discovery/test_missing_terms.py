@@ -37,8 +37,7 @@ from islands.report.documents.diagnosis_json import diagnosis_document
 from islands.report.documents.extension_json import extended_json
 from islands.report.pages.diagnosis import diagnosis_report
 from islands.report.pages.origin import Origin
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator

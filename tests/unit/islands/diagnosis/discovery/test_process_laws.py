@@ -19,8 +19,7 @@ from islands.effects.interface.effect import Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec, LocalExtendedSpec

@@ -15,8 +15,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
 from islands.effects.nonlinearity import UNSIGNED_SENSOR
 from islands.facade.results.complete_diagnosis import DiagnosisResult
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.output_equation import add_output_equation
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LinearSpec

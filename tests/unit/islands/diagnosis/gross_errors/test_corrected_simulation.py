@@ -8,8 +8,7 @@ import pytest
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.gross_errors.corrected_simulation import limit_to_tolerances
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import recorded, simulate_oscillator, wave

@@ -11,8 +11,7 @@ from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.kernels.memory_operators import play_from, slider
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.python_function import PythonFunctionSimulator

@@ -10,8 +10,7 @@ from islands.diagnosis.inference.curve_ends import MAX_INCREASE, flatten_ends
 from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.recorded_output import RecordedOutput
 
 SAMPLES = 800

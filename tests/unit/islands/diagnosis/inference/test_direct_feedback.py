@@ -16,8 +16,7 @@ from islands.diagnosis.inference.direct_feedback import hold_direct_term, list_l
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.output_equation import add_output_equation
 from islands.simulators.specification.factory import make_simulator
 from support.noise_records import DT, SAMPLES, draw_input, make_loop, make_noisy_record

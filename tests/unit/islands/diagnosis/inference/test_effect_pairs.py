@@ -13,8 +13,7 @@ from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.python_function import PythonFunctionSimulator
 from support.simulated_records import DT, recorded, wave
 

@@ -13,8 +13,7 @@ from islands.diagnosis.inference.exchanged_parts import ExchangedParts, exchange
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
 from islands.records.split import hold_out
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from support.joined_oscillator import SIGMA, oscillator_recordings
 

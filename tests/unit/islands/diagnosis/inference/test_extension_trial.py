@@ -24,8 +24,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator

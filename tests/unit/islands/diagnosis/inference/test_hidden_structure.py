@@ -11,8 +11,7 @@ from islands.diagnosis.calibration.preparation import count_fitted_samples, make
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hidden_structure import find_hidden_structure
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from support.noise_records import (
     DT,

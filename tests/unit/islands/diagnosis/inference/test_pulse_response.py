@@ -8,8 +8,7 @@ from scipy.signal import lfilter
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from support.built_in_simulators import make_oscillator, make_piezo
 from support.simulated_records import DT, recorded, wave

@@ -15,8 +15,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.parallel import ParallelMap
 from islands.progress import ignore_progress
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from support.built_in_simulators import make_oscillator

@@ -23,8 +23,7 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput

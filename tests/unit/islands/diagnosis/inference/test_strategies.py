@@ -11,8 +11,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import recorded

@@ -17,8 +17,7 @@ from islands.records.dataset import Dataset
 from islands.records.split import hold_out
 from islands.report.documents.diagnosis_json import diagnosis_document
 from islands.report.text.diagnosis_statements import describe_details
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.factory import make_simulator
 

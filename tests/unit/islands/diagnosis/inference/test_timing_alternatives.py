@@ -15,8 +15,7 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.baseline import OFFSET
 from islands.effects.interface.effect import Effect
 from islands.effects.timing import DELAY, RESONANCE, SENSOR_LAG
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded

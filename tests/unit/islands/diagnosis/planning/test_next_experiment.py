@@ -17,8 +17,7 @@ from islands.report.documents.experiment_json import (
     get_suggested_input,
     write_advice,
 )
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.recorded_output import RecordedOutput
 from support.planned import DT, amplifier, input_record, take_effects, wave

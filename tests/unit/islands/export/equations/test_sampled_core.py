@@ -13,7 +13,7 @@ from islands.export.fmu import find_compiler
 from islands.persistence.models import model_json
 from islands.records.input_lead import advance_all_inputs
 from islands.simulation.predictors import free_run
-from islands.simulators.context import make_context
+from islands.simulators.extended import make_context
 from islands.simulators.ode.system_document import make_output_system
 from islands.simulators.output_equation import OutputEquation, add_output_equation
 from islands.simulators.specification.factory import make_simulator

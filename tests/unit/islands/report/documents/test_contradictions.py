@@ -10,8 +10,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.effects.catalogue import CATALOGUE, catalogue_order
 from islands.records.dataset import Dataset
 from islands.report.documents.contradictions import list_contradictions
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 

@@ -14,8 +14,7 @@ from islands.effects.interface.effect import Effect
 from islands.effects.scale import wrong_parameter
 from islands.records.dataset import Dataset
 from islands.report.documents.extended_equations import WrittenExtension, write_extended_equations
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import ResampledSimulator
 from islands.simulators.output_equation import add_output_equation

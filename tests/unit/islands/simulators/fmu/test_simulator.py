@@ -22,8 +22,7 @@ from islands.models.narx import Model
 from islands.persistence.models import model_from_json
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec

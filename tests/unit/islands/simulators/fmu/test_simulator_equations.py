@@ -24,8 +24,7 @@ from islands.export.closed_form import closed_form
 from islands.export.fmu import find_compiler
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.fmu.fmi_description import FmiVariable, read_description
 from islands.simulators.fmu.model import choose_variables
 from islands.simulators.fmu.system import make_fmu_system

@@ -9,8 +9,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, ForceLaw
 from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
 from support.simulated_records import recorded, wave

@@ -11,8 +11,7 @@ import islands
 from islands.effects.catalogue import CATALOGUE
 from islands.expressions.tree import Symbol
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.ode import native_code
 from islands.simulators.ode.lane_simulation import simulate_lanes
 from islands.simulators.ode.lane_values import LaneInput

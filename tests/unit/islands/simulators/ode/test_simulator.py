@@ -13,8 +13,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import BatchSimulator, SimulationRun, Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.description import describe_extension

@@ -12,8 +12,7 @@ from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Signal
 from islands.errors import IslandsError
 from islands.records.dataset import Dataset
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 from support.simulated_records import EQUATIONS, wave
 

@@ -18,8 +18,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.export.extension import as_json
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document, extended_json
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator, SavedExtension
+from islands.simulators.extended import ExtendedSimulator, SavedExtension, make_context
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator

@@ -15,8 +15,7 @@ from islands.persistence.models import model_json
 from islands.records.dataset import Dataset
 from islands.records.preprocessing import preprocess
 from islands.simulation.predictors import free_run
-from islands.simulators.context import make_context
-from islands.simulators.extended import ExtendedSimulator
+from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import ModelSpec

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.errors import SettingsError
-from islands_service.domain.diagnosis_outputs import describe_outputs, write_outputs
+from islands_service.domain.plot_envelopes import describe_outputs, write_outputs
 
 MEASURED = np.array([1.0, np.nan, 3.0, 5.0])
 

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import structlog
 
+from islands_service import delivery_sender
+from islands_service.delivery_sender import DeliverySender, sign_request
 from islands_service.domain.webhook import DueDelivery
-from islands_service.outbound import delivery_sender
-from islands_service.outbound.delivery_sender import DeliverySender, sign_request
 from islands_service.store.database import StoreUnavailableError
 
 

@@ -1,4 +1,4 @@
-"""Requests to named hosts: URLs, addresses, certificates, redirects and time limits."""
+"""Addresses: the public ones, in every notation, and the resolution of names."""
 
 import asyncio
 import socket
@@ -8,15 +8,75 @@ import threading
 import pytest
 import trustme
 
-from islands_service.outbound import checked_client
-from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
-from islands_service.outbound.checked_client import CheckedClient, make_checked_client, read_body
+from islands_service import outbound
+from islands_service.outbound import (
+    CheckedClient,
+    OutboundFailedError,
+    OutboundRefusedError,
+    is_public,
+    make_checked_client,
+    read_body,
+    resolve,
+)
 from islands_service.settings import ServiceSettings
+
+PUBLIC = ["8.8.8.8", "2606:4700::1111", "::ffff:8.8.8.8", "64:ff9b::808:808", "2002:808:808::1"]
+
+#: One address of each special range, and notations that hide a private IPv4 address in an IPv6 address.
+OTHERS = [
+    "0.0.0.0",
+    "10.1.2.3",
+    "100.64.0.1",
+    "127.0.0.1",
+    "169.254.169.254",
+    "172.16.0.1",
+    "192.0.2.1",
+    "192.168.1.1",
+    "198.18.0.1",
+    "224.0.0.1",
+    "240.0.0.1",
+    "255.255.255.255",
+    "::",
+    "::1",
+    "::127.0.0.1",
+    "::ffff:127.0.0.1",
+    "64:ff9b::a00:1",
+    "64:ff9b:1::1",
+    "2001::1",
+    "2001:db8::1",
+    "2002:7f00:1::1",
+    "fc00::1",
+    "fe80::1",
+    "fe80::1%2",
+    "fec0::1",
+    "ff02::1",
+]
 
 #: Test client for servers on this machine.
 LOCAL = CheckedClient(("127.0.0.1", "localhost"), ("127.0.0.1", "localhost"))
 
 OK = b"HTTP/1.1 200 OK\r\nContent-Length: 4\r\n\r\nfine"
+
+
+@pytest.mark.parametrize("address", PUBLIC)
+def test_an_address_of_the_internet_is_public(address):
+    assert is_public(address)
+
+
+@pytest.mark.parametrize("address", OTHERS)
+def test_a_special_address_is_not_public(address):
+    assert not is_public(address)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.1", "0x7f000001", "2130706433"])
+def test_every_notation_of_an_address_is_resolved_before_it_is_checked(host):
+    assert asyncio.run(resolve(host, 443)) == ("127.0.0.1",)
+
+
+@pytest.mark.parametrize("host", ["no-such-name.invalid", "a" * 64 + ".example", "a\x00b"])
+def test_a_name_without_an_address_is_an_error_with_the_name(host):
+    with pytest.raises(OutboundFailedError, match=f"the name {host}"):
+        asyncio.run(resolve(host, 443))
 
 
 def exchange(client, answer, url="http://127.0.0.1:{port}/hook", seconds=5.0, tls=None, most=100, **request):
@@ -63,7 +123,7 @@ def names(monkeypatch):
         asked.append(host)
         return known[host]
 
-    monkeypatch.setattr(checked_client, "resolve", answer)
+    monkeypatch.setattr(outbound, "resolve", answer)
     return known, asked
 
 

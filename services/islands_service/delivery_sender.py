@@ -12,8 +12,7 @@ import structlog
 
 from islands_service.domain.webhook import DueDelivery
 from islands_service.logs import OutageLog
-from islands_service.outbound.addresses import OutboundFailedError, OutboundRefusedError
-from islands_service.outbound.checked_client import CheckedClient
+from islands_service.outbound import CheckedClient, OutboundFailedError, OutboundRefusedError
 from islands_service.store.database import StoreError
 from islands_service.store.webhooks import Deliveries
 

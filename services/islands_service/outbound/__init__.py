@@ -1,1 +1,0 @@
-"""Requests of the service to hosts that its clients name. Read `checked_client` first."""
