@@ -11,7 +11,6 @@ from scipy.signal import lfilter
 from islands.records.writer import write_record
 from lab.diagnosis.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
-from support.noise_records import SENSOR, make_noisy_record
 from support.undrawn import undrawn_figures
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
@@ -88,22 +87,6 @@ def test_an_exact_simulation_of_a_slow_output_has_no_discrepancy(tmp_path: Path)
 
 
 @pytest.mark.ci
-def test_several_files_are_diagnosed_together(offset_record: Path) -> None:
-    paths = offset_record / "record.csv", offset_record / "other.csv"
-    write_offset(paths[1])
-    with undrawn_figures():
-        succeed(
-            *("diagnose", *paths, "--input", "u_V", "--output", "y_um", "--rows", "0:300"),
-            *("--simulation", "column:theirs_um", "--out", offset_record / "both"),
-        )
-    document = json.loads((offset_record / "both/discrepancy.json").read_text())
-    assert document["record"]["segments"] == [300, 300]
-    assert [effect["name"] for effect in document["effects"]] == ["offset"]
-    assert document["effects"][0]["parameters"]["c"]["value"] == pytest.approx(0.3, abs=0.03)
-    assert "record.csv, other.csv" in (offset_record / "both/report.html").read_text()
-
-
-@pytest.mark.ci
 def test_file_for_validation_is_held_out_as_a_whole(offset_record: Path) -> None:
     other = offset_record / "validation.csv"
     header, *lines = write_offset(other).read_text().splitlines()
@@ -122,30 +105,6 @@ def test_file_for_validation_is_held_out_as_a_whole(offset_record: Path) -> None
     )
     planned = fail("diagnose", other, *options, "--plan", "--validation", other, "--out", offset_record / "p")
     assert "--validation is for a diagnosis" in planned
-
-
-@pytest.mark.ci
-def test_residual_far_above_the_stated_noise_is_unknown(tmp_path: Path) -> None:
-    write_record(make_noisy_record("white", 20), tmp_path / "data.csv")
-    stated = SENSOR / 4
-    options = ("--input", "u_V", "--output", "y_V", "--simulation", "linear:2", "--workers", "1")
-    with undrawn_figures():
-        said = succeed(
-            *("diagnose", tmp_path / "data.csv", *options, "--noise-level", str(stated)),
-            *("--out", tmp_path / "out"),
-        )
-    document = json.loads((tmp_path / "out/discrepancy.json").read_text())
-    assert document["verdict"] == "unknown"
-    assert document["noise_claim"]["noise_level"] == stated
-    assert [each["name"] for each in document["record_findings"]] == ["above-noise-level"]
-    assert "times the stated noise of" in " ".join(said.split())
-    planned = fail("diagnose", *options, "--plan", "--noise-level", "0.1", "--out", tmp_path / "plan")
-    assert "--noise-level is for a diagnosis" in planned
-
-
-def test_existing_result_is_not_overwritten_without_force(folder: Path) -> None:
-    command = ("diagnose", folder / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo")
-    assert "holds a result already" in fail(*command, "--out", folder / "out")
 
 
 @pytest.mark.parametrize(
