@@ -10,7 +10,7 @@ import pytest
 import islands
 from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
-from islands.errors import IslandsError, RecordError, SettingsError
+from islands.errors import IslandsError, RecordError
 from islands.records.dataset import Dataset
 from islands.simulators.specification.table import LocalSpec, PhysicalSpec
 from support.simulated_records import MODEL_SPEC, PROGRAM_SPEC, recorded, wave
@@ -111,11 +111,6 @@ def test_function_that_does_not_simulate_is_rejected(record: Dataset, tmp_path: 
     path.write_text(text)
     with pytest.raises(IslandsError, match=message):
         islands.diagnose(record, f"python:{path}:f")
-
-
-def test_missing_file_of_a_function_is_rejected(record: Dataset) -> None:
-    with pytest.raises(SettingsError, match=r"nowhere\.py cannot be run"):
-        islands.diagnose(record, "python:nowhere.py:f")
 
 
 @pytest.mark.parametrize(

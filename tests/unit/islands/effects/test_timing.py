@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 import islands
 from islands.effects.interface.context import SimulationContext
-from islands.effects.timing import DELAY, VARYING_DELAY
+from islands.effects.timing import VARYING_DELAY
 from islands.kernels.lagrange import interpolate_at
 from islands.kernels.memory_operators import lag_by_gap
 
@@ -44,15 +44,6 @@ def test_a_delay_that_swings_starts_with_its_frequency(frequency: float) -> None
     for _, cosine, sine, found in points:
         assert found == pytest.approx(frequency, abs=0.002)
         assert np.hypot(cosine, sine) == pytest.approx(0.3, rel=0.4)
-
-
-def test_a_delay_without_a_swing_is_a_constant_delay() -> None:
-    u = draw_levels(2)
-    context = make_context(u, u)
-    for form in (VARYING_DELAY.form, DELAY.form):
-        assert callable(form)
-    swung = VARYING_DELAY.form(u, np.array([0.34, 0.0, 0.0, 0.02]), context)
-    assert np.array_equal(swung, DELAY.form(u, np.array([0.34]), context))
 
 
 def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:

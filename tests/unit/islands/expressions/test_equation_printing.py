@@ -42,12 +42,6 @@ def test_mathml_is_one_element_with_the_structure_of_the_expression(text: str, s
     assert all(tag in tags for tag in shown)
 
 
-def test_a_difference_keeps_the_brackets_of_its_second_part() -> None:
-    written = EquationMathmlPrinter().write(parse_expression("a - (b + c)"))
-    assert written.count("<mo>(</mo>") == 1
-    assert "<mo>(</mo>" not in EquationMathmlPrinter().write(parse_expression("(a - b)/(c + d)"))
-
-
 def test_a_name_from_a_user_is_escaped() -> None:
     assert EquationMathmlPrinter().symbol("a<b") == "<mi>a&lt;b</mi>"
 

@@ -5,7 +5,7 @@ import pytest
 from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SUB
-from islands.expressions.printing import LARGEST_POWER, at_rest, latex, plain
+from islands.expressions.printing import at_rest, latex, plain
 from islands.expressions.tree import Apply, Constant, Lagged, Shift
 
 U = Lagged(1, 1)
@@ -129,16 +129,6 @@ def test_parse_error_names_the_unreadable_part(text, message):
         parse(text)
 
 
-def test_parser_accepts_the_largest_power():
-    assert len(parse(f"u(k-1)^{LARGEST_POWER}").arguments) == LARGEST_POWER
-
-
-def test_parser_refuses_a_function_missing_from_the_table():
-    table = {name: PRIMITIVES[name] for name in ("mul", "sub")}
-    with pytest.raises(ModelError, match=r"unknown function 'tanh': take one of mul, sub, or pass"):
-        parse("tanh(u(k-1))", table)
-
-
 @pytest.mark.parametrize(
     ("expression", "inputs", "text"),
     [
@@ -177,7 +167,3 @@ def test_steady_state_text_has_no_time_index(expression, inputs, text):
 )
 def test_latex_of_an_expression(text, written):
     assert latex(parse(text)) == written
-
-
-def test_latex_does_not_split_a_large_power():
-    assert latex(mul(*[U] * 243)) == "u_{k-1}^{243}"

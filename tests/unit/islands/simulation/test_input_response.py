@@ -22,10 +22,6 @@ def test_the_response_is_the_free_run_of_a_record_that_rests_before_it():
     assert found.u[:, 0].tolist() == U.tolist()
 
 
-def test_the_output_rests_at_a_constant_input():
-    assert input_response(LAG, np.full(50, 1.5)).y == pytest.approx(3.0)
-
-
 def test_an_input_that_acts_at_once_acts_on_the_first_sample():
     # The last value has no successor, so the input is held.
     assert input_response(DIRECT, U, 0.0).y == pytest.approx(3.0 * U)

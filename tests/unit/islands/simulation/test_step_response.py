@@ -7,7 +7,6 @@ import islands
 from islands.simulation.step_response import step_response
 
 LAG = islands.make_model([(islands.parse("y(k-1)"), 0.9), (islands.parse("u(k-1)"), 0.2)], dt=0.5)
-DIRECT = islands.make_model([(islands.parse("u(k-1)"), 3.0)], ("u_V+1",))
 HYSTERESIS = islands.make_model(
     [(islands.parse("y(k-1)"), 1.0), (islands.parse("u(k-1) - u(k-2)"), 0.8)], output_name="y"
 )
@@ -24,12 +23,6 @@ def test_a_first_order_response_is_exponential():
     # The response is simulated until it has settled.
     assert abs(found.y[-1] - 4.0) < 0.02
     assert repr(found) == f"<StepResponse of {len(found.time)} samples: u to y>"
-
-
-def test_an_input_that_acts_at_once_steps_the_output_at_time_zero():
-    found = step_response(DIRECT, 0.0, 1.0, samples=4)
-    assert found.y[found.time >= 0].tolist() == [3.0] * 4
-    assert found.y[found.time < 0].tolist() == [0.0] * 6
 
 
 def test_a_model_of_hysteresis_steps_from_a_given_output():

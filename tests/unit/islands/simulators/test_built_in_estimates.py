@@ -21,9 +21,7 @@ from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system_parts import OdeEffect
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
-from islands.simulators.specification.table import SIMULATORS, LocalExtendedSpec, PhysicalSpec
-from islands.systems.bouc_wen import BoucWenPiezo
-from islands.systems.bouc_wen import simulate as simulate_piezo
+from islands.simulators.specification.table import LocalExtendedSpec, PhysicalSpec
 from support.built_in_simulators import make_oscillator, make_piezo, make_tanks
 from support.simulated_records import made, recorded, simulate_oscillator, wave
 
@@ -74,13 +72,6 @@ def test_tanks_have_the_levels_of_a_fine_integration() -> None:
     assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-4 * np.ptp(expected))
 
 
-def test_a_piezo_has_the_output_of_equation_11() -> None:
-    u = wave()
-    simulation = extend(make_piezo(), u)
-    expected = simulate_piezo(BoucWenPiezo(), u, 0.01)
-    assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-9)
-
-
 def test_a_part_of_the_overflow_enters_the_lower_tank() -> None:
     u = 3.0 + wave() / 25
     simulation = extend(make_tanks(**TANKS, levels=LEVELS), u, 0.5, steps=16)
@@ -89,24 +80,6 @@ def test_a_part_of_the_overflow_enters_the_lower_tank() -> None:
         expected = simulate_tanks(u, 0.5, 4.2, caught)
         assert simulation.simulate(simulation.nominal, clip) == pytest.approx(expected, abs=0.02)
         assert np.max(np.abs(expected - simulate_tanks(u, 0.5))) > 0.2
-
-
-def test_a_gain_of_the_piezo_does_not_change_its_hysteresis() -> None:
-    u = wave()
-    simulation = extend(make_piezo(), u)
-    change = simulation.simulate(simulation.nominal, {"ageing": 0.1}) - simulation.simulate(
-        simulation.nominal
-    )
-    assert change == pytest.approx(1.6 * u * 0.1 * np.arange(u.size) / u.size, abs=1e-9)
-
-
-def test_a_held_voltage_gives_the_same_hysteresis_as_a_ramp() -> None:
-    """Hysteresis does not depend on the rate, so that only the values at the samples matter."""
-    u, piezo = wave(), make_piezo()
-    simulation = extend(piezo, u)
-    held = ExtendedSimulator(ResampledSimulator(piezo, InterSample.ZOH, 4), (), simulation.context)
-    expected = simulation.simulate(simulation.nominal)
-    assert held.simulate(held.nominal) == pytest.approx(expected, abs=1e-4)
 
 
 def test_every_effect_on_a_piezo_matches_the_reference_solution() -> None:
@@ -203,13 +176,6 @@ def test_an_effect_that_does_not_exist_is_refused() -> None:
     system = replace(make_oscillator(0.5, 4.0, 200.0).system, effects=(effect,))
     with pytest.raises(ModelError, match="leakage: there is no such effect: take input-offset"):
         make_ode_simulator(system, recorded(wave(), wave(), units=("N", "m")), {"x": 0.0, "v": 0.0})
-
-
-def test_parameters_that_can_be_given_are_those_of_the_equations() -> None:
-    for name in OLD_EFFECTS:
-        simulator = made()[name].simulator
-        names = {each.name for each in simulator.parameters if not each.initial}
-        assert names == SIMULATORS[name].parameters.keys()
 
 
 def test_extended_tanks_start_from_estimated_levels_on_other_records() -> None:

@@ -80,17 +80,6 @@ def test_a_new_key_of_the_issuer_is_found_at_once_and_an_old_one_no_more():
     follow(scenario)
 
 
-def test_unknown_ids_do_not_make_requests_at_any_rate():
-    async def scenario(keys, client, now):
-        await keys.find("first")
-        for number in range(100):
-            assert await keys.find(f"unknown-{number}") is None
-            now.time += 0.1
-        assert len(client.requests) <= 2 * 3
-
-    follow(scenario)
-
-
 def test_old_keys_are_read_again_without_a_wait():
     async def scenario(keys, client, now):
         await keys.find("first")
@@ -203,14 +192,5 @@ def test_a_short_rsa_key_is_not_used():
         client.changed[f"{URL}/keys"] = {"keys": [offer(1024), offer(2048)]}
         assert await keys.find("1024") is None
         assert (await keys.find("2048")).kid == "2048"
-
-    follow(scenario)
-
-
-def test_a_damaged_key_does_not_hide_the_others():
-    async def scenario(keys, client, now):
-        damaged = {"kty": "EC", "kid": "damaged", "crv": "P-256", "x": "AA", "y": "AA"}
-        client.changed[f"{URL}/keys"] = {"keys": [damaged, make_key().as_dict(private=False)]}
-        assert (await keys.find("first")).kid == "first"
 
     follow(scenario)

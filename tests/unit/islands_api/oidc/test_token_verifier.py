@@ -66,16 +66,6 @@ def test_a_token_of_every_default_algorithm_is_accepted(algorithm, kind, size):
     assert verify(sign(make_claims(ISSUER), key, algorithm), key).scopes
 
 
-@pytest.mark.parametrize("header", [{"typ": None}, {"typ": "at+jwt"}, {"typ": "JWT"}, {"x5t": "abc"}])
-def test_a_token_with_another_usual_header_is_accepted(header):
-    assert verify(sign(make_claims(ISSUER), make_key(), **header)).scopes
-
-
-@pytest.mark.parametrize("audience", [AUDIENCE, [AUDIENCE], ["account", AUDIENCE]])
-def test_the_audience_may_be_one_of_several(audience):
-    assert verify(token(aud=audience)).scopes
-
-
 def test_a_token_without_a_signature_is_refused():
     parts = [encode_part({"alg": "none", "kid": "first"}), encode_part(make_claims(ISSUER)), ""]
     assert "signed with 'none'" in refused(".".join(parts))
@@ -128,12 +118,6 @@ def test_a_token_with_a_wrong_header_is_refused(header, message):
     assert message in refused(sign(make_claims(ISSUER), make_key(), **header))
 
 
-@pytest.mark.parametrize("kid", [7, ["first"], {"a": 1}])
-def test_a_token_whose_key_has_no_textual_id_is_refused(kid):
-    parts = f"{encode_part({'alg': 'ES256', 'kid': kid})}.{encode_part(make_claims(ISSUER))}.AAAA"
-    assert "needs a kid" in refused(parts)
-
-
 def test_a_token_of_another_key_with_the_same_id_is_refused():
     text = sign(make_claims(ISSUER), make_key("second"), kid="first")
     assert "signature of the token is not valid" in refused(text)
@@ -150,12 +134,6 @@ def test_a_changed_claim_breaks_the_signature():
     header, _, signature = token().split(".")
     changed = encode_part(make_claims(ISSUER, sub="mallory"))
     assert "signature of the token is not valid" in refused(f"{header}.{changed}.{signature}")
-
-
-@pytest.mark.parametrize("algorithm", ["RS256", "Ed25519"])
-def test_the_type_of_the_key_must_fit_the_algorithm(algorithm):
-    header = encode_part({"alg": algorithm, "kid": "first"})
-    assert "signature" in refused(f"{header}.{token().partition('.')[2]}")
 
 
 def test_a_key_for_another_algorithm_is_not_used():
@@ -180,20 +158,6 @@ def test_a_key_is_no_token(text):
     assert not is_token(text)
 
 
-@pytest.mark.parametrize("text", ["e30.", "e30.e30", "e30.e30.e30.e30.e30"])
-def test_a_malformed_token_is_refused(text):
-    assert is_token(text)
-    assert refused(text)
-
-
-@pytest.mark.parametrize("payload", [b"[]", b"null", b"{", b"[" * 5000])
-def test_a_signed_payload_that_is_no_object_is_refused(payload):
-    from joserfc import jws
-
-    text = jws.serialize_compact({"alg": "ES256", "kid": "first"}, payload, make_key())
-    assert "not valid" in refused(text)
-
-
 def test_the_leeway_tolerates_the_clock_of_the_issuer():
     late = make_claims(ISSUER)["iat"] - 20.0
     assert verify(token(exp=late)).scopes
@@ -216,15 +180,6 @@ def test_roles_give_scopes_and_other_values_give_none(roles, scopes):
     assert verify(token(roles=roles)).scopes == scopes
 
 
-def test_roles_can_be_in_a_nested_claim_with_other_values():
-    nested = token(roles=None, realm_access={"roles": ["lab/members"]})
-    settings = {"oidc_role_claim": "realm_access.roles", "oidc_roles": "lab/members=submitter, a=b=reader"}
-    assert verify(nested, **settings).scopes == {"read", "write"}
-    assert verify(token(roles="a=b"), oidc_roles=settings["oidc_roles"]).scopes == {"read"}
-    dotted = token(roles=None, **{"https://example.org/roles": ["islands-reader"]})
-    assert verify(dotted, oidc_role_claim="https://example.org/roles").scopes == {"read"}
-
-
 def test_owners_of_two_issuers_and_of_keys_are_never_the_same():
     values = [
         "alice",
@@ -242,12 +197,6 @@ def test_owners_of_two_issuers_and_of_keys_are_never_the_same():
     }
     assert len(owners) == 2 * len(values)
     assert all(owner.startswith("oidc-") and len(owner) <= 64 and "/" not in owner for owner in owners)
-
-
-def test_the_owner_can_be_another_claim():
-    identity = verify(token(group="lab-3"), oidc_owner_claim="group")
-    assert identity.owner.endswith(":lab-3")
-    assert identity.subject == verify(token()).subject
 
 
 @pytest.mark.parametrize(

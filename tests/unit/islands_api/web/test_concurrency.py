@@ -19,18 +19,6 @@ def executor() -> Iterator[BlockingExecutor]:
     opened.close()
 
 
-def test_an_operation_runs_in_a_thread_and_returns_or_raises(
-    executor: BlockingExecutor,
-) -> None:
-    async def send() -> None:
-        assert await executor.run(threading.get_ident) != threading.get_ident()
-        assert await executor.run(int, "ff", base=16) == 255
-        with pytest.raises(ZeroDivisionError):
-            await executor.run(lambda: 1 / 0)
-
-    asyncio.run(send())
-
-
 def test_an_operation_has_the_context_of_its_request(executor: BlockingExecutor) -> None:
     """Log entries of an operation have the id of its request."""
 

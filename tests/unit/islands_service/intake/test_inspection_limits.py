@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands_service.intake.inspection_limits import SLOT_BYTES, count_slots, find_limits
+from islands_service.intake.inspection_limits import count_slots, find_limits
 from islands_service.settings import ServiceSettings
 
 SETTINGS = ServiceSettings()
@@ -15,11 +15,6 @@ def test_a_file_of_two_megabytes_unpacks_to_two_hundred():
     assert limits.unpacked == 200_000_000
     assert limits.memory < 3_000_000_000
     assert limits.slots == 4
-
-
-def test_a_small_file_takes_one_slot_and_may_unpack_to_all_of_it():
-    assert find_limits(0, SETTINGS) == find_limits(640_000, SETTINGS)
-    assert (find_limits(0, SETTINGS).unpacked, find_limits(0, SETTINGS).slots) == (SLOT_BYTES, 1)
 
 
 @given(st.integers(0, 10**10), st.integers(1, 10**10), st.integers(1, 10**11))

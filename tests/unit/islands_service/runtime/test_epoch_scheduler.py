@@ -4,27 +4,21 @@ The tests play the actors, in any order. An epoch is a number computed from the 
 that any confusion would change the last number.
 """
 
-import random
 from collections import deque
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands_service.runtime.epoch_scheduler import EpochTask
 
 #: The record is not used, since numbers replace islands.
 from support.epoch_runs import (
     SEED,
     PlayedRun,
-    make_epoch,
-    make_scheduler,
     orders,
     play,
-    posed,
     run_in_lockstep,
     searches,
 )
@@ -43,38 +37,6 @@ def test_losses_do_not_change_the_values_of_a_search(search, choose, losses):
     problem_, ends, ahead = search
     done = play(PlayedRun(problem_, ends, ahead), choose, losses)
     assert done == list(run_in_lockstep(problem_, ends))
-
-
-@given(searches(), orders, st.integers(0, 25))
-@example((posed("ring", 1, ((0, 1),), 2), [-1, 0, 1, 2], 2), random.Random(57), 5)
-def test_order_of_completion_does_not_change_the_values(search, choose, losses):
-    problem_, ends, ahead = search
-    done = play(PlayedRun(problem_, ends, ahead), choose, losses, at_once=False)
-    assert done == list(run_in_lockstep(problem_, ends))
-
-
-@given(searches(), orders, st.integers(0, 25))
-def test_every_task_is_submitted_after_its_dependencies(search, choose, losses):
-    """A dependency may be incomplete, but there is a reference to it that can be passed on."""
-    problem_, ends, ahead = search
-    run = PlayedRun(problem_, ends, ahead)
-    play(run, choose, losses)
-    sent = set()
-    for task in run.sent:
-        for needed in (task.island, *run.sources[task.island]):
-            assert task.begin == ends[0] or (needed, task.begin) in sent
-        sent.add((task.island, task.end))
-    assert len(sent) == problem_.settings.islands * (len(ends) - 1)
-
-
-@given(searches())
-def test_all_tasks_within_the_limit_are_ready_at_once(search):
-    """No result is needed first: neither of the island itself nor of its sources."""
-    problem_, ends, ahead = search
-    islands, stages = range(problem_.settings.islands), list(pairwise(ends))[:ahead]
-    assert PlayedRun(problem_, ends, ahead).send() == [
-        EpochTask(each, *stage) for stage in stages for each in islands
-    ]
 
 
 @given(searches(), orders, st.data())
@@ -159,18 +121,3 @@ def test_ready_tasks_of_earlier_epochs_come_first(search, choose):
         task = choose.choice(run.ready())
         run.carry(task)
         run.report(task)
-
-
-def test_epochs_completed_out_of_order_are_yielded_in_order():
-    scheduler = make_scheduler(islands=2, ahead=2)
-    one, other, later, other_later = scheduler.ready_tasks()
-    for task in (later, other_later, other):
-        scheduler.complete(task, make_epoch(task))
-        assert list(scheduler.completed_epochs()) == []
-    scheduler.complete(one, make_epoch(one))
-    assert list(scheduler.completed_epochs()) == [
-        (make_epoch(one), make_epoch(other)),
-        (make_epoch(later), make_epoch(other_later)),
-    ]
-    assert scheduler.completed_generation == 4
-    assert list(scheduler.completed_epochs()) == []

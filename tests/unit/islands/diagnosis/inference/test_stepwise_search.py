@@ -121,29 +121,6 @@ def test_effects_that_mask_each_other_are_only_found_as_a_pair(masked) -> None:
     assert found.cost < base.score - MIN_GAIN
 
 
-def test_hypothesis_without_one_effect_is_refitted(masked) -> None:
-    base, target, run = masked
-    found, _ = stepwise_search(base, screen_effects(base, target, run), target, run, pairs=True)
-    for effect in run.effects:
-        without = without_effect(found, effect, target)
-        assert effect not in without.effects
-        assert len(without.effects) == 1
-        assert without.cost > found.cost
-        assert without.fit.mean_square > found.fit.mean_square
-
-
-def test_pure_noise_yields_no_pair() -> None:
-    u = wave()
-    noise = np.random.default_rng(9).standard_normal(u.size)
-    core = RecordedOutput("theirs", u)
-    base, target = calibrate_to(recorded(u, u + noise), core)
-    effects = select_effects(core, base.simulation.context, {})
-    run = DiagnosisRun(effects)
-    found, _ = stepwise_search(base, screen_effects(base, target, run), target, run, pairs=True)
-    assert found.effects == ()
-    assert found.fit is base
-
-
 @pytest.mark.ci
 def test_noise_model_is_white_once_both_causes_are_found() -> None:
     """The search begins with the coloured residual of the first cause and ends with white noise."""
@@ -185,24 +162,6 @@ def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
     gains = [each for each in screened if each.effect.is_gain]
     assert gains
     assert gains[0].score_gain(with_offset) > MIN_GAIN
-
-
-@pytest.mark.ci
-def test_refinement_replaces_a_wrong_effect_by_a_better_one() -> None:
-    u = wave(3000)
-    core = RecordedOutput("theirs", u)
-    noise = 0.05 * np.random.default_rng(5).standard_normal(u.size)
-    base, target = calibrate_to(recorded(u, u + 0.02 * u**2 + 0.01 * u**3 + noise), core)
-    effects = select_effects(core, base.simulation.context, {})
-    wrong = [next(each for each in effects if each.name == name) for name in ("cubic-stiffness", "jump")]
-    fit = base
-    for effect in wrong:
-        fit = screen_effects(fit, target, DiagnosisRun([effect]))[0].fit
-    initial = Hypothesis(fit, fit.score, tuple(wrong))
-    found, _ = refine_by_swaps(initial, target, DiagnosisRun(effects))
-    assert {each.name for each in found.effects} == {"cubic-stiffness", "even-nonlinearity"}
-    assert found.cost < initial.cost
-    assert [each.without.effects for each in found.alternatives] == [(found.effects[1],), (found.effects[0],)]
 
 
 @pytest.mark.ci

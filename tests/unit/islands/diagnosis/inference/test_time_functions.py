@@ -77,12 +77,6 @@ def test_a_drift_that_goes_on_remains() -> None:
     assert found is fit
 
 
-def test_a_drift_remains_within_its_recording() -> None:
-    drift = np.where(0.75 * TIME[-1] > TIME, TIME / TIME[-1], 0.0)
-    fit, found = leave_out(make_recording(1, drift))
-    assert found is fit
-
-
 def test_terms_of_the_time_are_left_out_by_their_coefficients() -> None:
     def simulate(u: np.ndarray, dt: float, gain: float = 1.0, a1: float = 0.02) -> np.ndarray:
         return gain * simulate_lag(u) + a1 * dt * np.arange(u.size)

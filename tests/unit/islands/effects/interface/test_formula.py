@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.effects.catalogue import CATALOGUE, OF_EACH, find_entry
+from islands.effects.catalogue import CATALOGUE
 from islands.effects.channels import channel
 from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site, apply_map
 from islands.expressions.parsing import parse_formula
@@ -88,7 +88,3 @@ def test_a_formula_has_the_values_of_the_form(name: str, context: SimulationCont
     if "round" in effect.formula.text:  # which the form smooths over a small part of a step
         is_far = np.abs((x - known["o"]) / known["q"] % 1.0 - 0.5) > 0.01
     np.testing.assert_allclose(written[is_far], computed[is_far], rtol=1e-9, atol=1e-9)
-
-
-def test_every_template_is_found_by_its_name() -> None:
-    assert all(find_entry(f"{name}:x") is template for name, template in OF_EACH.items())

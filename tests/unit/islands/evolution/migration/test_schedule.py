@@ -1,9 +1,7 @@
 """Schedules: values and stops over the generations, and parsing."""
 
-import re
 from itertools import takewhile
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -35,12 +33,6 @@ def stops_after(read, generation):
         yield generation
 
 
-@given(schedules(least=0))
-def test_value_applies_from_the_beginning_of_its_piece(pieces):
-    values, _ = simulate_schedule(pieces)
-    assert [Schedule(pieces).at(generation) for generation in range(END)] == values
-
-
 @given(schedules())
 def test_stops_are_counted_from_the_beginning_of_each_piece(pieces):
     _, stops = simulate_schedule(pieces)
@@ -56,18 +48,6 @@ def test_stops_do_not_depend_on_interruptions(pieces, interrupted):
     never = takewhile(lambda stop: stop < 2 * END, stops_after(read, 0))
     resumed = takewhile(lambda stop: stop < 2 * END, stops_after(read, interrupted))
     assert list(resumed) == [stop for stop in never if stop > interrupted]
-
-
-def test_schedule_with_two_pieces_has_the_documented_meaning():
-    read = parse_schedule("5,100:20", 1, "migrate_every")
-    assert [read.at(generation) for generation in (0, 99, 100, 10_000)] == [5, 5, 20, 20]
-    assert list(takewhile(lambda stop: stop <= 140, stops_after(read, 90))) == [95, 100, 120, 140]
-    # The beginning of a piece cuts the interval before it.
-    assert list(takewhile(lambda stop: stop < 12, stops_after(parse_schedule("4,6:3", 1, "it"), 0))) == [
-        4,
-        6,
-        9,
-    ]
 
 
 @given(schedules(least=0))
@@ -119,21 +99,6 @@ def test_invalid_text_raises_settings_error_with_the_setting(text, message):
     with pytest.raises(SettingsError) as refused:
         parse_schedule(text, 1, "migrate_every")
     assert str(refused.value).startswith(message)
-
-
-@pytest.mark.parametrize(("known", "equal"), [(7, 7.0), (1, True), (7, np.float64(7.0))])
-def test_cached_schedule_does_not_accept_equal_values_of_other_types(known, equal):
-    assert known == equal
-    for _ in range(2):
-        assert parse_schedule(known, 1, "migrate_every").pieces == ((0, known),)
-        with pytest.raises(SettingsError, match=f"cannot read migrate_every {re.escape(repr(equal))}: write"):
-            parse_schedule(equal, 1, "migrate_every")
-
-
-def test_smallest_value_is_a_parameter():
-    assert parse_schedule("0,5:2", 0, "migrants").at(3) == 0
-    with pytest.raises(SettingsError, match="migrants is at least 3, got '3,9:2'"):
-        parse_schedule("3,9:2", 3, "migrants")
 
 
 @given(st.text("0123456789,: -x", max_size=12))

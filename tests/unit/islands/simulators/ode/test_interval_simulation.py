@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.expressions.tree import Symbol
 from islands.simulators.ode.interval_simulation import IntervalSimulation
 from islands.simulators.ode.lane_simulation import simulate_lanes
 from islands.simulators.ode.lane_values import LaneInput
@@ -69,23 +68,6 @@ def test_each_interval_has_the_bits_of_a_separate_simulation(program: OdeProgram
         assert np.array_equal(found[run, number, : expected.size], expected)
     fewer = IntervalSimulation(program, DT, lanes, "xvz", INTERVAL, every=3)
     assert np.array_equal(fewer.simulate(order, states, is_asked)[:, 0], found[..., ::3], equal_nan=True)
-
-
-def test_other_states_are_kept(program: OdeProgram) -> None:
-    """A state that is not given at the restarts is that of the sample before."""
-    lanes = make_lanes()[:2]
-    states = np.random.default_rng(3).standard_normal((2, INTERVALS, 2))
-    kept = generate_program(make_system(MOTION), (Symbol("z"), Symbol("x"), Symbol("v")))
-    simulation = IntervalSimulation(kept, DT, lanes, "xv", INTERVAL)
-    is_asked = np.zeros((2, INTERVALS), dtype=bool)
-    is_asked[1, 2] = True
-    found = simulation.simulate(np.array([0, 1]), states, is_asked)
-    assert not simulation.is_independent
-    assert np.isnan(found[0]).all()
-    z, x, v = found[1]
-    assert np.array_equal(np.stack([x[:, 0], v[:, 0]], axis=-1), states[1])
-    assert np.abs(np.diff(z.reshape(-1)[:SAMPLES])).max() < 0.1
-    assert np.ptp(z[:, 0]) > 0.0
 
 
 def test_divergence_is_that_of_one_interval(program: OdeProgram) -> None:
