@@ -13,7 +13,6 @@ from islands.simulators.specification.table import parse_spec
 from support.command_line import succeed
 from support.equation_programs import OCTAVE, extend, run_c, run_matlab
 from support.gain_scheduled import TRUE, GainScheduledModel, add_class, make_record
-from support.levels import nightly_but
 from support.undrawn import undrawn_figures
 
 pytestmark = pytest.mark.usefixtures("toy_class")
@@ -103,8 +102,8 @@ def test_the_command_fits_a_class(record, tmp_path):
     assert "x1(k)" in succeed("show", folder)
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("disturbance", nightly_but([0.2], [0.0, 0.2]))
+@pytest.mark.nightly
+@pytest.mark.parametrize("disturbance", [0.0, 0.2])
 def test_a_diagnosis_finds_a_disturbance_and_nothing_else(record, tmp_path, disturbance):
     islands.write_model(model_of(record), tmp_path / "model.json")
     measured = make_record(disturbance=disturbance, seed=3)

@@ -81,6 +81,7 @@ def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect
     expect(page.get_by_text("Before the first sample", exact=False)).to_be_visible()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
 def test_the_section_fits_and_has_sufficient_contrast(
     tried: Callable[..., Any], scheme: str, width: int

@@ -77,6 +77,7 @@ def test_a_prediction_starts_from_the_begin_or_from_given_outputs(data, regresso
         regressor.predict(u, initial=np.zeros(601))
 
 
+@pytest.mark.nightly
 def test_a_pipeline_and_a_grid_search_take_the_regressor(data, regressor):
     from sklearn.model_selection import GridSearchCV, TimeSeriesSplit
     from sklearn.pipeline import make_pipeline

@@ -49,7 +49,7 @@ def test_a_name_that_leaves_a_coloured_error_is_no_more_than_probable():
     assert [each.confidence for each in limited.causes] == [MAX_CONFIDENCE_WITHOUT_GAIN]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_valve_that_sticks_behind_a_held_input_is_no_more_than_probable():
     rng = np.random.default_rng(4)
     held = np.repeat(rng.standard_normal(40), 25)

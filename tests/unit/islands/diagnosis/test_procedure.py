@@ -53,7 +53,7 @@ def test_injected_drag_is_named_with_its_strength_and_gain(found: Diagnosis) -> 
     assert found.candidates[0].name == "quadratic-drag"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_diagnosis_is_reproducible(record: Dataset, found: Diagnosis) -> None:
     again = diagnose(record, make_piezo(), TOLERANCE)
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
@@ -95,7 +95,7 @@ def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) 
     assert found.best is found.base
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_only_the_improbable_cause_of_several_is_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     def describe(*arguments: Any) -> tuple:
         findings, equivalents = describe_effects(*arguments)
@@ -160,53 +160,29 @@ def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> N
         diagnose(record, PythonFunctionSimulator(function, "function"), {"offset": 0.1})
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("effects", "core", "noise", "seed"),
     [
         # A hold fits better next to one of the effects alone, and makes the others half a sample early.
-        pytest.param(
-            *(("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
-            marks=pytest.mark.nightly,
-        ),
-        pytest.param(
-            *(("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
-            marks=pytest.mark.nightly,
-        ),
+        (("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
+        (("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
         # A jump of many standard deviations is sharper than the step that is calibrated.
         (("ageing", "jump"), "cascaded-tanks", "white", 7750012),
         # The effects next to a discovered term lead to the third one.
-        pytest.param(
-            *(("input-saturation", "cyclic-error", "ageing"), "cascaded-tanks", "white", 7996002),
-            marks=pytest.mark.nightly,
-        ),
+        (("input-saturation", "cyclic-error", "ageing"), "cascaded-tanks", "white", 7996002),
         # The instants that the calibration starts from are many samples apart.
-        pytest.param(
-            *(("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
-            marks=pytest.mark.nightly,
-        ),
+        (("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
         # With a linear input between samples, a resonance explains more than a delay.
-        pytest.param(
-            *(("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
-            marks=pytest.mark.nightly,
-        ),
+        (("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
         # A noise model takes the response to any two of the causes for noise.
-        pytest.param(
-            *(("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
-            marks=pytest.mark.nightly,
-        ),
+        (("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
         # A step that is slightly too large is made up for by a gain.
-        pytest.param(
-            *(("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
-            marks=pytest.mark.nightly,
-        ),
+        (("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
         # A hold fits better next to two of the effects, and terms explain the third one.
-        pytest.param(
-            *(("offset", "thermal-drift", "cyclic-error"), "cascaded-tanks", "white", 6999011),
-            marks=pytest.mark.nightly,
-        ),
+        (("offset", "thermal-drift", "cyclic-error"), "cascaded-tanks", "white", 6999011),
         # The path of the hysteresis is that of an input that jumps between samples.
-        pytest.param(*(("stiction",), "bouc-wen-piezo", "white", 7996002), marks=pytest.mark.nightly),
+        (("stiction",), "bouc-wen-piezo", "white", 7996002),
     ],
 )
 def test_errors_of_the_calibration_are_no_further_causes(

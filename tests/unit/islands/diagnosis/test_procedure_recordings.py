@@ -42,7 +42,7 @@ def test_effect_is_named_and_predicts_whole_recordings(found: Diagnosis) -> None
     assert found.gain.before.rmse > 3 * SIGMA
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_extended_simulation_fits_the_initial_states_of_new_recordings(
     stiffened: Dataset, found: Diagnosis
 ) -> None:
@@ -71,7 +71,7 @@ def test_recording_that_is_held_out_as_a_whole_is_no_part_of_an_estimate() -> No
     assert two.gain is None or two.gain.after.rmse > 2 * SIGMA
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_change_between_two_recordings_is_a_jump_at_the_boundary() -> None:
     first, second = oscillator_recordings(5, (500, 300))
     record = islands.join((first, replace(second, y=second.y + 0.005)))

@@ -51,8 +51,17 @@ SPOILT: dict[str, Callable[[Dataset], Dataset]] = {
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("case", SPOILT)
-@pytest.mark.parametrize("name", SIMULATIONS)
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [
+        # For every change: each case with one simulation, and each simulation with one case.
+        pytest.param(
+            name, case, marks=() if (first - second) % len(SIMULATIONS) == 0 else pytest.mark.nightly
+        )
+        for first, name in enumerate(SIMULATIONS)
+        for second, case in enumerate(SPOILT)
+    ],
+)
 def test_uninformative_record_is_rejected_for_every_simulation(record: Dataset, name: str, case: str) -> None:
     spoilt = SPOILT[case](record)
     theirs = 0.8 * record.u[: spoilt.samples, 0]
@@ -167,9 +176,10 @@ def test_rigid_axis_states_the_required_record_length(record: Dataset) -> None:
 FEW = ("delay", "offset", "cubic-stiffness")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "effects",
-    [pytest.param(FEW, marks=pytest.mark.ci), pytest.param(tuple(CATALOGUE), marks=pytest.mark.nightly)],
+    [FEW, tuple(CATALOGUE)],
     ids=len,
 )
 def test_tanks_with_negative_levels_have_a_verdict(record: Dataset, effects: tuple[str, ...]) -> None:

@@ -31,7 +31,7 @@ def make_record(seed: int, sensor: float, drive: float, noise: float = 0.01) -> 
     return islands.Dataset(u[:, None], y, DT, ("F_N",), "x_mm", ("N",), "mm")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_play_of_the_sensor_is_named_and_holds_on_another_record() -> None:
     found = islands.diagnose(make_record(1, 0.06, 0.0), "second-order")
     assert (str(found.verdict), found.claimed_names) == ("named", ("sensor-hysteresis",))

@@ -72,7 +72,7 @@ def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:
     return islands.diagnose(record, "second-order")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("acts_at_input", [True, False])
 def test_a_sweep_is_named_by_the_place_where_it_acts(acts_at_input: bool) -> None:
     u, wave = draw_input(7), make_wave(0.5, 15.0)

@@ -52,7 +52,7 @@ def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:
     return islands.diagnose(record, "linear:1")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_delay_that_swings_is_named_with_its_values() -> None:
     u = draw_levels(4)
     found = diagnose(u, follow(swing(u, 0.7, 0.4, 0.02)))
@@ -63,7 +63,7 @@ def test_a_delay_that_swings_is_named_with_its_values() -> None:
     assert np.hypot(values["cosine"].value, values["sine"].value) == pytest.approx(0.4, abs=0.03)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_lag_that_grows_with_its_error_is_named_and_holds_on_another_record() -> None:
     u = draw_levels(5)
     found = diagnose(u, lag_by_gap(follow(u), DT, 0.7, 1.4))

@@ -72,6 +72,7 @@ def test_constraints_hold_to_nine_digits_after_a_refit(offset):
     assert found.wiring == model.wiring
 
 
+@pytest.mark.nightly
 def test_correct_knowledge_reduces_the_error_of_a_short_noisy_record():
     clean, text = spring_record(2000, seed=50), "fixed-point = 0, 0.3; gain = 0.564"
     errors = {"none": 0.0, text: 0.0}

@@ -46,7 +46,7 @@ def test_a_saved_result_states_the_constraints(result, tmp_path):
     assert f"so that they meet {KNOWN}." in " ".join((tmp_path / "method.txt").read_text("utf-8").split())
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_models_that_cannot_meet_the_constraints_are_left_out_and_counted():
     # The slopes of a linear model are equal.
     text = "gain = 0.564 at 0, 0.3; gain = 0.4 at 1, 0.75"

@@ -51,7 +51,7 @@ def test_an_unchanged_machine_raises_no_alarm_and_trains_once():
     assert tested == [index > TRAINING for index in range(ONSET)]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_head_and_the_records_since_the_start_continue_with_the_same_bits():
     """The second change is found after the training that begins with the first one."""
     changed = make_records(ONSET + 6, k=97.0)

@@ -82,7 +82,7 @@ def test_every_form_of_a_term_counts_as_the_recommended_one(seed):
     assert [found.inclusion(form.replace("u(", "u1(")) for form in SIGNS] == [0.0] * 3
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_no_true_term_of_the_motor_of_the_documentation_is_doubtful():
     """sign(y(k-1)) had a probability of 0.36, since sign(y(k-1)) sign(y(k-1)^2) was a rival."""
     found = identify(EXAMPLE_RECORDS["motor"].make())

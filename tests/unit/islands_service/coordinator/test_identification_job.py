@@ -148,7 +148,7 @@ def test_cancelled_job_keeps_the_models_of_its_last_generation(
     assert get_models(run_job(claim(store), store, blobs)) == undisturbed[0]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_job_that_is_cancelled_at_any_check_ends_at_the_next_one(
     store: Store, blobs: Blobs, job: Job
 ) -> None:

@@ -269,7 +269,7 @@ sys.exit(program.main())
 """
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_coordinator_continues_in_a_new_process_after_jobs(
     store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -60,7 +60,7 @@ def test_second_effect_below_the_resolution_is_not_named() -> None:
     assert [each.name for each in found.effects] == ["offset"]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", ["zoh", "foh"])
 @pytest.mark.parametrize("seed", range(3))
 def test_exact_oscillator_has_neither_effects_nor_terms(method: str, seed: int) -> None:

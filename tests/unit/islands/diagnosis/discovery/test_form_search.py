@@ -56,7 +56,7 @@ def test_curve_of_no_listed_form_is_a_family_with_its_shape() -> None:
     np.testing.assert_allclose(saved, found.best.output, rtol=1e-9)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_effect_in_addition_to_a_free_form_is_named() -> None:
     place = THEIRS / float(np.max(np.abs(THEIRS)))
     curve = 0.1 * np.sin(2 * np.pi * place) * (1.0 - place**2) + 0.1 * np.cos(np.pi * place / 2) ** 4

@@ -88,7 +88,7 @@ def fit(record: Dataset, simulation: str | OdeSpec = "linear:2") -> tuple[Calibr
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.nightly) for each in (1, 2))])
 @pytest.mark.parametrize("name", MOVES)
 def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int) -> None:
     base, target = fit(make_record(name, seed))
@@ -97,7 +97,7 @@ def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int
     assert exact == ([] if name == "none" else [name])
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("direct", [0.0, 1.0])
 def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> None:
     """A plant that responds at once has the steps at each sample, and another one their average."""
@@ -119,7 +119,7 @@ def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> 
     assert found.fit.mean_square < 0.7 * base.mean_square
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_slips_between_samples_need_differential_equations() -> None:
     """Its difference equation reads the slips at the samples only."""
     fine, times = 20, np.arange(24_000) / 1000.0
@@ -138,7 +138,7 @@ def test_slips_between_samples_need_differential_equations() -> None:
     assert found.fit.values[found.fit.simulation.get_slice(STICTION)] == pytest.approx(0.35, rel=1e-3)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_steps_are_found_behind_a_play_though_the_catalogue_has_them_before_it() -> None:
     """The search divides what the play leaves of the input."""
     record, play = make_smooth_record(0.2, np.inf), CATALOGUE["backlash"]

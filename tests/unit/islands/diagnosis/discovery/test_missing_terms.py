@@ -132,17 +132,12 @@ def test_missing_term_is_found_with_its_coefficient(name: str) -> None:
     assert text in found.describe()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("text", "expected", "law"),
     [
         ("tanh(x/{scale})", 0.1, lambda x, _v, _u: 20.0 * np.tanh(x / 0.1)),
-        pytest.param(
-            "sign(v)*exp(-(v/{scale})**2)",
-            1.0,
-            lambda _x, v, _u: 6.0 * np.tanh(v / 0.01) * np.exp(-(v**2)),
-            marks=pytest.mark.nightly,
-        ),
+        ("sign(v)*exp(-(v/{scale})**2)", 1.0, lambda _x, v, _u: 6.0 * np.tanh(v / 0.01) * np.exp(-(v**2))),
     ],
 )
 def test_saturation_and_stribeck_curve_are_found_with_their_scale(
@@ -155,7 +150,7 @@ def test_saturation_and_stribeck_curve_are_found_with_their_scale(
     assert scale["s1"] == pytest.approx(expected, rel=0.1)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("is_onset", [True, False])
 def test_friction_in_a_part_of_the_time_is_found_with_its_instant(is_onset: bool) -> None:
     found = search(lambda _x, v, _u, t: 6.0 * np.tanh(v / 0.01) * ((t >= 5.2) == is_onset), timed=True)
@@ -184,7 +179,7 @@ def test_rate_of_the_input_next_to_another_term_is_a_delay() -> None:
     assert values[found.terms[0].parameters[0]] == pytest.approx(coefficient, rel=0.05)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(2))
 def test_output_of_semi_implicit_euler_is_a_negative_delay(seed: int) -> None:
     """The output is recorded after the step, which begins with the input of the same row."""
@@ -278,7 +273,7 @@ def test_discovered_equations_are_the_diagnosis_if_no_effect_explains_as_much() 
     assert b"x*F" in diagnosis_report(Origin("record"), found)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_named_effect_wins_over_terms_that_explain_as_much() -> None:
     found = diagnose("dry friction")
     assert [each.name for each in found.effects][:1] == ["coulomb-friction"]
@@ -297,8 +292,8 @@ def diagnose_with_jump(name: str) -> Diagnosis:
     return islands.diagnose(add_jump(simulate(LAWS[name][0]), 0.05), spec)
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("name", ["bilinear", pytest.param("fifth power", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["bilinear", "fifth power"])
 def test_effect_and_missing_term_are_found_together(name: str) -> None:
     found = diagnose_with_jump(name)
     assert found.verdict == Verdict.DISCOVERED

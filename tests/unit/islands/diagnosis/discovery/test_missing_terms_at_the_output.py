@@ -56,9 +56,8 @@ def find(law: str) -> tuple[Dataset, Diagnosis]:
     return record, diagnose(record, make_column(record))
 
 
-@pytest.mark.parametrize(
-    "law", [pytest.param(law, marks=pytest.mark.ci if law == "u**5" else pytest.mark.nightly) for law in LAWS]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("law", LAWS)
 def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
     _, found = find(law)
     assert found.verdict == "discovered"
@@ -78,7 +77,7 @@ def test_right_simulation_gets_no_terms(seed: int) -> None:
     assert found.discovery is None
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:
     record, found = find("u**5")
     spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))

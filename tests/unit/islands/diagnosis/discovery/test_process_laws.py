@@ -106,7 +106,7 @@ def find(name: str) -> tuple[Dataset, Diagnosis]:
     return record, found
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_process_that_is_slower_in_one_direction_is_found() -> None:
     _, found = find("uneven")
     assert found.verdict == "discovered"
@@ -135,8 +135,8 @@ def test_limit_of_a_state_that_is_not_measured_is_found() -> None:
     assert found.causes[0].parameters["state-clip:x1"].value == pytest.approx(1.8, rel=0.02)
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("name", ["uneven", "radiation", pytest.param("limit", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["uneven", "radiation", "limit"])
 def test_a_law_of_the_process_is_no_model_error(name: str) -> None:
     find(name)
     assert "searching for missing terms" in MESSAGES[name]
@@ -156,7 +156,7 @@ def test_force_in_an_oscillator_is_found_by_a_linear_simulation(name: str, cause
     assert force.value == pytest.approx(value, rel=0.05)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
     [

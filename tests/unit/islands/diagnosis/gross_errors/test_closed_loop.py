@@ -80,7 +80,7 @@ def test_closed_loop_is_said_and_changes_no_verdict() -> None:
     assert acts_at_once(at_once)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_errors_below_the_resolution_are_no_noise_that_is_fed_back() -> None:
     def plant(u: np.ndarray, _dt: float) -> np.ndarray:
         return simulate(u)

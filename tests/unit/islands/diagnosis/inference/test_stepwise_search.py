@@ -30,7 +30,6 @@ from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from lab.diagnosis.trial import Trial, run_trial
 from support.built_in_simulators import make_piezo
-from support.levels import nightly_but
 from support.simulated_records import DT, made, recorded, wave
 
 Array = NDArray[np.float64]
@@ -164,8 +163,8 @@ def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
     assert gains[0].score_gain(with_offset) > MIN_GAIN
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [0, *(seed for seed in (1, 2, 3))])
 def test_equivalent_effects_keep_the_catalogue_order(seed: int) -> None:
     """Rounding does not decide: a sensor offset and a constant force are not distinguishable."""
     oscillator = made()["second-order"]
@@ -250,8 +249,8 @@ TRIALS = {
 }
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("name", nightly_but(["opposed-alone", "gain-before-dead-zone"], TRIALS))
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", TRIALS)
 def test_several_causes_are_found_though_one_alone_is_another(name: str) -> None:
     effects, seed, core = TRIALS[name]
     found = run_trial(Trial(effects, seed, band=(1.0, 4.0), core=core))

@@ -92,12 +92,12 @@ def test_terms_of_the_time_are_left_out_by_their_coefficients() -> None:
     assert found.output[SAMPLES:] == pytest.approx(gain * simulate_lag(record.u[SAMPLES:, 0]), abs=1e-12)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "first", "second"),
     [
         ("periodic-disturbance", 0.2 * np.sin(2.3 * TIME + 0.4), 0.2 * np.sin(2.3 * TIME + 2.9)),
-        pytest.param("linear-drift", 0.5 * TIME / TIME[-1], 0.0, marks=pytest.mark.nightly),
+        ("linear-drift", 0.5 * TIME / TIME[-1], 0.0),
     ],
 )
 def test_causes_with_another_time_in_validation_data_are_named(

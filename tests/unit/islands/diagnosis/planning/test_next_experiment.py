@@ -94,7 +94,7 @@ def test_a_recorded_simulation_predicts_no_other_input() -> None:
     assert "depends on this record" in write_advice(experiment)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_diagnosis_of_the_designed_experiment_names_the_cause_alone() -> None:
     """The prediction holds: causes that it separates are no equivalents in the new record."""
     t = DT * np.arange(2000)

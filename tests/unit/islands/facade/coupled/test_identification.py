@@ -80,7 +80,7 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
     assert read_result(folder / "outputs" / "1-y1").models[0].model.output_name == "y1"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_an_evolution_continues_from_the_stored_state_of_every_output() -> None:
     record = make_coupled_record(PREY, samples=150)
     settings = {"population": 8, "generations": 2, "max_terms": 3, "average": 1, "library_degree": 2}

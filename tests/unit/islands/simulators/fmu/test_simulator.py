@@ -151,7 +151,7 @@ def test_a_record_that_does_not_fit_is_refused(change: dict[str, object], query:
         make_simulator(f"fmu:{path}{query}", replace(oscillation(), **change))  # type: ignore[arg-type]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_hidden_effect_is_named_and_a_clean_record_has_none(tmp_path: Path) -> None:
     """The output of the FMU is cut off at 0.15 m; the result is saved, and simulated and diagnosed again."""
     clean = oscillation(250, 0.001)

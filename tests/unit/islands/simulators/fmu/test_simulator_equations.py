@@ -165,7 +165,7 @@ def make_record(spec: FmuSpec | OdeSpec, samples: int = 300, noise: float = 1e-3
     return recorded(wave(samples), y, units=("N", "m"))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_missing_stiffness_is_discovered_in_the_equation_of_an_fmu() -> None:
     """The equations of the record have a cubic term; the extended FMU is saved and simulated again."""
     record = make_record(make_equations({"v": "- 60*d*x**3"}))

@@ -217,7 +217,7 @@ def test_equations_without_states_are_simulated(tmp_path: Path) -> None:
     assert np.array_equal(again.simulate(again.nominal), 3.0 * record.u[:, 0])
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_missing_term_of_equations_without_states_is_discovered(tmp_path: Path) -> None:
     path, record = make_static(tmp_path)
     diagnosis = islands.diagnose(record, path, effects=FEW)
@@ -268,7 +268,7 @@ def simulate_motor(samples: int, friction: float) -> tuple[Array, Array]:
     return u, speeds
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_dry_friction_that_the_equations_lack_is_named() -> None:
     """The parameters differ from those of the file by less than their tolerances, which therefore apply."""
     u, speed = simulate_motor(600, 4e-3)

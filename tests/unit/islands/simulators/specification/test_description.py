@@ -151,12 +151,13 @@ def test_an_extension_can_be_extended_again(case: SpecAndRecord) -> None:
     assert_same_output(outer, extend(outer, further))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("kind", "name", "point"),
     [
         ("column", "jump", (1.0, 2.0)),
-        pytest.param("bouc-wen-piezo", "even-nonlinearity", (1e-3,), marks=pytest.mark.nightly),
-        pytest.param("linear", "delay", (0.02,), marks=pytest.mark.nightly),
+        ("bouc-wen-piezo", "even-nonlinearity", (1e-3,)),
+        ("linear", "delay", (0.02,)),
     ],
 )
 def test_a_second_diagnosis_of_an_extension_finds_no_effect(

@@ -116,7 +116,7 @@ def test_columns_of_different_clocks_give_the_law_at_the_rate_of_the_slowest(tmp
     assert f", every {record.dt:.4g} s" in record.reading[0].partition("read at those of ")[2]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("case", ["empty cells", "held"])
 def test_the_defaults_find_the_law_of_columns_of_different_clocks(tmp_path, case):
     """Held values gave a dead time of nine samples, terms of friction and twelve times the error."""
