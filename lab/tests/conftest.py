@@ -1,4 +1,4 @@
-"""Levels: the smoke test of the laboratory is fast, its imports are tested in ci, everything else at night."""
+"""Levels: the smoke test of the laboratory is fast, its imports are tested in ci, all others at night."""
 
 from pathlib import Path
 
