@@ -1,4 +1,4 @@
-"""Levels of the laboratory: the smoke test is fast, and everything that is not nightly belongs to ci."""
+"""Levels: the smoke test of the laboratory is fast, its imports are tested in ci, all others at night."""
 
 from pathlib import Path
 
@@ -10,6 +10,5 @@ FOLDER = Path(__file__).parent
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     for item in items:
-        is_smoke = item.path.name == "test_smoke.py"
-        if FOLDER in item.path.parents and not is_smoke and not item.get_closest_marker("nightly"):
-            item.add_marker("ci")
+        if FOLDER in item.path.parents and item.path.name not in ("test_smoke.py", "test_imports.py"):
+            item.add_marker("nightly")

@@ -6,14 +6,11 @@ The measured times are not tested, because they depend on the load of the machin
 import json
 import shutil
 
-import pytest
-
 from support.command_line import succeed
 
 KINDS = {"poly", "general", "gp"}
 
 
-@pytest.mark.nightly
 def test_quick_benchmark_measures_all_sides(tmp_path):
     written, figures = tmp_path / "new" / "bench.json", tmp_path / "figures"
     shown = succeed("bench", "--quick", "--json", written, "--out", figures)

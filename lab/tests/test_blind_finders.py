@@ -18,7 +18,7 @@ Finder = Callable[[Trial], TrialOutcome]
 EXCHANGED = ("offset", "linear-drift", "jump", "thermal-drift")
 
 
-@pytest.mark.parametrize("name", ["jump", pytest.param("thermal-drift", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("name", ["jump", "thermal-drift"])
 def test_exchanged_names_in_the_catalogue_fail_the_checks(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The effects of the real finder are exchanged, not its answers; with true effects the checks pass."""
     wrong = dict(CATALOGUE)

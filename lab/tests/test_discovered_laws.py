@@ -12,9 +12,6 @@ from lab.diagnosis.missing_terms import LAWS, MAX_ERROR, run_trial
 #: First seed; no seed from here on was used for tuning.
 SEED = 910_000
 
-#: The law of the level ci, that of the simulation with the fewest parameters.
-FAST = "cubic damping"
-
 #: Laws that are found in some records only; `missing_terms.py` gives the rates.
 UNCERTAIN = (
     "Stribeck friction",
@@ -26,16 +23,7 @@ UNCERTAIN = (
 @pytest.mark.timeout(2400)  # an axis takes up to 20 minutes next to other tests
 @pytest.mark.parametrize(
     ("simulator", "law"),
-    [
-        pytest.param(
-            simulator,
-            law,
-            marks=pytest.mark.ci if law == FAST and simulator != "rigid-axis" else pytest.mark.nightly,
-        )
-        for simulator, laws in LAWS.items()
-        for law in laws
-        if law not in UNCERTAIN
-    ],
+    [(simulator, law) for simulator, laws in LAWS.items() for law in laws if law not in UNCERTAIN],
 )
 def test_hidden_law_is_discovered_and_predicts_another_record(simulator: str, law: str) -> None:
     found, error = run_trial(simulator, law, strength=3.0, seed=SEED)

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from support.repository import ROOT
 
 NAMES = [
@@ -12,6 +14,7 @@ NAMES = [
 ]
 
 
+@pytest.mark.ci
 def test_every_measurement_can_be_imported() -> None:
     program = f"from importlib import import_module\nfor name in {NAMES}: import_module(name)"
     done = subprocess.run(

@@ -10,7 +10,7 @@ from islands.diagnosis.inference.finding import Finding
 from islands.diagnosis.result import Diagnosis
 from lab.diagnosis.measured_discrepancies import CASES, DATA, errors
 
-pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.timeout(600)
 
 
 @cache

@@ -9,7 +9,6 @@ from lab.diagnosis.planned_separation import EXPERIMENTS, compare, count_decided
 SEEDS = range(10)
 
 
-@pytest.mark.nightly
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize(
     ("experiment", "cause"),
@@ -24,7 +23,6 @@ def test_diagnoses_separate_the_causes_that_the_plan_calls_separable(experiment:
     assert found.equivalent >= 0.8 * found.inseparable
 
 
-@pytest.mark.nightly
 @pytest.mark.timeout(3000)
 def test_the_decisive_input_names_one_cause_where_the_given_one_names_two() -> None:
     before, after = count_decided(("cubic-stiffness", "even-nonlinearity"), SEEDS)

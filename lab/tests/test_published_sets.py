@@ -56,7 +56,6 @@ def test_a_run_has_a_row_for_each_class_and_test(folder):
         assert (row["median"] is None) == (row["per_seed"][0]["reason"] is not None)
 
 
-@pytest.mark.nightly
 def test_a_package_of_the_index_is_measured(folder):
     """A lag is linear: any of the packages finds it, up to the noise of the output."""
     pip = [sys.executable, "-m", "pip", "download", "--no-deps", "--quiet", "--dest", folder / "index"]

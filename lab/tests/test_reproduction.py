@@ -33,7 +33,6 @@ def test_short_form_of_case_2_prints_and_writes_its_tables(
     assert list(results(tmp_path)) == ["case2-published.json"]
 
 
-@pytest.mark.nightly
 @pytest.mark.timeout(900)
 def test_interrupted_short_form_continues_with_the_same_bytes(tmp_path: Path) -> None:
     command = [ISLANDS, "reproduce", "all", "--quick", "--seeds", "1", "--runs", "1", "--out"]

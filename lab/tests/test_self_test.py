@@ -103,7 +103,6 @@ def test_clean_surrogates_do_not_contain_the_named_effect(diagnosis: Diagnosis) 
     assert diagnose_surrogate(surrogates, SurrogateCase(None, 1)).named == NOTHING
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [0, 1])
 def test_stronger_injection_has_a_larger_misfit(
     surrogates: Surrogates, effects: Sequence[Effect], seed: int
@@ -187,7 +186,6 @@ def test_result_does_not_depend_on_the_order_of_evaluation(
     assert again.confusion == tested.confusion
 
 
-@pytest.mark.ci
 def test_detection_limit_does_not_depend_on_other_effects(
     column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
@@ -244,7 +242,6 @@ def test_detection_limit_is_the_smallest_recognised_strength(
         assert len(evaluated) <= 4
 
 
-@pytest.mark.ci
 def test_noise_model_fitted_to_a_drift_is_stable(diagnosis: Diagnosis) -> None:
     drift = np.concatenate(
         [1e-3 * 1.02 ** np.arange(diagnosis.estimation_samples), np.zeros(diagnosis.record.samples)]

@@ -55,7 +55,7 @@ def quick_self_test(
     [
         pytest.param(40, None, True, id="stub"),
         pytest.param(4, ("offset",), False, id="small"),
-        pytest.param(40, None, False, id="whole", marks=pytest.mark.nightly),
+        pytest.param(40, None, False, id="whole"),
     ],
 )
 def test_self_test_reports_detection_limits_and_false_alarms(
@@ -92,7 +92,6 @@ def test_self_test_reports_detection_limits_and_false_alarms(
     assert re.search(row, text)
 
 
-@pytest.mark.nightly
 def test_self_test_does_not_depend_on_the_number_of_workers(offset_record: Path) -> None:
     (_, serial), (_, parallel) = (
         run_self_test(offset_record, f"workers-{workers}", "--workers", workers) for workers in (1, 2)

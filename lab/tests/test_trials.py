@@ -71,7 +71,6 @@ def test_unusual_causes_are_scored_on_fresh_records(tmp_path: Path, monkeypatch:
 
 
 # Limits below the goals, which detect a degraded analysis.
-@pytest.mark.nightly
 @pytest.mark.timeout(3600)
 def test_most_unusual_causes_are_recognised(tmp_path: Path) -> None:
     succeed("trials", "--unusual", 1, "--seed", 8_100_000, "--json", tmp_path / "trials.json")
@@ -85,7 +84,6 @@ def test_most_unusual_causes_are_recognised(tmp_path: Path) -> None:
     assert ratio["value"] < 0.1
 
 
-@pytest.mark.nightly
 def test_repeated_trials_give_identical_counts(tmp_path: Path) -> None:
     command = ("trials", "--effects", "offset", "--effects", "cubic-stiffness", "--count", 1, "--clean", 2)
     more = ("--open-set", 0, "--pairs", 1, "--seconds", 20, "--seed", 7)
@@ -101,7 +99,6 @@ def test_repeated_trials_give_identical_counts(tmp_path: Path) -> None:
     assert sum(each["count"] for each in scores["reliability"]) >= 2
 
 
-@pytest.mark.nightly
 def test_simulations_have_separate_tables_and_figures(tmp_path: Path) -> None:
     printed = succeed(
         *("trials", "--core", "column", "--core", "second-order", "--effects", "offset", "--count", 1),
@@ -123,7 +120,6 @@ FAMILIES = (
 )
 
 
-@pytest.mark.nightly
 def test_effect_of_each_family_is_found(tmp_path: Path) -> None:
     """The trials run in parallel processes, as usual."""
     assert {CATALOGUE[name].family for name in FAMILIES} == {each.family for each in CATALOGUE.values()}
@@ -141,7 +137,6 @@ def test_effect_of_each_family_is_found(tmp_path: Path) -> None:
 
 
 # Limits below the goals, which detect a degraded analysis.
-@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("core", "first", "within", "pairs", "false_names"),
     [
@@ -166,14 +161,7 @@ def test_most_injected_effects_are_found(
     assert found["false names on clean records"] <= false_names
 
 
-#: Kinds of noise in the trials of every change.
-FEW = ("ar",)
-
-
-@pytest.mark.parametrize(
-    "noise",
-    [pytest.param(noise, marks=pytest.mark.ci if noise in FEW else pytest.mark.nightly) for noise in NOISES],
-)
+@pytest.mark.parametrize("noise", NOISES)
 def test_effects_are_named_and_noise_is_not(noise: str) -> None:
     """A random walk may be named a drift. In ten seconds, slow noise is not distinguished from one."""
     seconds = 30.0 if noise == "slow-ar" else 10.0

@@ -11,7 +11,7 @@ BY_TITLE = {record.title: record for record in AWKWARD_RECORDS}
 OUTPUT_ERROR = ("battery", "tank")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("title", ["Russian", "outer join of two clocks"])
 def test_an_awkward_file_leads_to_its_law(tmp_path, title):
     default, suggested = assess(BY_TITLE[title], 0, tmp_path)

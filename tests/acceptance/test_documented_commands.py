@@ -68,11 +68,6 @@ def test_a_wrong_option_is_found() -> None:
     assert set(used_options(rest)) - option_names(command) == {"--outputs"}
 
 
-def test_a_wrong_command_is_found() -> None:
-    with pytest.raises(AssertionError, match="no command"):
-        find_command(["islands", "jobs", "begin"])
-
-
 class ScriptCommand(NamedTuple):
     """Command that runs a script or tests of the repository."""
 

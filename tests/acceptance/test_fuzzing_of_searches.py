@@ -16,7 +16,7 @@ SEED = 1
 
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
-    "cases", [pytest.param(50, marks=pytest.mark.ci), pytest.param(200, marks=pytest.mark.nightly)]
+    "cases", [pytest.param(16, marks=pytest.mark.ci), pytest.param(200, marks=pytest.mark.nightly)]
 )
 def test_every_search_of_a_short_or_extreme_record_ends_in_a_result_or_in_words(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, cases: int

@@ -13,14 +13,14 @@ SECONDS = 15.0
 #: Duration of a short record, in seconds.
 SHORT = 6.0
 
-ci, nightly = pytest.mark.ci, pytest.mark.nightly
+pytestmark = pytest.mark.nightly
 
 
 def run(*effects: str, seed: int, seconds: float, band: tuple[float, float] | None = None) -> TrialOutcome:
     return run_trial(Trial(effects, seed, band=band, seconds=seconds, core="narx"))
 
 
-@pytest.mark.parametrize("seconds", [pytest.param(SHORT, marks=ci), pytest.param(SECONDS, marks=nightly)])
+@pytest.mark.parametrize("seconds", [SHORT, SECONDS])
 def test_clean_record_only_yields_the_model_form_error(seconds: float) -> None:
     found = run(seed=802, seconds=seconds)
     assert found.verdict == "named"
@@ -29,15 +29,9 @@ def test_clean_record_only_yields_the_model_form_error(seconds: float) -> None:
     assert not found.noticed
 
 
-@pytest.mark.parametrize(
-    ("name", "seconds"),
-    [
-        pytest.param("coulomb-friction", SECONDS, marks=nightly),
-        pytest.param("offset", SECONDS, marks=nightly),
-    ],
-)
-def test_injected_effect_is_separated_from_the_model_form_error(name: str, seconds: float) -> None:
-    found = run(name, seed=803, seconds=seconds, band=(1.0, 4.0))
+@pytest.mark.parametrize("name", ["coulomb-friction", "offset"])
+def test_injected_effect_is_separated_from_the_model_form_error(name: str) -> None:
+    found = run(name, seed=803, seconds=SECONDS, band=(1.0, 4.0))
     assert found.verdict in ("named", "named with remainder")
     assert found.first_right, (found.named, found.candidates)
     assert found.form

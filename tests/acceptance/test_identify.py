@@ -74,21 +74,6 @@ def test_folder_contains_models_figures_and_a_checkpoint(folder: Path) -> None:
 
 
 @pytest.mark.ci
-def test_run_ended_by_its_budget_resumes_to_the_same_models(folder: Path) -> None:
-    out = folder / "budget"
-    with undrawn_figures():
-        succeed(
-            *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
-            *("--set", "max_evaluations=90", "--test", 0.2, "--out", out),
-        )
-        assert stored(out)["search"]["ended_by"] == "evaluations"
-        assert stored(out)["search"]["generations"] < 6
-        change_generations(json.loads((out / "checkpoint.json").read_text()), 6, out)
-        succeed("identify", "--resume", out)
-    assert_same_search(out, folder / "whole")
-
-
-@pytest.mark.ci
 def test_run_stopped_by_ctrl_c_resumes_to_the_same_models(folder: Path) -> None:
     out = folder / "stopped"
     running = subprocess.Popen(
@@ -139,12 +124,3 @@ def test_changed_record_is_rejected_on_resuming(folder: Path) -> None:
     finally:
         record.write_text(kept)
     assert (folder / "whole/result.json").read_bytes() == before
-
-
-def test_invalid_budget_is_rejected_in_one_line(folder: Path) -> None:
-    base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
-    assert (
-        fail(*base, "--set", "population=0").strip()
-        == "error: population is an integer of at least 1, got '0'"
-    )
-    assert not (folder / "never").exists()

@@ -13,10 +13,15 @@ from lab.fuzzing.invariance import TRANSFORMATIONS, Answer, compare, draw_case, 
 #: Cases of the seed 0 that take a few seconds each; `lab/fuzzing/invariance.py` has others.
 CASES = (3, 8, 9, 10, 11, 12, 13, 14, 17, 20, 24, 85)
 
+#: Cases of more than eight seconds.
+SLOW = (3, 10, 14, 24)
+
 
 @pytest.mark.ci
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("number", CASES)
+@pytest.mark.parametrize(
+    "number", [pytest.param(each, marks=pytest.mark.nightly) if each in SLOW else each for each in CASES]
+)
 def test_a_result_does_not_depend_on_how_a_record_is_written(number: int, tmp_path: Path) -> None:
     case = draw_case(0, number)
     difference, answers = run_case(case, tmp_path)

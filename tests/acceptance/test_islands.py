@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from support.command_line import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
+from support.command_line import BUDGET, COLUMNS, found, stored, succeed, write_hysteresis
 from support.undrawn import undrawn_figures
 
 #: Options of three islands with a migration schedule.
@@ -38,21 +38,6 @@ def identify(base: Path, out: str, *options: object) -> str:
         )
 
 
-@pytest.mark.ci
-def test_result_contains_the_settings_of_the_islands(folder: Path) -> None:
-    result = stored(folder / "serial")
-    settings = result["settings"]
-    assert (settings["islands"], settings["topology"], settings["migrate_every"]) == (
-        *(3, "bidirectional-ring"),
-        "2,4:1",
-    )
-    assert settings["characters"] == ["plain", "explorer"]
-    assert "engine" not in settings
-    assert result["search"]["evaluations"] == 3 * 7 * 30
-    assert result["search"]["ended_by"] == "generations"
-    assert (folder / "serial/figures/islands.svg").exists()
-
-
 @pytest.mark.nightly
 def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
     out = folder / "moved"
@@ -66,20 +51,3 @@ def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
     with undrawn_figures():
         succeed("identify", "--resume", out, "--engine", "serial")
     assert found(out) == found(folder / "serial")
-
-
-@pytest.mark.ci
-def test_invalid_island_options_are_rejected_in_one_line(folder: Path) -> None:
-    base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
-    for options, message in (
-        (("--islands", 0), "islands is an integer from 1 to 10000, got '0'"),
-        (("--islands", 1_000_000), "islands is an integer from 1 to 10000"),
-        (("--set", "topology=spiral"), "unknown topology 'spiral': take one of isolated, ring"),
-        (("--islands", 3, "--set", "topology=0>7"), "does not join two of the islands 0 to 2"),
-        (("--set", "migrate_every=often"), "cannot read migrate_every 'often'"),
-        (("--engine", "steam"), "engine is one of serial, ray, got 'steam'"),
-        (("--set", "characters=grumpy"), "unknown character 'grumpy'"),
-        (("--set", "ray_address=127.0.0.1:9"), "no Ray cluster answers at 127.0.0.1:9"),
-    ):
-        assert message in fail(*base, *options)
-    assert not (folder / "never/result.json").exists()

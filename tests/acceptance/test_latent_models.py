@@ -48,15 +48,6 @@ def test_the_cubic_spring_is_found(folder):
         assert line.startswith("    ") != line[:2].strip().isdigit()
 
 
-def test_a_saved_model_simulates_another_record(folder):
-    text = succeed("simulate", folder / "out", folder / "other.csv", "--bands", "0.9")
-    model, other = islands.load(folder / "out").best.model, read(folder)
-    run = free_run(model, other)
-    error = (run.y - other.y)[model.maximum_lag :]
-    assert np.sqrt(np.mean(error**2)) == pytest.approx(0.02, rel=0.1)
-    assert "RMSE 0.02" in text
-
-
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
 def test_a_c_file_repeats_the_simulation_from_the_states_that_it_prints(folder, tmp_path):
     printed = " ".join(succeed("simulate", folder / "out", folder / "other.csv").split())
@@ -76,31 +67,6 @@ def test_a_c_file_repeats_the_simulation_from_the_states_that_it_prints(folder, 
     assert y[: first - sample] == pytest.approx(other.y[sample:first], abs=0.1)
 
 
-def test_settings_of_narx_models_are_refused(folder):
-    columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused")
-    text = fail("fit", folder / "spring.csv", *columns, "--model", "latent", "--lags", "3")
-    assert "settings of NARX models" in text
-
-
-def test_constraints_of_an_option_hold_and_are_stated(folder, tmp_path):
-    search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
-    budget = ("--preset", "latent", "--islands", "1", "--set", "population=6", "--generations", "1")
-    text = "fixed-point = 0, 0.3; gain = 0.564"
-    succeed(*search, *budget, "--constraints", text, "--out", tmp_path / "out")
-    found = islands.load(tmp_path / "out")
-    assert found.settings["constraints"] == text
-    assert all(check["met"] for entry in found.models for check in entry.document["constraints"])
-    assert f"Constraints that the model meets: {text}." in (tmp_path / "out" / "summary.txt").read_text()
-    refused = fail(*search, *budget, "--constraints", "[u(k-1)] = 1", "--out", tmp_path / "refused")
-    assert "Statements about latent models are gain, fixed-point and odd" in " ".join(refused.split())
-    fitted = (
-        "fit",
-        *search[1:6],
-        *("--model", "latent", "--constraints", "even", "--out", tmp_path / "refused"),
-    )
-    assert "its states read the inputs linearly" in " ".join(fail(*fitted).split())
-
-
 def test_a_structure_is_that_of_latent_models(folder):
     columns = ("--input", "u_V", "--output", "y_mm", "--out", folder / "refused", "--set")
     text = fail("fit", folder / "spring.csv", *columns, "structure=wiener")
@@ -114,25 +80,6 @@ def test_a_fit_has_the_structure_that_is_given(folder):
     found = islands.fit(read(folder)[:300], model="latent", structure="feedback")
     assert found.settings["structure"] == "feedback"
     assert not any(name.startswith("f") for name in found.best.model.parameter_names)
-
-
-def test_a_search_has_the_structure_that_its_option_names(folder, tmp_path):
-    search = ("identify", folder / "spring.csv", "--input", "u_V", "--output", "y_mm", "--engine", "serial")
-    budget = ("--preset", "latent", "--islands", "2", "--set", "population=6", "--generations", "2")
-    succeed(*search, *budget, "--set", "structure=wiener", "--out", tmp_path / "out")
-    found = islands.load(tmp_path / "out")
-    assert found.settings["structure"] == "wiener"
-    models = [entry.model for entry in found.models]
-    assert any(model.units for model in models)
-    assert not any(name.startswith("e") for model in models for name in model.parameter_names)
-    method = " ".join((tmp_path / "out" / "method.txt").read_text().split())
-    assert "for 2 generations of 6 offspring" in method
-    assert "no unit acts on the states" in method
-    assert "full polynomial set" not in method
-    text = fail(*search, *budget, "--set", "structure=phi", "--out", tmp_path / "refused")
-    assert "unknown structure of latent models 'phi': take one of auto, wiener" in text
-    text = fail(*search, "--set", "structure=wiener", "--out", tmp_path / "refused")
-    assert "unknown structure of narx models 'wiener'" in text
 
 
 @pytest.mark.nightly

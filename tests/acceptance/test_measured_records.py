@@ -50,11 +50,6 @@ def test_silverbox_is_simulated_to_less_than_half_a_millivolt():
     assert 0.2 < without_extrapolation < 0.45
 
 
-def test_silverbox_without_direct_feedthrough_is_several_times_less_accurate():
-    # Several times the bounds above.
-    assert min(silverbox_errors("u")) > 2.0
-
-
 # The rig of the paper's second case study, at 150 V and 1 Hz: two and a half periods each.
 
 
@@ -77,13 +72,6 @@ def test_constrained_model_of_the_measured_piezo_does_not_drift(piezo):
     # the check reports the divergence.
     bounded = {excursion.name for excursion in best.physics.excursions if excursion.bounded}
     assert bounded >= {"minor-loops", "amplitude x 0.5", "rate x 0.25"}
-
-
-def test_unconstrained_model_of_the_measured_piezo_drifts_in_a_hold(piezo):
-    best = islands.fit(piezo[0], validation=piezo[1], constraints="none").best
-    assert best.metrics["validation"]["free_run"].mape < 0.2
-    assert best.physics.property_1 is False
-    assert best.physics.hold_drift_percent > 20.0
 
 
 # Controls: linear systems.

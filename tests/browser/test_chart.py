@@ -97,14 +97,6 @@ def test_a_line_is_interrupted_at_missing_or_nonpositive_values(page: Any) -> No
     assert all(math.isfinite(each) for part in parts for point in part for each in point)
 
 
-def test_a_single_point_and_a_constant_are_drawn(page: Any) -> None:
-    for points in ([[3, 0.2]], [[0, 0.2], [1, 0.2]]):
-        for options in (LOG, {}):
-            drawn = heights(draw(page, [make_series("a", points)], **options), "a")
-            assert len(drawn) == len(points)
-            assert all(10 <= height <= 214 for height in drawn)
-
-
 def test_arrow_keys_move_the_pointer_and_announce_the_values(page: Any) -> None:
     series = [make_series("a", [[at, 1.0 / (at + 1)] for at in range(0, 50, 5)])]
     plot = draw(page, series, **LOG).get_by_role("slider", name="Errors")
@@ -134,13 +126,6 @@ def test_downsampling_keeps_the_ends_and_the_extremes(page: Any) -> None:
     assert len(places) <= 2 * 100 + 2
     assert {0, 4321, 8765, 9999} <= set(places)
     assert places == sorted(set(places))
-
-
-def test_the_nearest_point_matches_an_exhaustive_search(page: Any) -> None:
-    abscissas = [0, 2, 10]
-    for x, expected in ((-5, 0), (0.9, 0), (1.1, 1), (5.9, 1), (6.1, 2), (99, 2)):
-        assert call(page, "components/chart.js", "findNearest", abscissas, x) == expected
-    assert call(page, "components/chart.js", "findNearest", [], 1) == -1
 
 
 @pytest.mark.parametrize(

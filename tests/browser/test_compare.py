@@ -39,6 +39,7 @@ def compared(opened: Callable[..., Any], jobs: tuple[str, str]) -> Any:
     return page
 
 
+@pytest.mark.nightly
 def test_two_jobs_are_compared(
     compared: Any, service: ServiceClient, jobs: tuple[str, str], expect: Any
 ) -> None:

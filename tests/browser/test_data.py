@@ -171,6 +171,7 @@ def test_only_changed_settings_are_sent_and_a_job_can_be_run_again(
     assert submit(looked, desk)["settings"] == {"generations": 7}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_pages_of_data_are_readable(
     quiet: Callable[..., Screen], desk: ServiceClient, text: str, scheme: str, width: int

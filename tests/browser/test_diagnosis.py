@@ -135,6 +135,7 @@ def test_the_values_of_all_outputs_are_read_with_the_keys(
     expect(plot).to_have_attribute("aria-valuetext", re.compile(rf"^0\.04 s: {names}$"))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_page_of_a_finished_diagnosis_is_readable(
     quiet: Callable[..., Screen], desk: ServiceClient, finished: str, scheme: str, width: int

@@ -96,6 +96,7 @@ def test_a_wrong_equation_is_explained_and_the_corrected_one_started(
     assert "2*c*v" in spec["simulation"]["equations"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_form_is_readable(
     quiet: Callable[..., Screen], desk: ServiceClient, dataset: str, expect: Any, scheme: str, width: int

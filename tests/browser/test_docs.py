@@ -43,6 +43,7 @@ def test_an_operation_leads_by_keyboard_to_the_schema_of_its_body(
     expect(schema.get_by_role("row", name="dataset").first).to_contain_text("string, required")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_reference_is_readable(docs: Callable[..., Any], expect: Any, scheme: str, width: int) -> None:
     page = docs("docs#submit_v1_jobs_post", width=width, color_scheme=scheme)

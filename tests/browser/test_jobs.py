@@ -65,19 +65,6 @@ def test_a_row_shows_the_equation_the_error_and_the_verdict(
     assert not found.locator("progress").is_visible()
 
 
-def test_a_click_anywhere_in_a_row_opens_its_job(
-    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = end(desk, desk.submit(500, name="stage 3"))
-    page = screens(desk.url).go()
-    row(page, job).locator(".verdict").click()
-    expect(page.get_by_role("heading", level=1, name="stage 3")).to_be_visible()
-    page.go_back()
-    expect(row(page, job)).to_be_visible()
-    stops = row(page, job).locator("a, button, input").evaluate_all("all => all.map((each) => each.tagName)")
-    assert stops == ["INPUT", "A", "BUTTON"]
-
-
 def test_a_name_is_changed_in_its_row(quiet: Callable[..., Screen], desk: ServiceClient, expect: Any) -> None:
     job = desk.submit(500, name="before")
     page = quiet(desk.url).go()
@@ -100,36 +87,6 @@ def test_a_name_is_changed_in_its_row(quiet: Callable[..., Screen], desk: Servic
     expect(row(page, job).locator("th a").first).to_have_text("after <b>")
     expect(page.locator("tr[data-job]")).to_have_count(2)
     assert desk.job(job)["name"] == "after <b>"
-
-
-def test_a_refused_name_stays_in_its_field(
-    screens: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    job = desk.submit(500, name="before")
-    page = screens(desk.url).go()
-    page.route("**/v1/jobs/*", lambda route: route.fulfill(status=422, json={"title": "no", "detail": "why"}))
-    row(page, job).get_by_role("button", name="Rename").click()
-    field = row(page, job).get_by_role("textbox")
-    field.fill("after")
-    page.keyboard.press("Enter")
-    expect(page.locator(".banner")).to_contain_text("why")
-    expect(field).to_have_value("after")
-
-
-def test_rows_do_not_move_under_the_pointer(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    old = [desk.submit(500, name=f"old {number}") for number in range(2)]
-    page = quiet(desk.url).go()
-    row(page, old[0]).hover()
-    new = desk.submit(500, name="new")
-    button = page.get_by_role("button", name="Show 1 new")
-    expect(button).to_be_visible()
-    assert shown(page) == old[::-1]
-    button.click()
-    expect(row(page, new)).to_be_visible()
-    assert shown(page) == [new, *old[::-1]]
-    expect(button).to_have_count(0)
 
 
 def test_tags_are_added_on_the_page_of_a_job_and_filter_the_list(

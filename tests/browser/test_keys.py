@@ -89,19 +89,6 @@ def test_event_streams_are_opened_with_the_key(
 
 
 @pytest.mark.nightly
-def test_a_revoked_key_shows_the_key_form_with_the_reason(
-    screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
-) -> None:
-    page = screens(locked.url).go()
-    enter(page, key)
-    expect(page.get_by_role("heading", name="No jobs yet")).to_be_visible()
-    with stored(locked) as store:
-        store.keys.revoke(store.keys.find(key).id)
-    expect(page.get_by_role("alert")).to_contain_text("the key was revoked")
-    assert page.evaluate("sessionStorage.getItem('islands.key')") is None
-
-
-@pytest.mark.nightly
 def test_an_action_without_its_scope_shows_a_problem(
     screens: Callable[..., Screen], locked: ServiceClient, key: str, expect: Any
 ) -> None:

@@ -42,17 +42,6 @@ def test_a_new_job_appears_and_changes_its_state(
     expect(page.get_by_role("status")).to_have_text("\u2068tank, level 3\u2069: failed")
 
 
-def test_a_name_cannot_reverse_the_text_around_it(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    """A right-to-left override would turn "report\u202efdp.exe" into "reportexe.pdf" and all that follows."""
-    job = desk.submit(500, name="report\u202efdp")
-    link = row(quiet(desk.url).go(), job).locator("th a")
-    expect(link.locator("bdi")).to_have_text("report\u202efdp")
-    assert link.locator("bdi").evaluate("node => getComputedStyle(node).unicodeBidi") == "isolate"
-    desk.ask("POST", f"/v1/jobs/{job}/cancel")
-
-
 def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:
@@ -83,19 +72,6 @@ def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], des
     page.get_by_role("heading", name="Data set").wait_for()
     assert page.title() == f"{HOSTILE} · islands"
     assert page.locator("main script, main img").count() == 0
-
-
-def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], desk: ServiceClient) -> None:
-    job = desk.submit(500)
-    page = quiet(desk.url).go()
-    link = row(page, job).locator("th a")
-    link.focus()
-    new = desk.submit(500)
-    row(page, new).wait_for()
-    assert link.evaluate("link => link === document.activeElement")
-    page.keyboard.press("Enter")
-    page.get_by_role("heading", name="Settings").wait_for()
-    assert page.url.endswith(f"#/jobs/{job}")
 
 
 def test_a_hidden_page_sends_no_requests(quiet: Callable[..., Screen], desk: ServiceClient) -> None:

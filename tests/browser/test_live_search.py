@@ -60,7 +60,7 @@ def test_the_front_grows_and_its_points_show_their_equations(
     expect(page.locator(".map")).to_contain_text("Generation 95: 1 model was sent along each arrow.")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_stop_and_keep_the_best_ends_a_search_with_models(
     opened: Callable[..., Any], searching: ServiceClient, expect: Any
 ) -> None:

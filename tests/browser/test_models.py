@@ -103,6 +103,7 @@ def test_figures_are_loaded_when_they_scroll_into_view(
     expect(page.locator(".search img")).to_have_count(4, timeout=DRAWN)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_models_panel_has_sufficient_contrast(
     opened: Callable[..., Any], finished: str, expect: Any, width: int, scheme: str

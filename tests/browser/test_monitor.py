@@ -83,6 +83,7 @@ def places(
     return {"list": "#/monitors", "monitor": f"#/monitors/{monitor}"}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["list", "monitor"])
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_pages_of_monitors_fit_and_have_sufficient_contrast(

@@ -117,6 +117,7 @@ def test_an_fmu_is_uploaded_previewed_and_diagnosed(
     assert again["spec"] == job["spec"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), APPEARANCES)
 def test_the_form_of_an_fmu_and_a_preview_are_readable(
     quiet: Callable[..., Screen],

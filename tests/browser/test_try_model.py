@@ -1,6 +1,5 @@
 """Response of a model to inputs of choice on the page of a job, while sliders move."""
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -82,25 +81,7 @@ def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect
     expect(page.get_by_text("Before the first sample", exact=False)).to_be_visible()
 
 
-def test_the_response_is_saved_with_every_digit(tried: Callable[..., Any]) -> None:
-    page = tried()
-    with page.expect_response(lambda answer: answer.url.endswith("/simulate")) as answered:
-        page.get_by_label("Samples").fill("300")
-    document = json.loads(answered.value.body())
-    page.wait_for_function("document.querySelector('.try form button:enabled')")
-    page.wait_for_timeout(200)
-    with page.expect_download() as download:
-        page.get_by_role("button", name="Save as CSV").click()
-    heading, *rows = download.value.path().read_text().splitlines()
-    assert heading == "t_s,u_V,y_um"
-    columns = zip(*([float(cell) for cell in row.split(",")] for row in rows), strict=True)
-    assert [list(each) for each in columns] == [
-        document["time_s"],
-        document["inputs"]["u_V"],
-        document["output"],
-    ]
-
-
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
 def test_the_section_fits_and_has_sufficient_contrast(
     tried: Callable[..., Any], scheme: str, width: int

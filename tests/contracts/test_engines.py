@@ -12,7 +12,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.engine import SerialEngine, run_epoch, select_migrants
+from islands.evolution.engine import SerialEngine, run_epoch
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
@@ -126,16 +126,6 @@ def test_engine_equals_single_epochs_of_the_islands(history, search_problem):
         assert epoch.steps == tuple(each.steps for each in epochs)
 
 
-@separate_actors(pytest.mark.nightly)
-def test_migration_affects_the_result(history, engine, search_problem):
-    alone = replace(search_problem, settings=replace(SETTINGS, topology="isolated"))
-    isolated = archipelagos(engine.run(alone, empty_archipelago(3, 7), never_stop))
-    # Emigrants of generation 2 immigrate at the beginning of the next epoch.
-    assert isolated[:2] == archipelagos(history)[:2]
-    assert isolated[-1] != history[-1].archipelago
-    assert all(select_migrants(island, SETTINGS) for island in history[1].archipelago.islands)
-
-
 @pytest.mark.parametrize(
     ("name", "stop"),
     [
@@ -166,33 +156,9 @@ def test_run_resumed_from_a_checkpoint_has_equal_bits(engine, history, search_pr
 
 
 @separate_actors(pytest.mark.nightly)
-def test_engine_can_be_closed_early_and_run_again(engine, history, search_problem):
-    first = engine.run(search_problem, empty_archipelago(3, 7), never_stop)
-    assert next(first).archipelago == history[0].archipelago
-    first.close()
-    assert archipelagos(engine.run(search_problem, empty_archipelago(3, 7), never_stop)) == archipelagos(
-        history
-    )
-
-
-def test_run_from_the_last_epoch_yields_nothing(engine, history, search_problem):
-    assert list(engine.run(search_problem, history[-1].archipelago, never_stop)) == []
-
-
-@separate_actors(pytest.mark.nightly)
 def test_run_with_more_generations_continues_a_shorter_run(engine, history, search_problem):
     shorter = replace(search_problem, settings=replace(SETTINGS, generations=4))
     *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never_stop)
-    assert (
-        archipelagos(engine.run(search_problem, stopped.archipelago, never_stop)) == archipelagos(history)[3:]
-    )
-
-
-@separate_actors(pytest.mark.nightly)
-def test_run_that_ended_between_stops_continues_to_the_same_stops(engine, history, search_problem):
-    shorter = replace(search_problem, settings=replace(SETTINGS, generations=5))
-    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never_stop)
-    assert stopped.archipelago.generation == 5
     assert (
         archipelagos(engine.run(search_problem, stopped.archipelago, never_stop)) == archipelagos(history)[3:]
     )
@@ -205,14 +171,6 @@ def test_stopped_engine_yields_no_further_epochs(engine, history, search_problem
         seen.append(epoch.archipelago)  # noqa: PERF401 - the engine asks while the list grows
     assert seen == archipelagos(history)[:2]
     assert list(engine.run(search_problem, empty_archipelago(3, 7), lambda: True)) == []
-
-
-@separate_actors(pytest.mark.nightly)
-def test_different_seeds_give_different_runs(engine, history, search_problem):
-    other = next(iter(engine.run(search_problem, empty_archipelago(3, 8), never_stop))).archipelago
-    assert [island.population for island in other.islands] != [
-        island.population for island in history[0].archipelago.islands
-    ]
 
 
 def test_steps_report_all_generations(history):
@@ -228,12 +186,6 @@ def test_steps_report_all_generations(history):
                 each.outcome.verdict.name.lower() for each in island.population
             )
         before = epoch.archipelago.generation
-
-
-def test_epochs_report_use_and_limits_of_the_caches(history):
-    for epoch in history:
-        assert set(epoch.caches) == {"pairs", "genes", "structures"}
-        assert all(0 < taken <= limit for taken, limit in epoch.caches.values())
 
 
 def test_hall_of_fame_of_an_archipelago_merges_those_of_the_islands(history):
@@ -265,18 +217,6 @@ def test_errors_of_a_problem_are_raised_unchanged(engine, search_problem):
         with pytest.raises(RecordError) as raised:
             list(engine.run(wrong, empty_archipelago(3, 7), never_stop))
         assert type(raised.value) is RecordError
-
-
-@separate_actors(pytest.mark.nightly)
-def test_more_islands_than_processors_are_evolved(engine, search_problem):
-    many = replace(
-        search_problem, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2)
-    )
-    *_, last = engine.run(many, empty_archipelago(9, 1), never_stop)
-    first_only = replace(many, settings=replace(many.settings, generations=0))
-    *_, first = engine.run(first_only, empty_archipelago(9, 1), never_stop)
-    assert last.archipelago.generation == 2
-    assert len({island.population for island in first.archipelago.islands}) == 9
 
 
 @separate_actors(pytest.mark.ci)

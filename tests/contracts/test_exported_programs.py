@@ -22,14 +22,15 @@ _COMPILED = {
     **{name: ["from a record"] for name in OF_BLOCKS if name.startswith(("state space", "integrator"))},
 }
 
-#: Models whose FMU of FMI 2.0, which has the equations of that of 3.0, is run for every change.
-_ESSENTIAL = ("deviations at once", "two masses", "state space")
+#: Models of which every format is run for every change. The programs of the others are in C and Python, whose
+#: equations the further formats have; those are run at night.
+_ESSENTIAL = ("own primitive", "deviations at once", "two masses", "state space")
 
 
 def _list_cells():
     for (kind, (build, need)), name in product(BUILDERS.items(), OF_BLOCKS):
         if need:
-            is_rare = kind == "fmu2" and name not in _ESSENTIAL
+            is_rare = kind != "c" and name not in _ESSENTIAL
             marks = [need, pytest.mark.nightly if is_rare else pytest.mark.ci]
             yield pytest.param(build, name, [*STARTS], marks=marks, id=f"{kind}, {name}")
             continue

@@ -10,12 +10,6 @@ from support.service import kept, problem_of, queued, spec
 from support.stores import claimed
 
 
-@pytest.fixture(scope="module")
-def shared(serve):
-    with serve(require_keys=True, rate=0.0, max_active=3, max_running_islands=5) as running:
-        yield running
-
-
 @pytest.fixture
 def admin(service):
     return service.key("admin", owner="operator")
@@ -85,13 +79,6 @@ def test_owners_are_listed_with_their_quotas_and_use(service, admin, change):
         name="me", weight=250, max_running=0, queued=1, running=1, running_islands=1, stored=7
     )
     assert service.client.get("/v1/admin/owners/me", headers=admin).json() == answer.json()["items"][0]
-
-
-def test_absent_fields_are_not_changed_and_null_restores_a_default(change):
-    assert change(weight=250, max_running=1).json()["max_running"] == 1
-    again = change(max_running=None, max_stored=5).json()
-    assert (again["weight"], again["max_running"], again["max_stored"]) == (250, None, 5)
-    assert change(weight=None).json()["weight"] == 100
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,7 @@ def test_invalid_requests_say_what_exists(finished, query, detail):
     assert (answer.status_code, detail in answer.text) == (422, True), answer.text
 
 
+@pytest.mark.nightly
 def test_an_extended_linear_simulation_is_exported_as_a_model(service, order):
     linear = {"kind": "linear", "order": 0, "numerator": [2.0]}
     spec = extended(linear, {"dead-zone": {"d": 0.25}})

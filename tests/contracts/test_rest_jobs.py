@@ -64,11 +64,6 @@ def test_another_request_with_the_same_key_is_rejected(service, order, change):
     assert ids(service.client.get("/v1/jobs")) == [first]
 
 
-@pytest.mark.parametrize("key", ["", "x" * 256])
-def test_an_idempotency_key_has_1_to_255_characters(service, order, key):
-    problem_of(service.submit({"Idempotency-Key": key}, **order), 422, "invalid-request")
-
-
 def test_an_unchanged_job_is_answered_with_304(service):
     path = f"/v1/jobs/{queued(service.store).id}"
     tag = service.client.get(path).headers["etag"]
@@ -98,24 +93,6 @@ def test_a_waiting_request_times_out_with_304(service):
     answer = service.client.get(path, params={"wait": 0.4}, headers={"If-None-Match": '"1"'})
     assert answer.status_code == 304
     assert 0.4 <= time.monotonic() - began < 15.0
-
-
-@pytest.mark.parametrize("headers", [{}, {"If-None-Match": '"0"'}])
-def test_a_request_without_a_matching_etag_does_not_wait(service, headers):
-    path = f"/v1/jobs/{queued(service.store).id}"
-    began = time.monotonic()
-    assert service.client.get(path, params={"wait": 20}, headers=headers).status_code == 200
-    assert time.monotonic() - began < 15.0
-
-
-def test_a_request_for_an_ended_job_does_not_wait(service):
-    path = f"/v1/jobs/{make_job_in_state(service, JobState.SUCCEEDED)}"
-    tag = service.client.get(path).headers["etag"]
-    began = time.monotonic()
-    answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": tag})
-    assert answer.status_code == 304
-    assert "retry-after" not in answer.headers
-    assert time.monotonic() - began < 15.0
 
 
 def read_all_pages(service, path, limit, between=lambda: None, **params):
@@ -212,15 +189,6 @@ def test_figures_of_a_job_of_another_version_are_rejected(service):
     detail = problem_of(answer, 422, "invalid-settings")
     assert "this version of islands cannot read the job (colour: " in detail
     assert "submit it again" in detail
-
-
-def test_cached_figures_vary_with_the_key(service):
-    job = make_job_in_state(service, JobState.SUCCEEDED)
-    blob = service.app.state.islands.blobs.write(b"<svg/>" * 1000)
-    service.store.results.keep(job, {"1/loop.svg": blob})
-    headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers
-    assert headers["cache-control"] == "private, max-age=86400, immutable"
-    assert headers["vary"] == "Authorization, Accept-Encoding"
 
 
 def test_a_caller_knows_its_owner_and_its_scopes(service):

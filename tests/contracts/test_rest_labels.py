@@ -64,13 +64,6 @@ def test_the_list_is_searched(service, order):
     assert ids(service, tag="Rig") == []
 
 
-@pytest.mark.parametrize(
-    "filters", [{"kind": "other"}, {"tag": "a,b"}, {"tag": ""}, {"q": "a\x00b"}, {"q": "x" * 201}]
-)
-def test_unusable_filters_are_refused(service, filters):
-    problem_of(service.client.get("/v1/jobs", params=filters), 422, "invalid-request")
-
-
 def test_a_search_with_many_words_is_refused(service):
     answer = service.client.get("/v1/jobs", params={"q": "a " * 11})
     assert "q has 11 words, and 10 is the most" in problem_of(answer, 422, "invalid-settings")

@@ -4,20 +4,13 @@ import json
 
 import pytest
 
-import islands
 from islands.diagnosis.monitoring import alarm_rate, record_follower
-from islands.errors import RecordError
-from islands.facade.record_monitor import reject_record
 from islands.report.documents import monitor_state
-from islands.report.documents.monitor_json import monitor_document
-from islands.report.documents.monitor_state import monitor_to_json
 from islands_api.client import Client
 from islands_service.domain import monitor_spec
 from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState
 from islands_service.store import monitors
 from islands_service.store.blobs import Blobs
-from support.monitored_oscillator import make_records
-from support.monitoring_jobs import OSCILLATOR, add_file, analyse_next, write_records
 from support.service import held, kept, problem_of
 from support.stores import claimed, submitted
 
@@ -143,45 +136,3 @@ def test_a_record_that_cannot_be_read_is_refused(service, order):
     other = create(service, channels=["T_K"])
     assert "T_K" in problem_of(add(service, other, order["dataset"]), 422, "invalid-record")
     assert service.client.get("/v1/jobs").json()["items"] == []
-
-
-@pytest.mark.ci
-def test_records_over_rest_give_the_bits_of_the_library(service, tmp_path):
-    """A record that cannot be used is listed, one that is sent again changes nothing."""
-    paths = write_records(make_records(2), tmp_path)
-    short = tmp_path / "short.csv"
-    short.write_text("".join(paths[1].read_text().splitlines(keepends=True)[:90]))
-    with Client(service.url) as client:
-        monitor = client.create_monitor(**OSCILLATOR)
-        sent = [paths[0], short, paths[0], paths[1]]
-        jobs = [add_file(client, monitor, path, time="2026-11-23T01:00:00") for path in sent]
-        outcomes = [analyse_next(service) for _ in sent]
-        saved = None
-        for path in sent:
-            record = islands.read_record(path, inputs=["F"], output="x")
-            settings = {name: OSCILLATOR[name] for name in ("false_alarms", "training")}
-            saved = saved or islands.create_monitor(record, OSCILLATOR["simulation"], **settings)
-            if path == short:
-                with pytest.raises(RecordError) as refused:
-                    islands.monitor_record(saved, record, path.name)
-                saved = reject_record(saved, path.name, record.sha256, str(refused.value))
-            elif not saved.knows(path.name, record.sha256):
-                saved = islands.monitor_record(saved, record, path.name, "2026-11-23T01:00:00")
-        found = client.monitor(monitor)
-        assert client.monitor_state(monitor) == monitor_to_json(saved)
-        document = json.loads(json.dumps(monitor_document(saved)))
-        analysed, rejected = document.pop("records"), document.pop("rejected")
-        assert found.result == document
-        for listed, is_rejected in ((analysed, False), (rejected, True)):
-            page = client.monitor_records(monitor, rejected=is_rejected).items
-            assert page == tuple({"index": at, **each} for at, each in enumerate(listed))
-            assert client.monitor_records(monitor, 0, rejected=is_rejected).items == page[1:]
-        assert (found.status, found.records, found.alarms, found.pending) == ("training", 2, 0, 0)
-        states = [each.state for each in outcomes]
-        assert states == ["succeeded", "failed", "succeeded", "succeeded"]
-        assert "at least 200" in client.job(jobs[1]).problem["detail"]
-        assert client.job(jobs[2]).summary["words"] == "hour-0.csv was analysed before"
-        result = client.result(jobs[3])
-        assert result["record"] == {"index": 1, **analysed[-1]}
-        assert result["alarms"] == []
-        problem_of(service.client.get(f"/v1/jobs/{jobs[3]}/report"), 404, "not-found")

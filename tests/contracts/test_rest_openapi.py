@@ -7,7 +7,6 @@ import xml.etree.ElementTree as ET
 import pytest
 from jsonschema import Draft202012Validator
 
-from islands.export import EXPORTS
 from support.service import (
     columns,
     csv,
@@ -209,26 +208,6 @@ def test_a_model_equals_its_entry_in_the_result(service, finished):
     assert models[0]["metrics"]["validation"]["free_run"]["mape"] < 1.0
     missing = service.client.get(f"/v1/jobs/{finished}/models/{len(models) + 1}")
     assert "see its /models" in problem_of(missing, 404, "not-found")
-
-
-@pytest.mark.parametrize("form", EXPORTS)
-def test_a_model_is_exported_in_every_format(service, document, finished, form):
-    path = f"/v1/jobs/{finished}/models/1/export"
-    answer = service.client.get(path, params={"format": form})
-    assert answer.status_code == 200
-    assert answer.text
-    assert re.fullmatch(r'inline; filename="model-01\.[a-z]+"', answer.headers["content-disposition"])
-    documented = document["paths"]["/v1/jobs/{job}/models/{rank}/export"]["get"]
-    (parameter,) = [each for each in documented["parameters"] if each["name"] == "format"]
-    assert form in parameter["schema"]["enum"]
-    assert answer.headers["content-type"].partition(";")[0] in documented["responses"]["200"]["content"]
-
-
-def test_an_unknown_export_format_is_rejected(service, finished):
-    answer = service.client.get(f"/v1/jobs/{finished}/models/1/export", params={"format": "cobol"})
-    detail = problem_of(answer, 422, "invalid-settings")
-    assert "cobol" in detail
-    assert "python" in detail
 
 
 @pytest.mark.parametrize(

@@ -56,14 +56,6 @@ def test_an_unknown_query_parameter_or_form_field_of_an_upload_is_refused(servic
     assert service.client.get("/v1/datasets").json()["items"] == []
 
 
-@pytest.mark.parametrize(
-    "path", ["/v1/jobs", "/v1/datasets", "/v1/monitors", "/v1/jobs/a/models", "/v1/webhooks"]
-)
-def test_an_unknown_query_parameter_is_refused_everywhere(service, path):
-    answer = service.client.get(path, params={"limits": "3"})
-    assert "no query parameter 'limits'" in problem_of(answer, 422, "invalid-settings")
-
-
 @pytest.mark.parametrize("name", ["record.log", "record", "record.xls", "record.2026-11-22"])
 def test_a_table_of_text_is_uploaded_under_any_name(service, name):
     stored = service.upload("\n".join(lines()).encode(), name)

@@ -90,15 +90,6 @@ def test_huge_inputs_are_answered(service, job):
         assert found.status_code == 200, found.text
 
 
-def test_the_client_sends_arrays_and_excitations(service, job):
-    u = np.linspace(0.0, 1.0, 30)
-    with Client(service.url) as client:
-        found = client.simulate(job, 1, {"u_V": u})
-        held = client.simulate(job, inputs={"u_V": {"kind": "hold", "value": 1}}, samples=50_000)
-    assert found.inputs["u_V"] == tuple(u.tolist())
-    assert len(held.output) == 50_000
-
-
 @pytest.mark.parametrize(
     ("body", "status", "kind", "detail"),
     [

@@ -36,15 +36,6 @@ def test_no_peak_is_lost_whatever_the_number_of_points(service, dataset):
 
 
 @pytest.mark.ci
-def test_a_part_of_few_rows_has_every_sample(service, dataset, signal):
-    found = ask(service, dataset, "column=y&start=10&stop=30").json()
-    assert found["rows"] == list(range(10, 30))
-    (y,) = found["columns"]
-    expected = [None if row == 20 else signal[row] for row in range(10, 30)]
-    assert y["minimum"] == y["maximum"] == expected
-
-
-@pytest.mark.ci
 def test_an_answer_is_valid_for_ever(service, dataset):
     first = ask(service, dataset, "column=y")
     assert "immutable" in first.headers["cache-control"]

@@ -96,25 +96,6 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
     ]
 
 
-def test_a_job_has_the_latent_models_of_the_library(service, dataset, tmp_path):
-    settings = {"population": 4, "generations": 1, "islands": 1}
-    with Client(service.url) as client:
-        job = client.submit(dataset, "u", ["y1", "y2"], preset="latent", **settings)
-        run(service, job)
-        assert client.models(job)[0].kind == "coupled-latent"
-        assert client.report(job).count(b"<img") == 2
-        succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
-        assert "y1(k) =" in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
-    files = CoupledRecord(
-        tuple(islands.read_record(tmp_path / "masses.csv", "u", name) for name in ("y1", "y2"))
-    )
-    expected = identify_coupled(files, preset="latent", **settings)
-    loaded = islands.load(tmp_path / "result")
-    assert loaded.model == expected.model
-    for one, other in zip(loaded.bands(files), expected.bands(files), strict=True):
-        np.testing.assert_array_equal(one.upper, other.upper)
-
-
 def test_a_job_continues_in_the_search_that_was_interrupted(service, dataset, monkeypatch):
     monkeypatch.setattr(identification_job, "REPORT_EVERY", 0.0)
     with Client(service.url) as client:

@@ -6,7 +6,6 @@ import pytest
 
 from islands.errors import SettingsError
 from islands_api.__main__ import check_safe
-from islands_api.web.auth import make_verifier
 from islands_service.settings import ServiceSettings
 from support.issuers import AUDIENCE, encode_part, issuing, make_claims, make_key
 from support.service import emptied, kept, problem_of, queued, spec
@@ -153,10 +152,6 @@ def test_the_description_names_the_issuer_as_an_alternative_to_keys(service, iss
     assert scheme["openIdConnectUrl"] == f"{issuer.url}/.well-known/openid-configuration"
     assert document["paths"]["/v1/jobs"]["get"]["security"] == [{"key": []}, {"token": []}]
     assert "security" not in document["paths"]["/healthz"]["get"]
-
-
-def test_a_service_without_an_issuer_has_no_verifier():
-    assert make_verifier(ServiceSettings()) is None
 
 
 @pytest.mark.parametrize(

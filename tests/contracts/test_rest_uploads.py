@@ -16,14 +16,6 @@ from support.bad_records import write_hdf5_bomb, write_mat_bomb, write_parquet_b
 from support.processes import eventually
 from support.service import csv, problem_of
 
-
-@pytest.fixture(scope="module")
-def shared(serve):
-    limits = {"max_uploads": 3, "max_uploads_per_owner": 2, "max_stored": 5_000_000, "max_upload": 9_000_000}
-    with serve(require_keys=True, rate=0.0, **limits) as running:
-        yield running
-
-
 #: Beginning of a form whose file never ends.
 START = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\nt_s,u_V,y_um\r\n'
 
@@ -150,14 +142,6 @@ def test_a_declared_length_above_the_quota_is_refused_before_the_body(service):
     assert "this one has 5.9 MB, and 5.0 MB is the most" in detail
 
 
-def test_uploads_in_progress_count_towards_the_quota(service):
-    headers = service.key()
-    with started(service, headers, 4_000_000):
-        eventually(lambda: len(receiving(service)) == 1)
-        with started(service, headers, 4_000_000) as connection:
-            assert "uploads in progress 3.9 MB" in answer(connection)[2]
-
-
 def test_a_body_of_undeclared_length_ends_at_the_quota(service):
     sent = 0
     with started(service, service.key(), None) as connection:
@@ -183,11 +167,6 @@ def test_bodies_in_progress_are_on_the_disk_and_not_in_memory(service):
         eventually(lambda: sum(map(size, receiving(service))) > 3 * 4_500_000)
         assert resident_bytes() - before < 6_000_000
     eventually(lambda: not receiving(service))
-
-
-def test_a_key_without_the_scope_is_refused_before_the_body(service):
-    with started(service, service.key("read")) as connection:
-        assert answer(connection)[1] == "scope-missing"
 
 
 def test_the_file_of_a_request_is_in_the_data_folder_only(service):

@@ -13,7 +13,6 @@ from islands_service.domain.job import (
     JobState,
     QuotaError,
 )
-from islands_service.store import Store
 from support.stores import (
     ALICE,
     BOB,
@@ -25,13 +24,6 @@ from support.stores import (
     open_stores,
     submitted,
 )
-
-
-def test_accepted_job_is_found_after_reopening_the_store(database):
-    with Store(database) as store:
-        job = submitted(store)
-    with Store(database) as store:
-        assert store.jobs.get(ALICE, job.id) == job
 
 
 def test_floats_are_stored_bit_for_bit(store):
@@ -82,22 +74,6 @@ def test_concurrent_requests_with_the_same_key_get_one_job(database):
             assert len({job.id for job, _ in answers}) == 1
             assert sum(new for _, new in answers) == 1
             assert len(stores[0].jobs.page(ALICE).jobs) == turn + 1
-
-
-def test_different_concurrent_requests_with_one_key_get_conflicts(database):
-    with open_stores(database) as stores:
-        answers = at_once(
-            [
-                lambda store=stores[i // 2 % 4], i=i: store.jobs.submit(
-                    asked(idempotency_key="k", spec={"seed": i % 2})
-                )
-                for i in range(MANY)
-            ]
-        )
-        refused = [answer for answer in answers if isinstance(answer, IdempotencyError)]
-        taken = [answer for answer in answers if isinstance(answer, tuple)]
-        assert (len(refused), len(taken)) == (MANY // 2, MANY // 2)
-        assert len({job.id for job, _ in taken}) == 1
 
 
 @pytest.mark.parametrize("quota", [1, 7])

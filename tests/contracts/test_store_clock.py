@@ -3,7 +3,7 @@
 import pytest
 
 from islands_service.domain.job import LeaseLostError
-from support.stores import ALICE, LONG, claimed, kinds, submitted, turn_clock
+from support.stores import ALICE, claimed, kinds, submitted, turn_clock
 
 #: Seconds of a lease in these tests.
 LEASE = 60.0
@@ -28,15 +28,6 @@ def test_running_coordinator_keeps_its_job_after_the_clock_has_gone_back(store):
     turn_clock(store, -HOUR)
     store.leases.renew(lease, LEASE)
     assert store.leases.claim("second", LEASE) is None
-
-
-@pytest.mark.parametrize("seconds", [-0.5, 0.0])
-def test_lease_is_respected_whatever_the_lease_of_others(store, seconds):
-    """The clock of a server may be adjusted by less than a second, and settings may differ."""
-    submitted(store)
-    claimed(store, LONG)
-    turn_clock(store, seconds)
-    assert store.leases.claim("second", 1.0) is None
 
 
 def test_postponed_job_is_tried_after_the_clock_has_gone_back(store):

@@ -72,24 +72,6 @@ def test_only_a_search_is_stopped(store, other):
         store.jobs.stop(ALICE, job.id)
 
 
-def test_a_search_that_is_being_cancelled_is_not_stopped(store):
-    job = submitted(store)
-    claimed(store)
-    store.jobs.cancel(ALICE, job.id)
-    with pytest.raises(JobStateError, match="is being cancelled"):
-        store.jobs.stop(ALICE, job.id)
-
-
-def test_events_are_read_after_a_number(store):
-    job = job_in(store, JobState.SUCCEEDED)
-    other = submitted(store)
-    assert [event.number for event in store.jobs.events(job.id)] == [1, 2, 3]
-    assert [event.number for event in store.jobs.events(job.id, after=1)] == [2, 3]
-    assert store.jobs.events(job.id, after=3) == ()
-    assert {event.job for event in store.jobs.events(other.id)} == {other.id}
-    assert store.jobs.events("0" * 32) == ()
-
-
 @pytest.mark.ci
 def test_reader_that_continues_from_the_last_number_misses_nothing(database):
     """The coordinator reports while the owner cancels and resumes, and both write at the same time."""

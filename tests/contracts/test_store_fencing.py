@@ -100,14 +100,6 @@ def test_writes_under_a_lost_lease_change_nothing(store, loss):
         assert contents(store) == before
 
 
-def test_lease_belongs_to_one_job(store):
-    submitted(store), submitted(store)
-    leases = claimed(store), claimed(store)
-    assert [lease.epoch for lease in leases] == [1, 1]
-    store.leases.finish(leases[0], FOUND)
-    assert not store.leases.renew(leases[1], LONG).cancel_requested
-
-
 def test_epochs_of_a_job_rise_with_every_claim(store):
     job = submitted(store)
     epochs = []

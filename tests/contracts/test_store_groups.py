@@ -8,8 +8,7 @@ from sqlalchemy import insert, select, text
 
 from islands_service.domain.job import JobNotFoundError
 from islands_service.store import Store
-from islands_service.store import database as database_module
-from islands_service.store.database import MAX_GROUP_SIZE, StoreError
+from islands_service.store.database import StoreError
 from islands_service.store.job_rows import append_event, update_job
 from islands_service.store.tables import keys
 from support.stores import (
@@ -36,10 +35,6 @@ def list_new_threads(before):
     return [each for each in threading.enumerate() if each not in before]
 
 
-def raised(error):
-    raise error
-
-
 def in_one_group(store, actions, reads=0):
     """Run calls in threads whose writes form one group; return their values or errors."""
     answers = []
@@ -60,14 +55,6 @@ def test_writes_that_arrive_during_a_commit_share_the_next_one(store):
     assert len({job.id for job, _ in answers}) == MANY
     # The commit that kept the writer busy, and that of the group.
     assert len(times) == 2
-
-
-def test_group_has_a_largest_size(store, monkeypatch):
-    assert MAX_GROUP_SIZE >= MANY
-    monkeypatch.setattr(database_module, "MAX_GROUP_SIZE", 4)
-    with commits(store) as times:
-        in_one_group(store, [lambda: store.jobs.submit(asked())] * MANY)
-    assert len(times) == 1 + MANY / 4
 
 
 def test_failed_operation_does_not_affect_its_group(store):
@@ -110,15 +97,6 @@ def test_failed_operation_does_not_affect_its_group(store):
     assert kinds(store, job.id) == ["queued"]
 
 
-def test_write_in_a_group_with_failures_is_visible_after_its_return(database):
-    with open_stores(database, 2) as (one, other):
-        answers = in_one_group(
-            one,
-            [lambda: one.database.write(lambda _: raised(OwnFault())), lambda: submitted(one)],
-        )
-        assert other.jobs.get(ALICE, answers[1].id) == answers[1]
-
-
 def test_writes_are_invisible_before_their_commit(database):
     with open_stores(database, 2) as (one, other):
         job = submitted(one)
@@ -136,20 +114,6 @@ def test_writes_are_invisible_before_their_commit(database):
         seen.set()
         thread.join()
         assert kinds(other, job.id) == ["queued", "touched"]
-
-
-def test_concurrent_first_writes_start_one_writer(database, monkeypatch):
-    class Slow(threading.Thread):
-        def __init__(self, **options):
-            threading.Event().wait(0.05)  # enough time for another thread to arrive
-            super().__init__(**options)
-
-    monkeypatch.setattr(database_module, "Thread", Slow)
-    with Store(database) as store:
-        before = set(threading.enumerate())
-        assert len({job.id for job, _ in at_once([lambda: store.jobs.submit(asked())] * MANY)}) == MANY
-        assert len(list_new_threads(before)) == 1
-    assert not list_new_threads(before)
 
 
 def test_closed_store_has_written_its_queue(database):

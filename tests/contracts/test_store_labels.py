@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from islands_service.domain.job import JobNotFoundError, JobOutcome, JobState, Requester
+from islands_service.domain.job import JobOutcome, JobState, Requester
 from islands_service.store.audit import Action
-from support.stores import ALICE, BLOB, BOB, FAILED, claimed, contents, job_in, kinds, submitted
+from support.stores import ALICE, BLOB, BOB, claimed, job_in, kinds, submitted
 
 
 def found(store, owner=ALICE, **filters):
@@ -31,32 +31,12 @@ def test_a_job_is_labelled_in_every_state(store, state):
     assert kinds(store, job.id) == [*before, "labelled"]
 
 
-def test_labels_that_are_not_given_are_kept(store):
-    job = submitted(store, name="name", tags=("a", "b"))
-    assert store.jobs.label(ALICE, job.id, name="other").tags == ("a", "b")
-    assert store.jobs.label(ALICE, job.id, tags=()).name == "other"
-    assert store.jobs.get(ALICE, job.id).tags == ()
-
-
-def test_the_same_labels_change_nothing(store):
-    job = submitted(store, name="name", tags=("a", "b"))
-    before = contents(store)
-    assert store.jobs.label(ALICE, job.id, "name", ("a", "b"), Requester("192.0.2.1")) == job
-    assert contents(store) == before
-
-
 def test_a_label_is_in_the_audit_trail(store):
     job = submitted(store, name="name")
     store.jobs.label(ALICE, job.id, tags=("a",), by=Requester("192.0.2.1", "key"))
     (entry,) = store.audit.entries()
     assert (entry.action, entry.owner, entry.subject, entry.key_id) == (Action.LABEL, ALICE, job.id, "key")
     assert json.loads(entry.details) == {"name": "name", "tags": ["a"]}
-
-
-def test_only_the_owner_labels_a_job(store):
-    job = submitted(store)
-    with pytest.raises(JobNotFoundError):
-        store.jobs.label(BOB, job.id, "mine")
 
 
 def test_a_tag_selects_the_jobs_that_have_exactly_it(store):
@@ -79,16 +59,6 @@ def test_words_are_found_in_labels_data_set_and_result(store):
     assert found(store, words=["thermal", "duffing"]) == {other}
     for words in (["unread"], ["straße", "thermal"], ["fullstand"], ["rig%2"], ["100_"]):
         assert found(store, words=words) == set()
-
-
-def test_a_search_follows_the_labels_and_the_result(store):
-    job = submitted(store, name="before").id
-    store.leases.finish(claimed(store), FAILED)
-    store.jobs.label(ALICE, job, "after")
-    assert (found(store, words=["before"]), found(store, words=["after"])) == (set(), {job})
-    store.jobs.resume(ALICE, job)
-    store.leases.finish(claimed(store), JobOutcome(JobState.SUCCEEDED, {}, summary={"equation": "sin"}))
-    assert found(store, words=["after", "sin"]) == {job}
 
 
 def test_jobs_with_a_model_are_listed_by_its_error(store):

@@ -1,6 +1,5 @@
 """Contract of the store with coordinators: order of claims, duration of leases, number of attempts."""
 
-from collections import Counter
 from contextlib import ExitStack
 from uuid import uuid4
 
@@ -58,15 +57,6 @@ def test_owner_with_its_quota_of_running_jobs_waits_and_others_do_not(store, own
     assert other.id in {lease.job.id for lease in leases}
 
 
-def test_concurrent_claims_serve_owners_equally(database):
-    with open_stores(database) as stores:
-        for owner in (ALICE, BOB):
-            for _ in range(MANY):
-                submitted(stores[0], owner)
-        leases = at_once([lambda store=stores[i % 4]: claimed(store) for i in range(MANY)])
-        assert Counter(lease.job.owner for lease in leases) == {ALICE: MANY // 2, BOB: MANY // 2}
-
-
 def test_concurrent_claims_do_not_exceed_the_quota_of_running_jobs(database):
     with open_stores(database) as stores:
         for _ in range(MANY):
@@ -117,12 +107,6 @@ def test_jobs_are_not_claimed_by_two_processes(store, database):
         said = [process.communicate(timeout=60)[0].split() for process in processes]
     assert sorted(job for each in said for job in each[::2]) == sorted(jobs)
     assert {epoch for each in said for epoch in each[1::2]} == {"1"}
-
-
-def test_job_is_not_claimed_before_its_lease_has_expired(store):
-    submitted(store)
-    claimed(store, LONG, "first")
-    assert store.leases.claim("second", LONG) is None
 
 
 def test_claim_and_renewal_contain_the_request_to_stop_the_search(store):

@@ -47,16 +47,6 @@ def records_of(store, monitor):
     return [] if states is None else [json.loads(each) for each in states.records]
 
 
-def test_a_new_monitor_waits_for_its_first_record(store):
-    monitor = created(store)
-    assert (monitor.status, monitor.records, monitor.pending, monitor.version) == ("waiting", 0, 0, 0)
-    assert (monitor.spec, monitor.priority) == ({"input": "u"}, 5)
-    assert (
-        store.monitors.load(ALICE, monitor.id) == store.monitors.result(ALICE, monitor.id) == (monitor, None)
-    )
-    assert store.monitors.page(ALICE) == ((monitor,), None)
-
-
 def test_records_are_claimed_one_by_one_in_the_order_of_their_submission(store):
     """A higher priority, which orders other jobs, and a clock that goes back change nothing."""
     monitor = created(store)
@@ -215,23 +205,6 @@ def test_deletion_of_a_monitor_cancels_its_waiting_records(store):
     assert store.monitors.page(ALICE)[0] == (store.monitors.get(ALICE, other.id),)
     (entry,) = store.audit.entries(limit=1)
     assert (entry.action, entry.subject) == ("delete-monitor", monitor.id)
-
-
-def test_a_monitor_of_another_owner_is_not_found(store):
-    monitor = created(store, BOB).id
-    reads = (store.monitors.get, store.monitors.load, store.monitors.result, store.monitors.saved)
-    for operation in (*reads, store.monitors.delete):
-        with pytest.raises(MonitorNotFoundError, match=monitor):
-            operation(ALICE, monitor)
-    with pytest.raises(MonitorNotFoundError):
-        submitted(store, ALICE, kind=MONITORING, monitor=monitor)
-    assert store.jobs.page(ALICE).jobs == ()
-
-
-def test_a_repeated_submission_adds_no_second_record(store):
-    monitor = created(store)
-    assert added(store, monitor, idempotency_key="k").id == added(store, monitor, idempotency_key="k").id
-    assert store.monitors.get(ALICE, monitor.id).pending == 1
 
 
 def test_one_more_monitor_than_the_limit_is_refused(store):

@@ -43,23 +43,6 @@ def generations(store, lease, **limits):
     return [each[0] for each in store.results.history(lease.job.id, **limits)]
 
 
-def test_artefacts_of_reports_replace_each_other_and_end_with_the_result(store, lease):
-    job = lease.job.id
-    for blob in ("a" * 64, "b" * 64):
-        store.leases.report(lease, ProgressReport({}, artefacts={"live.json": blob}))
-        assert store.results.artefact(job, "live.json") == blob
-    # A report without it keeps it, and so does one of a coordinator that has lost the job.
-    store.leases.report(lease, ProgressReport({"generation": 1}))
-    store.leases.release(lease)
-    newer = claimed(store)
-    with pytest.raises(LeaseLostError):
-        store.leases.report(lease, ProgressReport({}, artefacts={"live.json": "c" * 64}))
-    assert store.results.artefact(job, "live.json") == "b" * 64
-    assert "b" * 64 in store.retention.named_blobs()
-    store.leases.finish(newer, FOUND)
-    assert store.results.artefact(job, "live.json") is None
-
-
 def test_parts_of_a_report_appear_together(store, lease):
     reported = store.leases.report(lease, brought_on(7))
     assert reported == store.jobs.get(ALICE, lease.job.id)
@@ -126,13 +109,6 @@ def test_failed_report_is_rolled_back(store, lease, report):
     assert store.leases.report(lease, brought_on(2)).progress == {"generation": 2}
 
 
-def test_report_without_a_checkpoint_keeps_the_previous_one(store, lease):
-    store.leases.report(lease, brought_on(4))
-    reported = store.leases.report(lease, ProgressReport({"generation": 5}, (point(5),), after=4))
-    assert (reported.checkpoint, reported.progress) == (brought_on(4).checkpoint, {"generation": 5})
-    assert generations(store, lease) == [4, 5]
-
-
 def test_points_replace_those_after_the_given_generation(store, lease):
     """After a crash the same generations are reported again, from the checkpoint on."""
     store.leases.report(lease, ProgressReport({}, tuple(map(point, range(8)))))
@@ -145,11 +121,6 @@ def test_points_replace_those_after_the_given_generation(store, lease):
     assert generations(store, lease) == [3]
 
 
-def test_infinite_values_of_a_history_stay_infinite(store, lease):
-    store.leases.report(lease, ProgressReport({}, ((0, 1, {1: float("inf")}, (float("-inf"),)),)))
-    assert store.results.history(lease.job.id) == [[0, 1, {"1": float("inf")}, [float("-inf")]]]
-
-
 def test_only_old_progress_events_are_deleted(store, lease, monkeypatch):
     monkeypatch.setattr(leases_module, "KEPT", 5)
     for generation in range(20):
@@ -158,24 +129,6 @@ def test_only_old_progress_events_are_deleted(store, lease, monkeypatch):
     assert [event.kind for event in events] == ["queued", "running", *["progress"] * 5]
     assert [event.number for event in events] == [1, 2, 18, 19, 20, 21, 22]
     assert store.jobs.versions([lease.job.id]) == {lease.job.id: 22}
-
-
-def test_successful_job_has_a_result_models_and_a_summary(store, lease):
-    store.leases.report(lease, brought_on(3))
-    store.leases.finish(lease, FOUND)
-    job = store.jobs.get(ALICE, lease.job.id)
-    assert (job.state, job.summary, job.problem) == (JobState.SUCCEEDED, FOUND.summary, None)
-    assert job.started <= job.finished <= job.updated + 0.01
-    assert job.progress == {"generation": 3}
-    assert store.results.document(job.id) == FOUND.document
-    models = store.results.models(job.id)
-    assert [(each.rank, each.document, each.file) for each in models] == [
-        (1, {"fitness": 0.5}, "first"),
-        (2, {"fitness": 0.7}, "second"),
-    ]
-    assert [store.results.models(job.id, rank) for rank in (1, 2, 3)] == [models[:1], models[1:], []]
-    event = store.jobs.events(job.id)[-1]
-    assert (event.kind, event.data) == ("succeeded", FOUND.summary)
 
 
 def test_checkpoint_is_kept_unless_the_job_succeeds(store):
@@ -188,12 +141,6 @@ def test_checkpoint_is_kept_unless_the_job_succeeds(store):
         kept[outcome.state] = store.jobs.get(ALICE, lease.job.id).checkpoint
     checkpoint = brought_on(3).checkpoint
     assert kept == {"succeeded": None, "failed": checkpoint, "cancelled": checkpoint}
-
-
-def test_cancelled_job_may_have_a_result(store, lease):
-    store.leases.finish(lease, JobOutcome(JobState.CANCELLED, FOUND.document, FOUND.models))
-    assert store.jobs.get(ALICE, lease.job.id).state == JobState.CANCELLED
-    assert len(store.results.models(lease.job.id)) == 2
 
 
 HALVES = {
@@ -233,16 +180,6 @@ def test_new_result_replaces_the_whole_old_one(store, lease):
     assert store.results.document(job) == {"new": 1}
     assert [each.file for each in store.results.models(job)] == ["only"]
     assert store.results.artefact(job, "pareto.svg") is None
-
-
-def test_finish_without_a_result_keeps_the_old_one(store, lease):
-    job = lease.job.id
-    lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
-    store.results.keep(job, {"pareto.svg": BLOB})
-    store.leases.finish(lease, FAILED)
-    assert store.results.document(job) == {"old": 1}
-    assert len(store.results.models(job)) == 2
-    assert store.results.artefact(job, "pareto.svg") == BLOB
 
 
 def test_artefacts_of_a_deleted_job_are_refused(store, lease):

@@ -80,20 +80,6 @@ def test_a_data_set_that_a_job_names_is_kept_and_its_time_begins_after_the_job(
     assert store.retention.expire_datasets(DAY) == 1
 
 
-def test_validation_data_and_recordings_are_named_too(store: Store) -> None:
-    used = [added(store, blob=str(number) * 64) for number in range(3)]
-    named = {
-        **spec(used[0]),
-        "recordings": [{"dataset": used[1]}],
-        "validation": {"dataset": used[2], "rows": "0:9"},
-    }
-    job_in(store, JobState.SUCCEEDED, ALICE, spec=named)
-    for _ in range(2):
-        assert store.retention.expire_datasets(DAY) == 0
-        pass_time(store, 2 * DAY)
-    assert len(listed(store)) == 3
-
-
 def test_a_job_that_is_submitted_while_the_data_set_expires_can_read_it(store: Store) -> None:
     dataset = added(store)
     store.retention.expire_datasets(DAY)
@@ -106,16 +92,6 @@ def test_a_job_that_is_submitted_while_the_data_set_expires_can_read_it(store: S
     store.jobs.cancel(ALICE, job.id)
     with pytest.raises(DatasetDeletedError):
         store.jobs.resume(ALICE, job.id)
-
-
-def test_another_upload_of_the_same_bytes_restarts_the_time(store: Store) -> None:
-    dataset = added(store)
-    for expired in (0, 1):
-        store.retention.expire_datasets(DAY)
-        pass_time(store, DAY + 1)
-        assert store.retention.expire_datasets(DAY if expired else 0) == expired
-        assert added(store) == dataset
-        assert store.datasets.get(ALICE, dataset).idle_since is None
 
 
 def test_the_retention_of_an_owner_precedes_the_default(store: Store) -> None:

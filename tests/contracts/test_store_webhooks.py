@@ -4,9 +4,8 @@ import json
 
 import pytest
 
-from islands.errors import SettingsError
 from islands_service.domain.job import JobState
-from islands_service.domain.webhook import MAX_ATTEMPTS, WebhookNotFoundError, retry_delay
+from islands_service.domain.webhook import MAX_ATTEMPTS, retry_delay
 from islands_service.store import Store
 from support.stores import (
     ALICE,
@@ -27,8 +26,6 @@ from support.stores import (
 ALL = ("job.succeeded", "job.failed", "job.cancelled")
 
 URL = "https://hooks.example.org/a"
-
-UNKNOWN = "0" * 32
 
 
 def created(store, owner=ALICE, events=ALL, most=10):
@@ -166,28 +163,3 @@ def test_deliveries_are_sent_after_the_clock_has_gone_back(store):
     found = store.deliveries.claim(60.0, 10)
     assert {(each.id, each.attempt) for each in found} == {(failed.id, 2), (interrupted.id, 2)}
     assert store.deliveries.claim(60.0, 10) == ()
-
-
-@pytest.mark.parametrize("events", [(), ("job.started",)])
-def test_unknown_events_are_refused_with_the_known_ones(store, events):
-    with pytest.raises(SettingsError, match=r"take some of job\.succeeded, job\.failed, job\.cancelled"):
-        created(store, events=events)
-
-
-@pytest.mark.parametrize("operation", ["delete", "deliveries"])
-def test_a_webhook_of_another_owner_does_not_exist(store, operation):
-    webhook = created(store)
-    for owner, identity in ((BOB, webhook.id), (ALICE, UNKNOWN)):
-        with pytest.raises(WebhookNotFoundError, match=f"there is no webhook '{identity}'"):
-            getattr(store.webhooks, operation)(owner, identity)
-    assert store.webhooks.all(BOB) == ()
-    assert store.webhooks.all(ALICE) == (webhook,)
-
-
-def test_a_deleted_webhook_takes_its_deliveries_along(store):
-    webhook = created(store)
-    job_in(store, JobState.FAILED)
-    (due,) = store.deliveries.claim(LONG, 10)
-    store.webhooks.delete(ALICE, webhook.id)
-    store.deliveries.record(due, 200, None)
-    assert store.deliveries.pending().count == 0

@@ -18,8 +18,7 @@ from islands.evolution.problem import Problem
 from islands.progress import Steps
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool
-from islands_service.runtime.actor_pool import IslandActor
-from islands_service.runtime.cluster import LOSS_ERRORS, ClusterError
+from islands_service.runtime.cluster import ClusterError
 from islands_service.runtime.ray_engine import RayEngine
 from support.latent_systems import spring_record
 from support.processes import actors, alive, eventually, kill
@@ -112,45 +111,6 @@ def test_frozen_actor_is_replaced_and_does_not_change_the_result(posed, undistur
 
 
 @pytest.mark.nightly
-def test_actor_that_is_frozen_during_its_preparation_is_replaced(
-    posed, engine, messages, monkeypatch, tmp_path
-):
-    import ray
-
-    frozen = tmp_path / "frozen"
-
-    class FreezingActor(IslandActor):
-        def prepare(self, started=None):
-            if not frozen.exists():
-                frozen.write_text(str(os.getpid()))
-                os.kill(os.getpid(), signal.SIGSTOP)
-            return super().prepare(started)
-
-    actor = ray.remote(max_restarts=0, concurrency_groups={"watch": 1})(FreezingActor)
-    monkeypatch.setattr(actor_pool, "_ACTOR", actor)
-    monkeypatch.setattr(actor_pool, "PREPARATION_TIMEOUT", 3.0)
-    found = actor_pool.IslandActorPool(posed, 1, messages.append)
-    try:
-        eventually(lambda: found.maintain(at_once=True))
-        assert "an actor was not prepared within 3 s: its islands continue from their last epoch" in messages
-        assert not alive([int(frozen.read_text())])
-    finally:
-        found.shutdown()
-
-
-@pytest.mark.nightly
-def test_loss_of_all_actors_does_not_change_the_result(posed, undisturbed, engine, messages):
-    found = []
-    for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
-        found.append(exactly(epoch.archipelago))
-        if len(found) == 3:
-            for pid in actors():
-                kill(pid)
-    assert found == undisturbed
-    assert sum("was lost" in message for message in messages) == min(3, count_cpus())
-
-
-@pytest.mark.nightly
 def test_standby_actor_replaces_a_lost_one_until_its_restart(posed, engine, messages, monkeypatch):
     import ray
 
@@ -204,14 +164,6 @@ def test_finished_search_leaves_no_actor(posed, engine):
     assert actors()
     epochs.close()
     eventually(lambda: not actors())
-
-
-@pytest.mark.parametrize("kind", ["OutOfMemoryError", "NodeDiedError", "ObjectLostError"])
-def test_errors_of_lost_processes_count_as_losses(kind):
-    """The out-of-memory monitor of Ray has its own error, which is no actor error."""
-    from ray import exceptions
-
-    assert issubclass(getattr(exceptions, kind), LOSS_ERRORS)
 
 
 @pytest.mark.ci

@@ -61,16 +61,6 @@ def test_job_whose_checkpoint_was_lost_restarts_to_the_same_result(
     assert "checkpoint was lost" in service.job(job)["summary"]["note"]
 
 
-def test_queued_job_is_cancelled_at_once_and_runs_when_resumed(service: Service, undisturbed: bytes) -> None:
-    first, second = service.submit(LONG), service.submit(LONG)
-    answer = service.ask("POST", f"/v1/jobs/{second}/cancel")
-    assert (answer.status_code, answer.json()["state"]) == (202, "cancelled")
-    assert service.found(first) == undisturbed
-    assert service.job(second)["attempt"] == 0
-    service.ask("POST", f"/v1/jobs/{second}/resume")
-    assert service.found(second) == undisturbed
-
-
 def test_job_that_repeatedly_ends_its_coordinator_fails(service: Service, undisturbed: bytes) -> None:
     job = service.submit(LONG)
 

@@ -67,14 +67,6 @@ def test_hanging_process_is_killed_and_the_job_continues(
     assert service.job(job)["attempt"] == 2
 
 
-def test_hanging_api_is_restarted(service: Service, undisturbed: bytes, stopped: list[int]) -> None:
-    job = service.submit(LONG, settings=ALONE)
-    victim = service.one("api")
-    stop(victim, stopped)
-    eventually(lambda: not alive([victim]))
-    assert service.found(job) == undisturbed
-
-
 @contextmanager
 def colleague(service: Service, name: str) -> Iterator[subprocess.Popen[bytes]]:
     """Run a coordinator without a supervisor, as on another machine."""

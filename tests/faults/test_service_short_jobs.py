@@ -62,7 +62,7 @@ def test_coordinator_lost_during_a_short_search_loses_no_job(
     assert service.job(job)["attempt"] == 2
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_cancelled_short_search_keeps_its_models_and_resumes_to_the_same_result(
     service: Service, models: list[Any]
 ) -> None:

@@ -68,25 +68,6 @@ def test_service_waits_for_a_database_that_does_not_answer_yet(tmp_path: Path) -
             process.kill()
 
 
-def test_port_in_use_is_refused(tmp_path: Path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as other:
-        port = other.getsockname()[1]
-        said = refused("--data-dir", tmp_path / "data", "--port", port)
-    assert f"cannot listen at 127.0.0.1, port {port} (another program uses it): give another --port" in said
-
-
-def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    said = refused("--data-dir", folder, "--host", "0.0.0.0", "--port", free_port())
-    assert "0.0.0.0 can be reached by other machines, and there is no key" in said
-    assert "create one with 'islands keys create --scope read --scope write'" in said
-    secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()[0]
-    with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
-        assert service.client.get("/v1/jobs").status_code == 401
-        answer = service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {secret}"})
-        assert answer.status_code == 200
-
-
 def test_key_in_a_file_is_enough_for_the_first_start(tmp_path: Path) -> None:
     secret = tmp_path / "admin-key"
     secret.write_text("0123456789abcdef" * 4)
@@ -153,19 +134,6 @@ def test_service_with_a_certificate_uses_tls_only(
             plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
             assert b"alive" not in plain.recv(1000)
     assert "https://127.0.0.1" in service.log.read_text()
-
-
-def test_certificate_without_its_key_is_refused(
-    tmp_path: Path, certificate: tuple[Path, Path, ssl.SSLContext]
-) -> None:
-    options = ("--data-dir", tmp_path / "data", "--port", free_port())
-    said = refused(*options, "--tls-certificate", certificate[0])
-    assert "TLS needs both a certificate and a key" in said
-    said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", tmp_path / "none.pem")
-    assert f"there is no file {tmp_path / 'none.pem'}" in said
-    said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", certificate[0])
-    assert "are not a certificate and its key" in said
-    assert "give two PEM files that match" in said
 
 
 def test_event_stream_ends_cleanly_when_the_service_stops(tmp_path: Path) -> None:

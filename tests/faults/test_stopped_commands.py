@@ -168,18 +168,12 @@ def check_kept(folder: Path, err: str) -> None:
 @pytest.mark.parametrize(
     ("name", "percent", "number"),
     [
-        *(
-            pytest.param(*case, marks=pytest.mark.ci)
-            for case in [
-                ("fit", 80, signal.SIGTERM),
-                ("diagnose", 70, signal.SIGINT),
-            ]
-        ),
+        pytest.param("fit", 80, signal.SIGTERM, marks=pytest.mark.ci),
         *(
             pytest.param(name, percent, number, marks=pytest.mark.nightly)
             for name in COMMANDS
             for percent, number in [
-                *((percent, signal.SIGINT) for percent in (20, 40, 60, 75, 85, 95)),
+                *((percent, signal.SIGINT) for percent in (20, 40, 60, 70, 75, 85, 95)),
                 *((percent, signal.SIGTERM) for percent in (50, 90)),
             ]
         ),

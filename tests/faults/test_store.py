@@ -1,6 +1,5 @@
 """Killed processes, full disks and lost servers: accepted jobs are kept."""
 
-import shutil
 import sqlite3
 import tempfile
 from contextlib import closing
@@ -62,23 +61,6 @@ while True:
     generation += 1
 """
 
-#: May not write files above a size: the effect of a file system quota, also for unprivileged users.
-NARROW = """
-import resource, sys
-from islands_service.domain.job import Submission
-from islands_service.store import Store
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
-with Store(sys.argv[1]) as store:
-    while True:
-        try:
-            job, _ = store.jobs.submit(Submission("alice", {"text": "x" * 20_000}))
-        except Exception as error:
-            print(type(error).__name__)
-            break
-        print(job.id)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-    print(store.jobs.submit(Submission("alice", {}))[0].id)
-"""
 
 #: Bytes of a small disk.
 DISK = 2_000_000
@@ -119,19 +101,6 @@ def test_acknowledged_jobs_of_a_killed_process_are_stored(database, lines):
             name = " ".join(key)
             again, new = store.jobs.submit(asked(spec={"key": name}, idempotency_key=name))
             assert (again.id, new) == (job, False)
-
-
-@pytest.mark.nightly
-def test_repeated_kills_lose_no_acknowledged_job(database):
-    acknowledged = []
-    for turn in range(15):
-        with child(SUBMIT, database) as process:
-            acknowledged += killed_after(process, 1 + 7 * turn)
-        intact(database)
-    with Store(database) as store:
-        found = {job: " ".join(key) for job, *key in acknowledged}
-        assert all(store.jobs.get(ALICE, job).spec == {"key": key} for job, key in found.items())
-        assert len(set(found.values())) == len(found)
 
 
 @pytest.mark.ci
@@ -234,18 +203,6 @@ def test_store_opens_again_when_a_full_disk_has_space(disk):
     with Store(url) as store:
         assert store.jobs.get(ALICE, job.id) == job
         submitted(store)
-
-
-@pytest.mark.ci
-def test_file_size_limit_counts_as_a_full_disk(prepared_sqlite, tmp_path):
-    path = shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
-    with child(NARROW, f"sqlite:///{path}", "500000") as process:
-        *accepted, fault, after = process.communicate(timeout=60)[0].split()
-    assert fault == "StorageFullError"
-    assert len(accepted) > 5
-    intact(f"sqlite:///{path}")
-    with Store(f"sqlite:///{path}") as store:
-        assert {job.id for job in store.jobs.page(ALICE, limit=200).jobs} == {*accepted, after}
 
 
 def test_full_disk_refuses_new_blobs_and_keeps_existing_ones(disk):

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 from math import inf
 
 import pytest
@@ -136,13 +135,6 @@ def test_abandonment_does_not_change_a_search_with_a_library():
 # The abandon threshold.
 
 
-def test_threshold_depends_only_on_the_previous_island(setting, history):
-    assert history[0].abandon_threshold == inf
-    for before, after in pairwise(history):
-        assert after.abandon_threshold == _abandon_threshold(before, setting)
-    assert history[-1].abandon_threshold < inf
-
-
 def test_threshold_admits_candidates_of_elite_and_hall_of_fame(setting, history):
     for island in history:
         threshold = _abandon_threshold(island, setting)
@@ -153,49 +145,3 @@ def test_threshold_admits_candidates_of_elite_and_hall_of_fame(setting, history)
         for size, allowed in enumerate(thresholds):
             known = [entry.fitness for entry in island.hall_of_fame.entries if entry.size == size]
             assert allowed == (max(threshold, known[-1]) if len(known) == Individual.kept else inf)
-
-
-def test_threshold_is_the_80_percent_quantile_of_known_parents():
-    (first,) = islands_of(Evaluator(record(), SMALL), 0)
-    parents = sorted(each.fitness for each in (*first.elite, *first.population))
-    known = sum(fitness < inf for fitness in parents)
-    threshold = _abandon_threshold(first, SMALL)
-    expected = parents[min(int(0.8 * len(parents)), known - 1)]
-    assert threshold == max(expected, first.elite[-1].fitness)
-
-
-def test_threshold_includes_the_elite_if_most_parents_are_copies():
-    setting = SETTINGS["none shooting distinct"]
-    island = islands_of(Evaluator(record(), setting), 5)[-1]
-    alike = replace(island, population=island.elite[:1] * setting.population)
-    assert alike.elite[-1].fitness > alike.elite[0].fitness
-    assert _abandon_threshold(alike, setting) == alike.elite[-1].fitness
-    elites = []
-    for abandon in (True, False):
-        following, _ = step(alike, Evaluator(record(), setting, abandon=abandon))
-        elites.append(repr(following.elite))
-    assert elites[0] == elites[1]
-
-
-def test_nothing_is_abandoned_while_the_elite_is_not_full():
-    """There are fewer models of a single lag than places in the elite, but more than in the hall of fame."""
-    setting = replace(
-        SMALL,
-        constraints="none",
-        distinct=True,
-        elite=1.0,
-        initial_height=1,
-        max_height=1,
-        max_terms=1,
-        initial_terms=(1, 1),
-        prune=0.0,
-        primitives=(),
-    )
-    seen = set()
-    for island in islands_of(Evaluator(record(), setting), 6):
-        seen |= {each.key for each in island.population}
-        assert {each.key for each in island.elite} == seen
-        assert len(island.elite) < setting.elites
-        assert not abandoned(island)
-    assert len(seen) > Individual.kept
-    assert island.abandon_threshold == inf

@@ -1,6 +1,6 @@
 """Properties of island profiles: they change only variation and selection."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import inf
 
 import pytest
@@ -10,7 +10,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
 from islands.evolution.problem import Problem
-from islands.evolution.settings import ISLAND_PROFILES, Settings
+from islands.evolution.settings import ISLAND_PROFILES
 from support.migrations import (
     SETTINGS,
     evaluator,
@@ -31,23 +31,6 @@ BREEDING = {"crossover", "mutation", "prune", "tournament", "high_level", "outer
 @every_profile
 def test_profiles_change_only_variation_and_selection(profile):
     assert ISLAND_PROFILES[profile].keys() <= BREEDING
-
-
-def test_profiles_are_assigned_to_islands_in_turn():
-    assigned = tuple(ISLAND_PROFILES)
-    search_problem = Problem(recorded(), replace(SETTINGS, characters=assigned))
-    for island in range(3 * len(assigned)):
-        profile = ISLAND_PROFILES[assigned[island % len(assigned)]]
-        for field in fields(Settings):
-            value = getattr(search_problem.settings_of(island), field.name)
-            assert value == profile.get(field.name, getattr(search_problem.settings, field.name)), field.name
-
-
-def test_islands_without_profiles_have_the_settings_of_the_problem():
-    search_problem = Problem(recorded(), SETTINGS)
-    assert all(search_problem.settings_of(island) is SETTINGS for island in range(3))
-    plain = Problem(recorded(), replace(SETTINGS, characters=("plain",)))
-    assert plain.settings_of(5) == plain.settings
 
 
 @every_profile

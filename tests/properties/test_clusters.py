@@ -5,10 +5,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.expressions.parsing import parse
-from islands.expressions.primitives import ADD, MUL, PRIMITIVES
-from islands.expressions.tree import Apply, Constant, Lagged, Shift, content, lags
+from islands.expressions.primitives import MUL
+from islands.expressions.tree import Apply, Lagged, content
 from islands.models.clusters import OUTPUT_AT_REST, clusters, steady_state
-from islands.models.regressor import canonical, regressor
+from islands.models.regressor import regressor
 from support.strategies import grid, leaves, nearly, phi_factors, regressors, settled_value, signals
 
 
@@ -28,56 +28,11 @@ def test_weighted_steady_state_is_the_value_for_constant_signals(item, signal):
     assert nearly(weight * found, expected)
 
 
-@given(regressors())
-def test_steady_state_has_lag_zero_and_only_signals_of_the_regressor(item):
-    _, state = steady_state(item)
-    assert lags(state) <= {(channel, 0) for channel, _ in item.lags}
-
-
 @given(st.lists(leaves(), max_size=3), phi_factors(), st.integers(1, 4), st.lists(phi_factors(), max_size=2))
 def test_regressor_with_a_phi_factor_belongs_to_no_cluster(factors, phi, power, others):
     item = make_regressor(Apply(MUL, (*factors, *[phi] * power, *others, Lagged(0, 1))))
     assert steady_state(item)[0] == 0.0
     assert clusters([item]) == ()
-
-
-@given(phi_factors(), st.sampled_from(["sin", "tanh", "abs", "sqrt", "cube", "square", "sign", "log"]))
-def test_function_that_is_zero_at_zero_vanishes_with_its_phi(phi, name):
-    assert clusters([make_regressor(Apply(PRIMITIVES[name], (phi,)))]) == ()
-
-
-@given(phi_factors(), leaves())
-def test_quotient_of_a_phi_and_a_signal_vanishes_and_its_inverse_too(phi, leaf):
-    for quotient in ((phi, leaf), (leaf, phi)):
-        assert clusters([make_regressor(Apply(PRIMITIVES["div"], quotient))]) == ()
-
-
-@given(phi_factors(), st.sampled_from(["exp", "cos"]))
-def test_exp_and_cos_of_a_phi_are_one_in_steady_state(phi, name):
-    assert steady_state(make_regressor(Apply(PRIMITIVES[name], (phi,)))) == canonical(parse("1"))
-
-
-@given(phi_factors(), leaves(), st.sampled_from(["max", "min"]))
-def test_max_and_min_of_a_phi_and_a_signal_do_not_vanish(phi, leaf, name):
-    found = clusters([make_regressor(Apply(PRIMITIVES[name], (phi, leaf)))])
-    assert [cluster.weights for cluster in found] == [(1.0,)]
-    assert lags(found[0].steady_state) == {(leaf.channel, 0)}
-
-
-@given(phi_factors(), st.lists(leaves(), min_size=1, max_size=3), grid)
-def test_phi_does_not_change_the_steady_state_of_a_sum(phi, signals_read, offset):
-    terms = (Apply(MUL, tuple(signals_read) * 2), Lagged(0, 1), Constant(offset))
-    pair = [make_regressor(Apply(ADD, (*added, *terms))) for added in ((phi,), ())]
-    assert steady_state(pair[0]) == steady_state(pair[1])
-    assert [cluster.members for cluster in clusters(pair)] == [(0, 1)]
-
-
-@given(st.lists(leaves(), min_size=1, max_size=4), st.lists(st.integers(0, 9), min_size=4, max_size=4))
-def test_product_of_signals_is_in_one_cluster_at_all_lags(signals_read, shifts):
-    moved = [Shift(more, leaf) for more, leaf in zip(shifts, signals_read, strict=False)]
-    pair = [make_regressor(Apply(MUL, (*factors, Lagged(0, 1)))) for factors in (signals_read, moved)]
-    assert [cluster.members for cluster in clusters(pair)] == [(0, 1)]
-    assert steady_state(pair[0])[0] == steady_state(pair[1])[0] == 1.0
 
 
 @given(st.lists(regressors(height=2), max_size=8), st.randoms(use_true_random=False))

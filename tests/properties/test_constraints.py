@@ -12,7 +12,7 @@ from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.tree import Lagged
-from islands.models.clusters import OUTPUT_AT_REST, steady_state
+from islands.models.clusters import steady_state
 from islands.models.narx import make_model
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
@@ -52,17 +52,6 @@ def hysteresis(*texts):
     return CONSTRAINTS["hysteresis"].constrain(make_regressors(*texts))
 
 
-def test_model_14_has_the_three_clusters_of_the_paper():
-    found = CONSTRAINTS["hysteresis"].constrain(MODEL_14)
-    assert found.regressors == tuple(MODEL_14)
-    expected = [
-        ({"y(k-1)": 1.0}, 1.0),
-        ({"u(k-9)": 1.0, "u(k-7)": 1.0}, 0.0),
-        ({"y(k-6)*u(k-10)": 1.0, "y(k-1)*u(k-4)": 1.0}, 0.0),
-    ]
-    assert sorted(rows(found), key=str) == sorted(expected, key=str)
-
-
 def test_several_lags_of_y_sum_to_one():
     found = hysteresis("y(k-1)", "y(k-2)", "phi1(u(k-1), u(k-2))")
     assert rows(found) == [({"y(k-1)": 1.0, "y(k-2)": 1.0}, 1.0)]
@@ -76,24 +65,11 @@ def test_single_regressor_of_another_cluster_is_dropped(lone):
     assert rows(found) == [({"y(k-1)": 1.0}, 1.0)]
 
 
-def test_single_lag_of_y_has_the_parameter_one():
-    found = hysteresis("y(k-3)")
-    assert rows(found) == [({"y(k-3)": 1.0}, 1.0)]
-
-
 @pytest.mark.parametrize("texts", [["u(k-1)", "u(k-2)"], ["y(k-1)^2", "y(k-2)^2"], ["phi1(u(k-1), u(k-2))"]])
 def test_structure_without_y_is_infeasible(texts):
     found = hysteresis(*texts)
     assert found == EvaluationOutcome(Status.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
     assert "change either as the reason says" in str(found)
-
-
-def test_members_enter_their_cluster_with_their_steady_state_weight():
-    # 2 y(k-1) + y(k-2) is 3 y at rest; its canonical form takes the 2 out.
-    found = hysteresis("2*y(k-1) + y(k-2)", "y(k-3)")
-    (row, total), names = rows(found)[0], [plain(item.expression) for item in found.regressors]
-    assert total == 1.0
-    assert [row[name] for name in names] == [1.5, 1.0]
 
 
 def test_constrained_estimate_has_every_output_as_equilibrium():
@@ -110,13 +86,6 @@ def test_constrained_estimate_has_every_output_as_equilibrium():
     for level in (-2.0, 0.0, 3.0):
         held = free_run(chosen, Dataset(np.full(200, 1.5), np.full(200, level), 0.1)).y[10:]
         np.testing.assert_allclose(held, level, rtol=0, atol=1e-9)
-
-
-def test_constraint_none_has_no_rows():
-    found = CONSTRAINTS["none"].constrain(MODEL_14)
-    assert found.regressors == tuple(MODEL_14)
-    assert found.S.shape == (0, 9)
-    assert found.c.shape == (0,)
 
 
 @pytest.mark.parametrize("name", CONSTRAINTS)
@@ -157,27 +126,11 @@ def test_user_defined_constraint_sets_the_sums_of_its_groups():
     assert found.c.tolist() == [0.5, -2.0, 3.0]
 
 
-def test_group_without_a_given_sum_sums_to_zero():
-    items = make_regressors("y(k-1)", "u1(k-1)", "u1(k-2)^2", "u2(k-1)", "1")
-    found = make_constraint(c0=0.5).constrain(items)
-    assert [plain(item.expression, 2) for item in found.regressors] == ["y(k-1)", "u1(k-1)", "u1(k-2)^2", "1"]
-    assert found.S.tolist() == [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 2.0, 0.0]]
-    assert found.c.tolist() == [0.5, 0.0]
-
-
 @pytest.mark.parametrize("sums", [{"c1": 1.0}, {"c0": 1.0, "c2": 0.5}])
 def test_structure_without_a_required_group_is_infeasible(sums):
     assert make_constraint(**sums).constrain(make_regressors("y(k-1)", "y(k-2)")) == EvaluationOutcome(
         Status.INFEASIBLE, "none"
     )
-
-
-def test_table_has_groups_and_sums():
-    assert dict(CONSTRAINTS["hysteresis"].sums) == {OUTPUT_AT_REST: 1.0}
-    assert dict(CONSTRAINTS["none"].sums) == {}
-    for item in MODEL_14:
-        assert CONSTRAINTS["hysteresis"].group(item) == steady_state(item)
-        assert CONSTRAINTS["none"].group(item)[0] == 0.0
 
 
 # Null space, for selection.
@@ -225,9 +178,3 @@ def test_library_without_y_is_infeasible_under_the_constraint():
     found = CONSTRAINTS["hysteresis"].directions(make_regressors("u(k-1)", "u(k-2)"))
     assert found.verdict is Status.INFEASIBLE
     assert "add y(k-1)" in found.reason
-
-
-def test_regressors_without_a_constraint_are_the_directions():
-    found = CONSTRAINTS["none"].directions(LIBRARY)
-    assert (found.target, found.fixed) == (Lagged(0, 0), ())
-    assert [direction.regressors for direction in found.free] == [(item,) for item in LIBRARY]

@@ -9,13 +9,10 @@ from islands.evolution.engine import next_stop, receive_migrants, run_epoch, sel
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.problem import GeneEvolution, Problem, make_problem
+from islands.evolution.problem import GeneEvolution, make_problem
 from support.migrations import (
     SETTINGS,
     every_replacement_policy,
-    evolution,
-    keys,
-    models,
     recorded,
     run_next_epoch,
 )
@@ -89,14 +86,6 @@ def test_epoch_begins_with_immigration(search_problem, replaced):
     assert after.island != run_next_epoch(here.island, search_problem).island
 
 
-def test_immigrants_are_parents_of_the_next_generation():
-    fittest, *others = sorted(models(), key=lambda each: each.fitness)
-    island = Island(0, 3, 3, tuple(others[-6:]), tuple(others[-3:]), HallOfFame())
-    copies = Problem(recorded(), replace(SETTINGS, crossover=0.0, mutation=0.0, prune=0.0, generations=4))
-    assert fittest.key in keys(run_next_epoch(island, copies, [(fittest,)]).island.population)
-    assert fittest.key not in keys(run_next_epoch(island, copies).island.population)
-
-
 def test_epochs_without_immigrants_compose(search_problem):
     """Two epochs of three generations equal one of six, so a stop alone has no effect."""
     initial, first, second = run_first_epochs(search_problem)
@@ -105,17 +94,6 @@ def test_epochs_without_immigrants_compose(search_problem):
     assert exactly(whole.island) == exactly(second.island)
     assert whole.steps == first.steps + second.steps
     assert whole.emigrants == second.emigrants
-
-
-def test_run_that_ended_between_stops_continues_unchanged(search_problem):
-    *_, sixth = run_first_epochs(search_problem)
-    last = run_next_epoch(sixth.island, search_problem)
-    assert [info.generation for info in last.steps] == [7, 8]
-    assert last.emigrants == ()
-    longer = replace(search_problem, settings=replace(search_problem.settings, generations=20))
-    assert exactly(run_next_epoch(last.island, longer).island) == exactly(
-        run_next_epoch(sixth.island, longer).island
-    )
 
 
 def test_epoch_ends_at_the_next_stop_or_with_the_run():
@@ -143,13 +121,3 @@ def test_stopped_epoch_returns_none(search_problem, calls):
     assert exactly(
         run_next_epoch(initial.island, search_problem, evaluator_of_run=own_evaluator).island
     ) == exactly(first.island)
-
-
-def test_stop_is_called_before_every_generation_only(search_problem):
-    initial, first, _ = run_first_epochs(search_problem)
-    answers = iter([False] * 3)
-    epoch = run_epoch(initial.island, [], search_problem.open(), lambda: next(answers))
-    assert list(answers) == []
-    assert exactly(epoch.island) == exactly(first.island)
-    before_the_first = Island(0, 7, -1, (), (), HallOfFame())
-    assert run_epoch(before_the_first, [], evolution(SETTINGS), lambda: True) is None

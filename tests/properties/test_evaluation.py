@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 from math import inf
 
 import pytest
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 
 from islands.evolution import evaluation
 from islands.evolution.evaluation import Evaluator, Limits
-from islands.evolution.generation import first_generation
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
@@ -101,28 +99,6 @@ thresholds_by_size = st.none() | st.lists(
 
 
 @pytest.mark.ci
-def test_pool_has_all_outcomes():
-    for name, others in (
-        ("free", {"OK", "SINGULAR", "INFEASIBLE", "DIVERGED"}),
-        ("constrained", {"OK", "INFEASIBLE", "DIVERGED"}),
-    ):
-        found = [
-            evaluate_alone(name, place, pruned) for place in range(len(POOL)) for pruned in (False, True)
-        ]
-        assert {each.outcome.verdict.name for each in found} == others
-        assert len({each.fitness for each in found if each.outcome}) > 10
-        assert any(
-            evaluate_alone(name, place, True).size < evaluate_alone(name, place, False).size
-            for place in range(len(POOL))
-        )
-    diverged = {evaluate_alone("constrained", place, False).outcome.reason for place in range(len(POOL))}
-    assert diverged >= {
-        "a regressor overflows on the record",
-        "the simulation left the divergence bound in an interval",
-    }
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize("name", SETTINGS)
 @given(st.sampled_from(LIMITS), st.lists(st.tuples(populations, thresholds_by_size), min_size=1, max_size=4))
 def test_evaluation_does_not_depend_on_batch_and_cache(name, limits, history):
@@ -154,23 +130,6 @@ def test_abandoned_individuals_have_a_fitness_above_the_threshold(name, threshol
         assert (each.fitness, each.theta) == (inf, ())
         assert exact.fitness > thresholds[each.size]
         assert repr(exact) == repr(evaluate_alone(name, *key))
-
-
-def test_thresholds_are_ignored_if_abandonment_is_disabled():
-    population = [(each, True) for each in POOL]
-    complete = Evaluator(record(), CONSTRAINED, abandon=False)
-    assert complete.evaluate(population, [0.0] * 6) == Evaluator(record(), CONSTRAINED).evaluate(population)
-
-
-@pytest.mark.ci
-def test_threshold_equal_to_the_fitness_abandons_nothing():
-    for name, setting in SETTINGS.items():
-        known = [evaluate_alone(name, place, False) for place in range(len(POOL))]
-        for place, each in enumerate(known):
-            if each.outcome:
-                thresholds = [each.fitness if size == each.size else 0.0 for size in range(6)]
-                evaluator = Evaluator(record(), setting, Limits(pairs=0))
-                assert repr(evaluator.evaluate([(POOL[place], False)], thresholds)[0][0]) == repr(each)
 
 
 # Batches.
@@ -214,31 +173,7 @@ def test_small_pair_table_splits_a_generation_into_several_batches(batches, name
     assert sum(batches) == selected + evaluated
 
 
-def test_nearly_full_pair_table_is_emptied_between_calls():
-    evaluator = Evaluator(record(), FREE, Limits(pairs=0))
-    history = []
-    for lag in range(1, 17):
-        for other in range(1, 14, 4):
-            texts = [f"u(k-{lag})*y(k-{other + more})" for more in range(4)]
-            evaluator.evaluate([(Individual(tuple(map(parse, texts))), False)])
-            history.append(evaluator.memory["pairs"][0])
-    # Four regressors and y(k) have fifteen pairs; the second call shares the pair of y(k) with itself.
-    assert history[:2] == [15 * 16, 29 * 16]
-    assert max(history) <= 1024 * 16 * 3 // 4
-    assert any(after < before for before, after in pairwise(history))
-
-
 # Duplicates.
-
-
-def test_pruning_decision_is_part_of_the_cache_key():
-    genes = tuple(parse(text) for text in ("y(k-1)", "phi1(u(k-1), u(k-2))", "phi2(u(k-1), u(k-9))*y(k-3)"))
-    each = Individual(genes)
-    evaluator = Evaluator(record(), replace(SMALL, tolerance=1e-3))
-    (whole, pruned), duplicates = evaluator.evaluate([(each, False), (each, True)])
-    assert (whole.size, duplicates) == (3, 0)
-    assert pruned.size < 3
-    assert evaluator.evaluate([(each, True), (each, False), (each, True)]) == ((pruned, whole, pruned), 3)
 
 
 def test_abandoned_evaluation_answers_only_lower_thresholds():
@@ -259,40 +194,7 @@ def test_abandoned_evaluation_answers_only_lower_thresholds():
     assert evaluated(inf) == ("OK", 1)
 
 
-def test_duplicates_consume_random_draws():
-    """The pruning of every individual is drawn in order, also if the individual is cached."""
-
-    class Spy(Evaluator):
-        decisions, known = (), 0
-
-        def evaluate_genes(self, individuals, pruned, thresholds=None):
-            self.decisions = pruned.tolist()
-            found, self.known = super().evaluate_genes(individuals, pruned, thresholds)
-            return found, self.known
-
-    setting = replace(SMALL, prune=0.5, initial_terms=(1, 1), initial_height=0)
-    spy = Spy(record(), setting)
-    island, info = first_generation(0, 8, spy)
-    draw = Stream(8, 0, 0, Purpose.PRUNING)
-    assert spy.decisions == [draw.chance(0.5) for _ in range(setting.population)]
-    # Individuals of one leaf are mostly duplicates.
-    assert setting.population > info.duplicates >= setting.population - 8
-    assert spy.known < setting.population
-    second_island, second_info = first_generation(0, 8, spy)
-    assert spy.known == setting.population
-    # The cache affects the speed of a generation, not its result.
-    assert (second_island, second_info) == (island, info)
-
-
 # Emptied caches, and zero genes.
-
-
-def test_evaluator_without_caches_gives_equal_results():
-    without_caches = Evaluator(record(), SMALL, Limits(pairs=0, genes=0, structures=0))
-    known = [(Individual((Lagged(0),)), False)]
-    assert [without_caches.evaluate(known)[1] for _ in range(3)] == [0, 0, 0]
-    assert [Evaluator(record(), SMALL).evaluate(known * 2)[1] for _ in range(2)] == [1, 1]
-    assert repr(evolved(4, evaluator=without_caches)) == repr(evolved(4))
 
 
 def test_clear_caches_empties_all_and_keeps_results():

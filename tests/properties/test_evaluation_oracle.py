@@ -16,7 +16,6 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.models.narx import Model, canonical_order
 from islands.program.regressor_matrix import regressor_matrix
-from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 from support.searches import distinct_genes, record
@@ -261,44 +260,6 @@ def evaluate(*texts, data=None, pruned=False, **changes):
     return found
 
 
-def test_single_regressors_of_a_cluster_are_removed_also_after_pruning():
-    lone = evaluate("y(k-1)", "u(k-1)*y(k-1)", "phi1(u(k-1), u(k-2))")
-    assert lone.key == ("y(k-1)", "u1(k-1) - u1(k-2)")
-    assert repr(lone) == repr(evaluate("y(k-1)", "phi1(u(k-1), u(k-2))"))
-    # Two members form a cluster.
-    kept = evaluate("y(k-1)", "phi1(u(k-1), u(k-2))", "u(k-1)*y(k-1)", "u(k-3)*y(k-2)")
-    assert kept.size == 4
-    theta = dict(zip(kept.key, kept.theta, strict=True))
-    assert theta["y(k-1)"] == 1.0
-    assert theta["y(k-1)*u1(k-1)"] == -theta["y(k-2)*u1(k-3)"] != 0.0
-    pruned = evaluate(
-        "y(k-1)", "phi1(u(k-1), u(k-2))", "u(k-1)*y(k-1)", "u(k-3)*y(k-2)", pruned=True, tolerance=1e-3
-    )
-    assert pruned.key == lone.key
-
-
-@pytest.mark.parametrize("constraints", ["none", "hysteresis"])
-def test_zero_regressor_is_singular_unless_it_is_pruned(constraints):
-    """This includes clusters with another member, because the parameter of a zero regressor is arbitrary."""
-    data = record(700)
-    late = Dataset(np.where(np.arange(700) < 699 - 4, 0.0, 1.0), data.y, data.dt)
-    texts = ("y(k-1)", "u(k-1)", "u(k-9)")
-    assert not regressor_matrix([Lagged(1, 9)], late, SETTINGS.maximum_lag).any()
-    whole = evaluate(*texts, data=late, constraints=constraints)
-    assert whole.outcome.verdict is Status.SINGULAR
-    pruned = evaluate(*texts, data=late, constraints=constraints, pruned=True, tolerance=0.0)
-    assert pruned.outcome
-    assert pruned.key == (("y(k-1)", "u1(k-1)") if constraints == "none" else ("y(k-1)",))
-
-
-def test_structure_without_y_in_steady_state_is_infeasible():
-    for texts in (("u(k-1)",), ("u(k-1)", "u(k-2)"), ("y(k-1)*y(k-2)", "y(k-3)*y(k-1)")):
-        found = evaluate(*texts)
-        assert found.outcome.verdict is Status.INFEASIBLE
-        assert found.outcome.reason == "no regressor is y at rest: add y(k-1)" or found.size == 0
-        assert evaluate(*texts, constraints="none").outcome
-
-
 @pytest.mark.parametrize(("constraints", "most"), [("none", 4), ("hysteresis", 5)])
 def test_dependent_regressors_are_singular_unless_they_are_pruned(constraints, most):
     """Four samples determine two sines; the constraint on the sum allows a fifth regressor."""
@@ -314,36 +275,3 @@ def test_dependent_regressors_are_singular_unless_they_are_pruned(constraints, m
     pruned = evaluate(*texts, pruned=True, **setting)
     assert pruned.outcome
     assert pruned.size <= 1 + most
-
-
-def test_no_more_rows_than_parameters_are_too_few():
-    texts = ["y(k-1)", *(f"u(k-{lag})" for lag in (1, 3, 5, 8))]
-    for rows in (1, 2, 3, 4, 5):
-        for constraints in ("none", "hysteresis"):
-            found = evaluate(*texts, constraints=constraints, data=record(16 + rows))
-            assert found.outcome.verdict is Status.TOO_FEW_ROWS
-            assert (found.fitness, found.theta) == (np.inf, ())
-    assert evaluate(*texts, constraints="none", data=record(16 + 30)).outcome
-
-
-def test_regressor_that_overflows_has_diverged():
-    data = record(700)
-    huge = Dataset(1e160 * data.u, data.y, data.dt)
-    for pruned in (False, True):
-        found = evaluate("y(k-1)", "u(k-1)*u(k-2)", data=huge, constraints="none", pruned=pruned)
-        assert found.outcome.verdict is Status.DIVERGED
-        assert found.outcome.reason == "a regressor overflows on the record"
-        assert found.size == 2
-
-
-def test_individuals_without_genes_are_infeasible():
-    for genes in ((), (parse("phi1(u(k-1), u(k-1))"),)):
-        for pruned in (False, True):
-            for constraints in ("none", "hysteresis"):
-                evaluator = Evaluator(record(), replace(SETTINGS, constraints=constraints))
-                (found,), _ = evaluator.evaluate([(Individual(genes), pruned)])
-                assert (found.outcome.verdict, found.outcome.reason) == (
-                    Status.INFEASIBLE,
-                    "no gene is left",
-                )
-                assert (found.genes, found.regressors) == (genes, ())

@@ -145,14 +145,6 @@ def test_sparse_hysteresis_of_the_library_is_found_exactly(seed, noise, constrai
         assert model.theta[0] == pytest.approx(1.0, abs=1e-15)
 
 
-def test_active_one_of_two_inputs_is_found():
-    u = walk(1000, 5, inputs=2)
-    y = hysteresis(u[:, 1:], 0.0, 5)
-    found = forward_selection(library("phi-polynomial", 3, inputs=2), Dataset(u, y, 0.1), "hysteresis", 4)
-    expected = [text.replace("u(", "u2(") for text in HYSTERESIS]
-    assert sorted(texts(found[-1], inputs=2)) == sorted(expected)
-
-
 # Constraints.
 
 
@@ -172,33 +164,12 @@ def test_structures_selected_under_the_constraint_meet_it(name, degree, seed):
         assert all(total == pytest.approx(0.0, abs=1e-9) for total in sums.values())
 
 
-def test_constrained_selection_is_better_than_repaired_free_selection():
-    # The constraint removes some of the freely selected terms.
-    data = measured(1)
-    free, bound = (
-        forward_selection(library("polynomial", 2), data, name, 8) for name in ("none", "hysteresis")
-    )
-    repaired = [estimate(structure, data, "hysteresis", LAGS) for structure in free]
-    assert [entry.model.size for entry in repaired] == [1, 2, 3, 3, 5, 6, 6, 8]
-    for size in range(3, 9):
-        structure = max((item for item in bound if len(item) <= size), key=len)
-        chosen = estimate(structure, data, "hysteresis", LAGS)
-        assert chosen.residual_variance < 0.8 * repaired[size - 1].residual_variance
-
-
 def test_library_that_cannot_meet_the_constraint_is_infeasible():
     without = [item for item in library("phi-polynomial", 2) if plain(item.expression) != "y(k-1)"]
     found = forward_selection(without, measured(), "hysteresis")
     assert isinstance(found, EvaluationOutcome)
     assert found.verdict is Status.INFEASIBLE
     assert found.reason == "no regressor is y at rest: add y(k-1)"
-
-
-def test_constant_output_needs_no_increment():
-    still = Dataset(walk(100, 0), np.full(100, 3.0), 0.1)
-    found = forward_selection(library("phi-polynomial", 2), still, "hysteresis")
-    assert [texts(structure) for structure in found] == [["y(k-1)"]]
-    assert forward_selection(library("polynomial", 2), Dataset(walk(100, 0), np.zeros(100), 0.1)) == ()
 
 
 # Segments.
@@ -215,44 +186,12 @@ def test_recordings_that_overlap_by_the_maximum_lag_equal_one_record(name, degre
     assert forward_selection(library(name, degree), turned, constraints, 8) == whole
 
 
-def test_rows_do_not_cross_segments():
-    parts = []
-    for seed, start in ((7, 0.0), (8, 40.0), (9, -70.0)):
-        u = walk(300, seed)
-        parts.append(Dataset(u, hysteresis(u, 0.0, seed, start), 0.1))
-    recordings = join(tuple(parts))
-    found = forward_selection(library("phi-polynomial", 3), recordings, "hysteresis", 4)[-1]
-    assert sorted(texts(found)) == sorted(HYSTERESIS)
-    assert estimate(found, recordings, "hysteresis").residual_variance < 1e-20
-    across = Dataset(recordings.u, recordings.y, 0.1)
-    assert estimate(found, across, "hysteresis").residual_variance > 1.0
-
-
 # From a structure to a model.
-
-
-def test_estimate_keeps_column_names_and_sampling_time():
-    data = Dataset(measured().u, measured().y, 0.25, ("u_V",), "y_um")
-    model = estimate(library("polynomial", 1), data).model
-    assert (model.input_names, model.output_name, model.dt) == (("u_V",), "y_um", 0.25)
-    assert len(model.theta) == len(model.standard_errors) == 7
 
 
 def test_order_and_repetition_of_regressors_have_no_effect():
     terms = library("polynomial", 1)
     assert estimate((*reversed(terms), terms[0]), measured()) == estimate(terms, measured())
-
-
-def test_rows_before_the_warm_up_are_ignored():
-    u = walk(200, 1)
-    y = hysteresis(u, 0.0, 1)
-    y[:50] = np.random.default_rng(1).normal(size=50)
-    data = Dataset(u, y, 0.1)
-    terms = islands.make_model(
-        [(islands.parse(text), value) for text, value in HYSTERESIS.items()]
-    ).regressors
-    assert estimate(terms, data).residual_variance > 1e-3
-    assert estimate(terms, data, warm_up=53).residual_variance < 1e-25
 
 
 @pytest.mark.parametrize(
@@ -271,11 +210,6 @@ def test_estimation_failure_is_an_outcome_with_a_reason(samples, constraints, ve
     else:
         assert found.verdict is verdict
         assert found.reason
-
-
-def test_structure_without_y_is_infeasible_under_the_constraint():
-    terms = islands.make_model([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
-    assert estimate(terms, measured(), "hysteresis").verdict is Status.INFEASIBLE
 
 
 def test_the_candidates_of_a_search_do_not_follow_rounding():

@@ -100,42 +100,6 @@ def test_hall_keeps_the_best_distinct_structures_of_every_size(found):
     assert [entry.size for entry in hall.entries] == sorted(entry.size for entry in hall.entries)
 
 
-single = st.tuples(st.sampled_from(LEAVES), st.sampled_from(FITNESSES)).map(
-    lambda drawn: Individual((drawn[0],), (make_regressor(drawn[0]),), (1.0,), drawn[1])
-)
-
-
-@given(st.lists(single, min_size=10, max_size=60), st.integers(1, 12))
-def test_division_into_generations_does_not_matter(found, generation):
-    """Individuals less fit than the last of a full size are skipped; equally fit ones are not."""
-    hall = HallOfFame()
-    for begin in range(0, len(found), generation):
-        hall = with_entries(hall, found[begin : begin + generation])
-    assert exactly(hall) == exactly(with_entries(HallOfFame(), found))
-
-
-def test_ties_with_the_last_of_a_full_size_are_broken_by_text():
-    full = with_entries(HallOfFame(), [entry(1.0, f"y(k-{lag})") for lag in range(1, Individual.kept + 1)])
-    early, late = entry(1.0, "u(k-1)"), entry(1.0, "y(k-9)")
-    assert with_entries(full, [late]) == full
-    assert [each.key for each in with_entries(full, [early]).entries] == [
-        ("u1(k-1)",),
-        *(each.key for each in full.entries[:-1]),
-    ]
-    assert with_entries(full, [entry(1.5, "u(k-1)")]) == full
-
-
-@given(halls)
-def test_ranks_are_counted_within_a_size(hall):
-    counted = [(place, each.size) for place, each in hall.ranked()]
-    assert [each for _, each in hall.ranked()] == list(hall.entries)
-    assert counted == [
-        (place, size)
-        for size in sorted({each.size for each in hall.entries})
-        for place in range(1, 1 + sum(each.size == size for each in hall.entries))
-    ]
-
-
 @given(halls)
 def test_fitness_improves_along_the_pareto_front(hall):
     best = pareto_front(hall.entries)
@@ -154,27 +118,9 @@ def entry(fitness, *texts, theta=None):
     return Individual(genes, regressors, theta or (1.0,) * len(genes), fitness)
 
 
-def test_fitter_of_equal_structures_is_kept():
-    worse, better = entry(2.0, "q1(y(k-1))"), entry(1.0, "y(k-2)")
-    hall = with_entries(HallOfFame(), [better, worse])
-    assert [(each.fitness, each.genes) for each in hall.entries] == [(1.0, (Lagged(0, 2),))]
-
-
 def test_ties_of_fitness_and_structure_are_broken_by_parameters():
     one, other = entry(1.0, "y(k-1)", theta=(0.5,)), entry(1.0, "y(k-1)", theta=(0.25,))
     assert with_entries(HallOfFame(), [one, other]).entries[0].theta == (0.25,)
-
-
-def test_ties_of_fitness_are_broken_by_text():
-    hall = with_entries(HallOfFame(), [entry(1.0, "y(k-1)"), entry(1.0, "u(k-1)")])
-    assert [each.key for each in hall.entries] == [("u1(k-1)",), ("y(k-1)",)]
-
-
-def test_at_most_eight_models_of_a_size_are_kept():
-    assert Individual.kept == 8
-    many = [entry(float(lag), f"y(k-{lag})") for lag in range(1, 20)]
-    hall = with_entries(HallOfFame(), many[::-1])
-    assert [each.fitness for each in hall.entries] == [float(lag) for lag in range(1, 9)]
 
 
 @pytest.mark.parametrize("fitness", [nan, inf, -inf])
@@ -182,13 +128,3 @@ def test_non_finite_fitness_never_enters(fitness):
     assert with_entries(HallOfFame(), [entry(fitness, "y(k-1)")]) == HallOfFame()
     good = with_entries(HallOfFame(), [entry(3.0, "y(k-1)")])
     assert with_entries(good, [entry(fitness, "y(k-1)")]) == good
-
-
-def test_larger_model_without_better_fitness_is_not_on_the_front():
-    hall = with_entries(
-        HallOfFame(),
-        [entry(1.0, "y(k-1)"), entry(1.0, "y(k-1)", "u(k-1)"), entry(0.5, "y(k-1)", "y(k-2)", "u(k-1)")],
-    )
-    assert [each.size for each in pareto_front(hall.entries)] == [1, 3]
-    assert sorted(hall.best()) == [1, 2, 3]
-    assert pareto_front(()) == ()

@@ -7,15 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import Island, empty_archipelago
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import receive_migrants, run_epoch
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.generation import select_elite
-from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
-from islands.evolution.migration import REPLACEMENT_POLICIES, parse_topology
+from islands.evolution.migration import parse_topology
 from islands.evolution.problem import GeneEvolution, Problem
-from islands.evolution.rng import Purpose, Stream
 from islands.simulation.outcome import Status
 from support.migrations import (
     SETTINGS,
@@ -25,7 +23,6 @@ from support.migrations import (
     islands,
     keys,
     known_fitness,
-    models,
     never_stop,
     recorded,
 )
@@ -81,28 +78,6 @@ def test_elite_is_the_best_of_elite_and_immigrants(replaced, distinct, data, arr
         assert len(after.elite) == SETTINGS.elites
 
 
-def test_structures_in_the_elite_do_not_immigrate_again():
-    one, two, *others = models()
-    population = tuple(others[: SETTINGS.population])
-    island = Island(0, 3, 6, population, (one,), HallOfFame())
-    assert receive_migrants(island, [(replace(one),), (replace(one),)], evolution(SETTINGS)) == island
-    # Structures that are only in the population do immigrate, because the population may lose them.
-    after = receive_migrants(island, [(replace(one), replace(population[0]))], evolution(SETTINGS))
-    assert one not in after.population
-    assert population[0] in after.elite
-    assert two in receive_migrants(island, [(two, one)], evolution(SETTINGS)).population
-
-
-@every_replacement_policy
-def test_first_immigrants_are_taken_of_equal_or_too_many(replaced):
-    one, two, three, *others = models()
-    island = Island(0, 3, 6, tuple(others[:2]), (others[3],), HallOfFame())
-    again = replace(one, genes=one.genes[::-1])
-    setting = replace(SETTINGS, replaced=replaced)
-    after = receive_migrants(island, [(), (one,), (again, two), (three,)], evolution(setting))
-    assert {id(each) for each in after.population} == {id(one), id(two)}
-
-
 @given(islands(), arrivals())
 def test_worst_policy_evaluates_abandoned_individuals(island, arriving):
     after = receive_migrants(island, arriving, evolution(replace(SETTINGS, replaced="worst")))
@@ -110,24 +85,6 @@ def test_worst_policy_evaluates_abandoned_individuals(island, arriving):
     places = sorted(range(len(fitness)), key=lambda place: (-fitness[place], place))
     for place, each in zip(places, expected(island, arriving), strict=False):
         assert after.population[place] is each
-
-
-def test_random_policy_replaces_every_position():
-    newcomer, member, *others = models()
-    island = Island(0, 3, 1, tuple(others[:6]), (member,), HallOfFame())
-    setting = replace(SETTINGS, replaced="random")
-
-    def place(**changes):
-        after = receive_migrants(replace(island, **changes), [(newcomer,)], evolution(setting))
-        return after.population.index(newcomer)
-
-    for name in ("index", "generation", "seed"):
-        assert {place(**{name: value}) for value in range(40)} == set(range(6)), name
-    drawn = [place(generation=generation) for generation in range(20)]
-    for purpose in Purpose:
-        streams = [Stream(3, 0, generation, purpose) for generation in range(20)]
-        own = [REPLACEMENT_POLICIES["random"](6, pytest.fail, 1, stream)[0] for stream in streams]
-        assert (own == drawn) == (purpose is Purpose.IMMIGRATION)
 
 
 @every_replacement_policy

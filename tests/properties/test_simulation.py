@@ -139,17 +139,6 @@ def test_kernel_equals_the_recursion_for_random_layouts(data):
     assert equal_bits(found.y, recursion(chosen, drawn, interval, warm_up))
 
 
-@pytest.mark.parametrize("name", ["linear", "deepest lag on u", "hysteresis"])
-@pytest.mark.parametrize("interval", [1, 2])
-def test_more_intervals_than_lanes_of_a_block_are_simulated(name, interval):
-    data = record(MODELS[name], (3 * WIDTHS[-1] + 17, 5, 2 * WIDTHS[-1] + 1), seed=1)
-    cut = layout(data, MODELS[name].maximum_lag, interval)
-    assert len(cut.block_lanes) > 2
-    assert equal_bits(
-        multiple_shooting(MODELS[name], data, interval).y, recursion(MODELS[name], data, interval)
-    )
-
-
 def test_functions_of_the_mathematical_library_agree_to_rounding():
     chosen = model(
         a="0.5 * tanh(y(k-1) + u(k-1))",
@@ -209,37 +198,7 @@ def test_interval_as_long_as_the_record_is_the_free_run(name, more):
     assert found.mean_squared_error == expected.mean_squared_error
 
 
-@every_model
-@pytest.mark.parametrize("interval", [2, 10, 64])
-def test_intervals_begin_with_the_one_step_ahead_prediction(name, interval):
-    data = record(MODELS[name], (200, 90))
-    found, ahead = multiple_shooting(MODELS[name], data, interval).y, one_step_ahead(MODELS[name], data).y
-    for begin, end in data.bounds:
-        first = slice(begin + MODELS[name].maximum_lag, end, interval)
-        assert equal_bits(found[first], ahead[first])
-
-
 # Predicted samples.
-
-
-@given(st.data())
-def test_exactly_the_samples_after_the_warm_up_are_predicted(data):
-    chosen, drawn, warm_up = draw_records(data)
-    found = multiple_shooting(chosen, drawn, data.draw(st.none() | st.integers(1, 50)), warm_up).y
-    expected = np.concatenate([np.arange(length) >= warm_up for length in drawn.segments])
-    assert np.array_equal(np.isfinite(found), expected)
-
-
-@every_model
-@pytest.mark.parametrize("interval", [1, 7, None])
-@pytest.mark.parametrize("more", [0, 5])
-def test_mean_squared_error_is_the_mean_over_predicted_samples(name, interval, more):
-    data = record(MODELS[name])
-    found = multiple_shooting(MODELS[name], data, interval, MODELS[name].maximum_lag + more)
-    predicted = ~np.isnan(found.y)
-    assert 0 < predicted.sum() < data.samples
-    expected = np.mean((found.y - data.y)[predicted] ** 2)
-    assert found.mean_squared_error == pytest.approx(expected, rel=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -260,14 +219,6 @@ def test_squared_errors_are_summed_from_the_longest_interval_on(seed, interval):
     assert found.mean_squared_error == total(np.array(sums)) / np.isfinite(found.y).sum()
 
 
-@every_model
-def test_longer_warm_up_only_omits_one_step_ahead_predictions(name):
-    data = record(MODELS[name])
-    short, long = one_step_ahead(MODELS[name], data).y, one_step_ahead(MODELS[name], data, 20).y
-    assert np.isnan(short).sum() < np.isnan(long).sum()
-    assert equal_bits(long[~np.isnan(long)], short[~np.isnan(long)])
-
-
 # Causality and boundaries.
 
 
@@ -282,30 +233,6 @@ def test_present_and_future_samples_do_not_affect_predictions(data):
     before = multiple_shooting(chosen, drawn, interval, warm_up).y
     after = multiple_shooting(chosen, replace(drawn, u=u, y=y), interval, warm_up).y
     assert equal_bits(before[: k + 1], after[: k + 1])
-
-
-def test_past_samples_affect_predictions():
-    # Shows that the previous test can fail: the prediction at k depends on sample k - 1.
-    chosen = MODELS["linear"]
-    data, k = record(chosen, (100,)), 60
-    for field in ("u", "y"):
-        changed = getattr(data, field).copy()
-        changed[k - 1] += 1.0
-        before, after = (one_step_ahead(chosen, item).y for item in (data, replace(data, **{field: changed})))
-        assert equal_bits(before[:k], after[:k])
-        assert before[k] != after[k]
-
-
-@given(st.data())
-def test_free_run_does_not_use_outputs_after_the_warm_up(data):
-    chosen, drawn, warm_up = draw_records(data)
-    y = drawn.y.copy()
-    for begin, end in drawn.bounds:
-        y[begin + warm_up : end] = np.nan
-    found = free_run(chosen, replace(drawn, y=y), warm_up)
-    assert found.outcome
-    assert np.isnan(found.mean_squared_error)
-    assert equal_bits(found.y, free_run(chosen, drawn, warm_up).y)
 
 
 @every_model

@@ -1,7 +1,6 @@
 """Properties of every simulator: its declarations are correct, and effects at rest have no response."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,55 +8,12 @@ import pytest
 from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
 from islands.effects.catalogue import catalogue_order
 from islands.effects.interface.context import SimulationContext
-from islands.effects.interface.effect import Effect, Site
-from islands.export.fmu import find_compiler
-from islands.simulators import (
-    extended,
-    intersample,
-    linear,
-    narx,
-    output_equation,
-    parametric,
-    python_function,
-    recorded_output,
-)
+from islands.effects.interface.effect import Effect
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.fmu import simulator as fmu
 from islands.simulators.interface import Simulator
-from islands.simulators.ode import simulator as ode
-from islands.simulators.specification.table import SIMULATORS, PhysicalSpec
 from support.simulated_records import made, names
 
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("toy_class")]
-
-#: Classes of the simulators that are not physical systems; those of "held" and "terms" are
-#: inside an extension.
-CLASSES = {
-    "ode": ode.OdeSimulator,
-    "linear": linear.LinearSimulator,
-    "model": narx.NarxSimulator,
-    "class": parametric.ParametricSimulator,
-    "column": recorded_output.RecordedOutput,
-    "fmu": fmu.FmuSimulator,
-    "python": python_function.PythonFunctionSimulator,
-    "held": intersample.ResampledSimulator,
-    "terms": output_equation.OutputEquation,
-    "extended": extended.SavedExtension,
-}
-
-#: Modules of the package that define no simulator of a specification.
-SHARED_MODULES = {
-    "__init__",
-    "built_in_estimates",
-    "context",
-    "coordinates",
-    "extended",
-    "interface",
-    "linear_states",
-    "mapped_input",
-    "model_form",
-    "second_order",
-}
 
 
 def make(name: str) -> Simulator:
@@ -95,24 +51,6 @@ def possible_effects(simulator: Simulator, context: SimulationContext) -> list[E
     )
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
-def test_every_simulator_has_a_record() -> None:
-    package = Path(intersample.__file__).parent
-    modules = {path.stem for path in package.glob("*.py")} - SHARED_MODULES
-    modules |= {f"{path.parent.name}.simulator" for path in package.glob("*/simulator.py")}
-    assert modules == {type(make(name)).__module__.removeprefix("islands.simulators.") for name in names()}
-
-
-def test_a_simulator_has_the_class_of_its_name(name: str, simulator: Simulator) -> None:
-    if name in SIMULATORS and SIMULATORS[name].spec is PhysicalSpec:
-        assert simulator.name == name
-    else:
-        assert isinstance(simulator, CLASSES[name])
-    assert simulator.name
-    assert set(simulator.sites) <= set(Site)
-    assert isinstance(simulator.is_continuous_time, bool)
-
-
 def test_a_simulation_has_a_finite_value_for_every_sample(
     alone: ExtendedSimulator, context: SimulationContext
 ) -> None:
@@ -134,15 +72,6 @@ def test_the_same_input_gives_the_same_bits(
     assert np.array_equal(context.u, u)
 
 
-def test_nominal_values_are_within_bounds_that_have_a_width(alone: ExtendedSimulator) -> None:
-    lower, upper = alone.bounds
-    assert np.isfinite(alone.nominal).all()
-    assert (lower <= alone.nominal).all()
-    assert (alone.nominal <= upper).all()
-    assert (lower < upper).all()
-    assert (alone.scales > 0.0).all()
-
-
 def test_every_parameter_changes_the_output(alone: ExtendedSimulator) -> None:
     at_rest = alone.simulate(alone.nominal)
     for place, parameter in enumerate(alone.parameters):
@@ -151,16 +80,6 @@ def test_every_parameter_changes_the_output(alone: ExtendedSimulator) -> None:
         changed = alone.simulate(np.minimum(values, alone.bounds[1])) - at_rest
         assert np.isfinite(changed).all(), parameter
         assert np.max(np.abs(changed)) > 0.0, parameter
-
-
-def test_names_of_parameters_and_effects_are_unique(simulator: Simulator, context: SimulationContext) -> None:
-    names = [each.name for each in simulator.parameters]
-    assert len(set(names)) == len(names)
-    found = select_effects(simulator, context, {})
-    assert len({each.name for each in found}) == len(found)
-    for effect in possible_effects(simulator, context):
-        own = [each.name for each in effect.parameters(context)]
-        assert len(set(own)) == len(own), effect.name
 
 
 def test_the_force_coordinate_has_units_and_positive_scales(context: SimulationContext) -> None:

@@ -284,20 +284,20 @@ PORTFOLIO = [name for name in CASES if name.startswith("portfolio")]
 
 #: Cases of every kind; `lab/searches/contradictions.py` has all of them.
 SAMPLE = (
-    *PORTFOLIO[::4],
-    *[name for name in CASES if name.startswith("law")][::12],
+    *PORTFOLIO[::12],
+    *[name for name in CASES if name.startswith("law")][::24],
     *(name for name in CASES if name.startswith("first order") and name.endswith("seed 1")),
-    *(f"first order, {fault}, seed 0" for fault in ("sentinels", "extrapolation")),
-    *[name for name in CASES if name.startswith("several outputs")][::5],
-    *("diagnosis, portfolio, first order", "diagnosis, portfolio, tank", "diagnosis, wrong parameter"),
-    *("diagnosis, channels", "diagnosis, column, gain, seed 0"),
+    "first order, extrapolation, seed 0",
+    *[name for name in CASES if name.startswith("several outputs")][::10],
+    *("diagnosis, portfolio, first order", "diagnosis, column, gain, seed 0"),
 )
 
 
 #: Further cases, each with some seconds of search.
 SLOW = (
     *(name for name in PORTFOLIO if name not in SAMPLE),
-    *(f"first order, {fault}, seed 0" for fault in ("spikes", "short", "integrator")),
+    *(f"first order, {fault}, seed 0" for fault in ("spikes", "short", "integrator", "sentinels")),
+    *("diagnosis, portfolio, tank", "diagnosis, wrong parameter", "diagnosis, channels"),
     "diagnosis, stopped before free forms",
 )
 

@@ -9,17 +9,16 @@ from hypothesis import strategies as st
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import phi
 from islands.evolution.generation import first_generation, step
-from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.evolution.variation import repair_genes, with_required_genes
+from islands.evolution.variation import repair_genes
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.printing import plain
 from islands.expressions.tree import Apply, Lagged, Shift, children, walk
 from support.searches import SMALL, record
-from support.variation import breed_compiled, outer_mutation, random_gene, random_genes
+from support.variation import breed_compiled
 
 # Independent definition of valid genes.
 
@@ -180,15 +179,6 @@ def test_children_of_an_outer_mutation_are_valid(drawn, seed):
             assert faults(child, setting, inputs) == []
 
 
-@given(parents(1), seeds)
-def test_repair_does_not_change_valid_genes(drawn, seed):
-    """A step therefore needs to repair only new genes."""
-    setting, inputs, (genes,) = drawn
-    assert repair_genes(genes, setting) == with_required_genes(genes, setting) == genes
-    child = with_required_genes(outer_mutation(genes, setting, inputs, stream(seed), ()), setting)
-    assert repair_genes(child, setting) == child
-
-
 @given(parents(2), seeds)
 def test_repair_makes_genes_of_other_settings_valid(drawn, seed):
     """The genes come from unconstrained settings."""
@@ -197,17 +187,6 @@ def test_repair_makes_genes_of_other_settings_valid(drawn, seed):
         for genes in individuals:
             constrained = replace(setting, structure=structure, constraints="hysteresis")
             assert faults(repair_genes(genes, constrained), constrained, inputs) == []
-
-
-@given(setting_values(), st.integers(1, 2), seeds)
-def test_random_individuals_are_valid_up_to_the_initial_height(setting, inputs, seed):
-    genes = random_genes(setting, inputs, stream(seed, Purpose.INITIAL))
-    assert faults(genes, setting, inputs) == []
-    gene = random_gene(setting, inputs, stream(seed))
-    assert edges(gene) <= setting.initial_height
-    used = {node.primitive.name for node in walk(gene) if isinstance(node, Apply)}
-    assert used <= set(setting.primitives)
-    assert {node.samples for node in walk(gene) if isinstance(node, Shift)} <= set(setting.shifts)
 
 
 @pytest.mark.parametrize("library", ["phi-polynomial", "polynomial"])
@@ -240,15 +219,6 @@ def test_offspring_of_library_genes_are_valid(library, structure, max_height):
             assert faults((Lagged(0), *each.genes)[: setting.max_terms], setting, 1) == []
 
 
-def test_maximum_lag_includes_library_leaves_under_back_shifts():
-    setting = replace(SMALL, library="phi-polynomial", library_lags=3, library_degree=1)
-    assert setting.maximum_lag == 3 + 4 * 5
-    deep = parse("q5(q5(q5(q5(u(k-3)))))")
-    (evaluated,), _ = Evaluator(record(), setting).evaluate([(Individual((Lagged(0), deep)), False)])
-    assert evaluated.outcome
-    assert Evaluator(record(), SMALL).warm_up == 1 + 4 * 5
-
-
 # The constraint of phi functions, Figure 3.
 
 
@@ -274,9 +244,3 @@ def test_maximum_lag_includes_library_leaves_under_back_shifts():
 def test_phi_functions_are_repaired_as_in_figure_3(broken, repaired):
     assert phi(parse(broken)) == parse(repaired)
     assert phi(parse(repaired)) == parse(repaired)
-
-
-def test_repaired_term_of_figure_3_is_that_of_the_paper():
-    """Figure 3: "to form the model term phi(u(k-2), u(k-5))"."""
-    repaired = phi(parse("phi1(q1(u(k-1)*y(k-1)), q4(y(k-1)))"))
-    assert make_regressor(repaired).text == "u1(k-2) - u1(k-5)"

@@ -4,7 +4,6 @@ from functools import partial
 
 import numpy as np
 
-from islands.evolution.engine import SerialEngine
 from islands.facade.identify import identify as identify_with_default
 from islands.records.dataset import Dataset
 
@@ -64,21 +63,6 @@ def record_states(states):
 
 def parameters(result):
     return [(fitted.model.regressors, fitted.model.parameters) for fitted in result.models]
-
-
-class RecordingEngine(SerialEngine):
-    """Engine that records its epochs and whether its generator was closed."""
-
-    def __init__(self):
-        self.epochs, self.closed = [], False
-
-    def run(self, problem, start, stop):
-        try:
-            for epoch in super().run(problem, start, stop):
-                self.epochs.append(epoch)
-                yield epoch
-        finally:
-            self.closed = True
 
 
 def two_inputs(seed):

@@ -1,11 +1,9 @@
 """Monitoring jobs in this process: records are submitted over REST, and analysed without Ray."""
 
 from pathlib import Path
-from typing import Any
 
 from islands.records.dataset import Dataset
 from islands.records.writer import write_record
-from islands_api.client import Client
 from islands_service.coordinator.monitoring_job import run_monitoring_job
 from islands_service.domain.job import JobOutcome
 from islands_service.store.blobs import Blobs
@@ -39,8 +37,3 @@ def analyse_next(service: Service) -> JobOutcome:
     outcome = run_monitoring_job(make_run(lease, service.store, blobs))
     service.store.leases.finish(lease, outcome)
     return outcome
-
-
-def add_file(client: Client, monitor: Any, path: Path, **changes: Any) -> str:
-    """Upload a record and add it to a monitor; return the id of its job."""
-    return client.add_record(monitor, client.upload(path), **changes).id

@@ -2,15 +2,10 @@
 
 from typing import Any
 
-import pytest
-
 from support.markup_rules import find_markup_defects
 
-#: Colour schemes and widths of a page. Other tests of the level ci see the pages in light colours and wide.
-APPEARANCES = [
-    pytest.param("light", 1280, marks=pytest.mark.nightly),
-    pytest.param("dark", 360, marks=pytest.mark.ci),
-]
+#: Colour schemes and widths of a page.
+APPEARANCES = [("light", 1280), ("dark", 360)]
 
 #: Minimum contrast of a text (WCAG 2.2, 1.4.3).
 _CONTRAST = 4.5

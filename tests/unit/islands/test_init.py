@@ -31,11 +31,6 @@ def test_stub_file_lists_the_public_names():
     assert stub == islands._make_stub()
 
 
-def test_package_docstring_shows_an_example():
-    assert "islands.read_record(" in islands.__doc__
-    assert "islands.fit(" in islands.__doc__
-
-
 def test_facade_functions_are_public():
     assert islands.identify is identify
     assert islands.fit is fit

@@ -98,12 +98,6 @@ def test_pool_evaluates_local_functions_in_other_processes_in_order() -> None:
     assert len(set(processes)) <= 2
 
 
-def test_one_process_and_the_first_seconds_need_no_pool() -> None:
-    for workers in (1, 2):
-        with process_pool(workers, start_after=60.0) as parallel_map:
-            assert set(parallel_map(lambda _: os.getpid(), range(3))) == {os.getpid()}
-
-
 def test_quota_of_a_container_bounds_the_number_of_processes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

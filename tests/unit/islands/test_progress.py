@@ -1,7 +1,5 @@
 """Steps of a computation: a stop request ends it before a needed step and leaves out the optional ones."""
 
-from itertools import pairwise
-
 import pytest
 
 from islands.errors import IslandsError
@@ -43,12 +41,6 @@ def test_optional_steps_are_left_out_in_their_order_and_named_once() -> None:
     assert steps.left_out == ("refinement", "figures")
 
 
-def test_without_a_stop_function_no_step_is_left_out() -> None:
-    steps = Steps()
-    steps("search")
-    assert not steps.skip("figures")
-
-
 PHASES = (Phase("read", 1.0), Phase("trial of", 2.0, 4), Phase("search", 4.0), Phase("assess", 1.0))
 
 
@@ -64,16 +56,6 @@ def test_fractions_are_those_of_the_whole_by_the_shares_of_the_phases() -> None:
     for message, fraction in (("reading", None), ("trial of a", None), ("search", 0.5), ("assess", None)):
         progress(message, fraction)
     assert [fraction for _, fraction in reported] == pytest.approx([0.0, 1 / 8, 5 / 8, 7 / 8])
-
-
-def test_the_share_of_a_skipped_phase_is_no_part_of_the_whole() -> None:
-    progress, reported = phased()
-    progress("reading")
-    progress("search")
-    assert reported[-1] == ("search", pytest.approx(1 / 6))
-    first, seen = phased()
-    first("search", 0.0)
-    assert seen[-1] == ("search", 0.0)
 
 
 def test_a_phase_that_an_earlier_one_replaces_is_no_part_of_the_whole() -> None:
@@ -92,16 +74,6 @@ def test_a_phase_that_an_earlier_one_replaces_is_no_part_of_the_whole() -> None:
     for message in ("read", "search"):
         without(message)
     assert seen[-1][1] == pytest.approx(1 / 6)
-
-
-def test_a_phase_with_more_steps_than_usual_still_advances() -> None:
-    progress, reported = phased()
-    progress("trial of a")
-    for _ in range(7):  # of four
-        list(progress.count(map)(abs, [1]))
-    fractions = [fraction for _, fraction in reported]
-    assert all(one < other for one, other in pairwise(fractions))
-    assert fractions[-1] < 2 / 7
 
 
 def test_messages_and_calls_of_a_phase_increase_the_fraction() -> None:

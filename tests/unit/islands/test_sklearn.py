@@ -66,19 +66,6 @@ def test_a_prediction_continues_the_training_data(data, regressor):
     assert {item.text for item in regressor.model_.regressors} == {"y(k-1)", "u1(k-1)", "u1(k-1)^2"}
 
 
-def test_the_defaults_choose_the_library_of_friction():
-    from islands.sklearn import IslandsRegressor
-
-    u = np.repeat(np.random.default_rng(1).uniform(-4.0, 4.0, 80), 8)
-    y = np.zeros(len(u))
-    for k in range(1, len(u)):
-        y[k] = 0.9 * y[k - 1] + 0.6 * u[k - 1] - 0.5 * np.sign(y[k - 1])
-    regressor = IslandsRegressor(DT, settings={"certificate": 0}).fit(u[:, None], y)
-    assert regressor.get_params()["library"] == regressor.get_params()["preset"] == "auto"
-    assert regressor.result_.settings["library"] == "friction"
-    assert "sign(y(k-1))" in regressor.equation_
-
-
 def test_a_prediction_starts_from_the_begin_or_from_given_outputs(data, regressor):
     u, y = data
     regressor.set_params(start="begin").fit(u, y)
@@ -90,6 +77,7 @@ def test_a_prediction_starts_from_the_begin_or_from_given_outputs(data, regresso
         regressor.predict(u, initial=np.zeros(601))
 
 
+@pytest.mark.nightly
 def test_a_pipeline_and_a_grid_search_take_the_regressor(data, regressor):
     from sklearn.model_selection import GridSearchCV, TimeSeriesSplit
     from sklearn.pipeline import make_pipeline
@@ -111,15 +99,6 @@ def test_columns_of_a_frame_name_the_inputs(data, regressor):
     assert regressor.feature_names_in_.tolist() == ["pump_V"]
     copy = pickle.loads(pickle.dumps(regressor))
     assert np.array_equal(copy.predict(frame), regressor.predict(frame))
-
-
-def test_identify_takes_its_settings_and_seed(data, regressor):
-    u, y = data
-    settings = {"population": 20, "generations": 2, "shooting": 50}
-    regressor.set_params(method="identify", settings=settings, random_state=3)
-    one, other = (regressor.fit(u[:300], y[:300]).model_ for _ in range(2))
-    assert one == other
-    assert regressor.result_.search_result.settings["method"] == "identify"
 
 
 @pytest.mark.parametrize(

@@ -88,17 +88,6 @@ def test_a_new_key_of_the_issuer_is_found_at_once_and_an_old_one_no_more():
     follow(scenario)
 
 
-def test_unknown_ids_do_not_make_requests_at_any_rate():
-    async def scenario(keys, client, now):
-        await keys.find("first")
-        for number in range(100):
-            assert await keys.find(f"unknown-{number}") is None
-            now.time += 0.1
-        assert len(client.requests) <= 2 * 3
-
-    follow(scenario)
-
-
 def test_old_keys_are_read_again_without_a_wait():
     async def scenario(keys, client, now):
         await keys.find("first")
@@ -215,15 +204,6 @@ def test_a_short_rsa_key_is_not_used():
     follow(scenario)
 
 
-def test_a_damaged_key_does_not_hide_the_others():
-    async def scenario(keys, client, now):
-        damaged = {"kty": "EC", "kid": "damaged", "crv": "P-256", "x": "AA", "y": "AA"}
-        client.changed[f"{URL}/keys"] = {"keys": [damaged, make_key().as_dict(private=False)]}
-        assert (await keys.find("first")).kid == "first"
-
-    follow(scenario)
-
-
 class _Keys:
     """Keys of an issuer that always answers."""
 
@@ -271,16 +251,6 @@ def test_a_valid_token_gives_owner_scopes_and_expiry():
 def test_a_token_of_every_default_algorithm_is_accepted(algorithm, kind, size):
     key = make_key("made", kind, size)
     assert verify(sign(make_claims(ISSUER), key, algorithm), key).scopes
-
-
-@pytest.mark.parametrize("header", [{"typ": None}, {"typ": "at+jwt"}, {"typ": "JWT"}, {"x5t": "abc"}])
-def test_a_token_with_another_usual_header_is_accepted(header):
-    assert verify(sign(make_claims(ISSUER), make_key(), **header)).scopes
-
-
-@pytest.mark.parametrize("audience", [AUDIENCE, [AUDIENCE], ["account", AUDIENCE]])
-def test_the_audience_may_be_one_of_several(audience):
-    assert verify(token(aud=audience)).scopes
 
 
 def test_a_token_without_a_signature_is_refused():
@@ -335,12 +305,6 @@ def test_a_token_with_a_wrong_header_is_refused(header, message):
     assert message in refused(sign(make_claims(ISSUER), make_key(), **header))
 
 
-@pytest.mark.parametrize("kid", [7, ["first"], {"a": 1}])
-def test_a_token_whose_key_has_no_textual_id_is_refused(kid):
-    parts = f"{encode_part({'alg': 'ES256', 'kid': kid})}.{encode_part(make_claims(ISSUER))}.AAAA"
-    assert "needs a kid" in refused(parts)
-
-
 def test_a_token_of_another_key_with_the_same_id_is_refused():
     text = sign(make_claims(ISSUER), make_key("second"), kid="first")
     assert "signature of the token is not valid" in refused(text)
@@ -357,12 +321,6 @@ def test_a_changed_claim_breaks_the_signature():
     header, _, signature = token().split(".")
     changed = encode_part(make_claims(ISSUER, sub="mallory"))
     assert "signature of the token is not valid" in refused(f"{header}.{changed}.{signature}")
-
-
-@pytest.mark.parametrize("algorithm", ["RS256", "Ed25519"])
-def test_the_type_of_the_key_must_fit_the_algorithm(algorithm):
-    header = encode_part({"alg": algorithm, "kid": "first"})
-    assert "signature" in refused(f"{header}.{token().partition('.')[2]}")
 
 
 def test_a_key_for_another_algorithm_is_not_used():
@@ -387,20 +345,6 @@ def test_a_key_is_no_token(text):
     assert not is_token(text)
 
 
-@pytest.mark.parametrize("text", ["e30.", "e30.e30", "e30.e30.e30.e30.e30"])
-def test_a_malformed_token_is_refused(text):
-    assert is_token(text)
-    assert refused(text)
-
-
-@pytest.mark.parametrize("payload", [b"[]", b"null", b"{", b"[" * 5000])
-def test_a_signed_payload_that_is_no_object_is_refused(payload):
-    from joserfc import jws
-
-    text = jws.serialize_compact({"alg": "ES256", "kid": "first"}, payload, make_key())
-    assert "not valid" in refused(text)
-
-
 def test_the_leeway_tolerates_the_clock_of_the_issuer():
     late = make_claims(ISSUER)["iat"] - 20.0
     assert verify(token(exp=late)).scopes
@@ -423,15 +367,6 @@ def test_roles_give_scopes_and_other_values_give_none(roles, scopes):
     assert verify(token(roles=roles)).scopes == scopes
 
 
-def test_roles_can_be_in_a_nested_claim_with_other_values():
-    nested = token(roles=None, realm_access={"roles": ["lab/members"]})
-    settings = {"oidc_role_claim": "realm_access.roles", "oidc_roles": "lab/members=submitter, a=b=reader"}
-    assert verify(nested, **settings).scopes == {"read", "write"}
-    assert verify(token(roles="a=b"), oidc_roles=settings["oidc_roles"]).scopes == {"read"}
-    dotted = token(roles=None, **{"https://example.org/roles": ["islands-reader"]})
-    assert verify(dotted, oidc_role_claim="https://example.org/roles").scopes == {"read"}
-
-
 def test_owners_of_two_issuers_and_of_keys_are_never_the_same():
     values = [
         "alice",
@@ -449,12 +384,6 @@ def test_owners_of_two_issuers_and_of_keys_are_never_the_same():
     }
     assert len(owners) == 2 * len(values)
     assert all(owner.startswith("oidc-") and len(owner) <= 64 and "/" not in owner for owner in owners)
-
-
-def test_the_owner_can_be_another_claim():
-    identity = verify(token(group="lab-3"), oidc_owner_claim="group")
-    assert identity.owner.endswith(":lab-3")
-    assert identity.subject == verify(token()).subject
 
 
 @pytest.mark.parametrize(

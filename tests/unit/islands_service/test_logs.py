@@ -54,19 +54,6 @@ def test_a_store_that_fails_again_and_again_is_logged_once_a_minute(outage: Outa
     assert [entry["event"] for entry in logs] == ["store away", "store back"]
 
 
-def test_a_later_outage_is_logged_at_once(outage: OutageLog, clock: Clock) -> None:
-    retry(outage, clock, 5.0)
-    outage.succeed()
-    clock.now += 60.0
-    with structlog.testing.capture_logs() as logs:
-        retry(outage, clock, 5.0)
-        outage.succeed()
-    assert [(entry["event"], entry.get("failures")) for entry in logs] == [
-        ("store away", None),
-        ("store back", 10),
-    ]
-
-
 def test_a_failure_long_after_the_last_one_begins_another_outage(outage: OutageLog, clock: Clock) -> None:
     """A request that fails and is not repeated is no outage that lasts until the next failure."""
     retry(outage, clock, 5.0)
@@ -75,9 +62,3 @@ def test_a_failure_long_after_the_last_one_begins_another_outage(outage: OutageL
         retry(outage, clock, 5.0)
         outage.succeed()
     assert [(entry.get("failures"), entry.get("seconds")) for entry in logs] == [(None, None), (10, 5.0)]
-
-
-def test_success_without_an_outage_is_not_logged(outage: OutageLog) -> None:
-    with structlog.testing.capture_logs() as logs:
-        outage.succeed()
-    assert logs == []

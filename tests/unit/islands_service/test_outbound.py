@@ -58,11 +58,6 @@ LOCAL = CheckedClient(("127.0.0.1", "localhost"), ("127.0.0.1", "localhost"))
 OK = b"HTTP/1.1 200 OK\r\nContent-Length: 4\r\n\r\nfine"
 
 
-@pytest.mark.parametrize("address", PUBLIC)
-def test_an_address_of_the_internet_is_public(address):
-    assert is_public(address)
-
-
 @pytest.mark.parametrize("address", OTHERS)
 def test_a_special_address_is_not_public(address):
     assert not is_public(address)
@@ -176,12 +171,6 @@ def test_a_listed_host_may_have_a_private_address(names, listed):
     assert b"Host: hooks.lan:" in sent
 
 
-def test_a_host_that_is_listed_with_another_port_is_refused(names):
-    names[0]["hooks.lan"] = ("127.0.0.1",)
-    with pytest.raises(OutboundRefusedError, match="ISLANDS_PRIVATE_HOSTS"):
-        exchange(CheckedClient(("hooks.lan:9",), ("hooks.lan",)), OK, "http://hooks.lan:{port}/")
-
-
 def test_the_name_is_resolved_once_and_the_next_address_is_tried(names):
     """The second answer of a name server of an attacker could be a private address."""
     known, asked = names
@@ -212,12 +201,6 @@ def test_names_that_are_not_resolved_delay_no_other_request(monkeypatch):
         await asyncio.gather(*slow, return_exceptions=True)
 
     asyncio.run(run())
-
-
-def test_a_redirect_is_not_followed():
-    answer = b"HTTP/1.1 302 Found\r\nLocation: http://10.0.0.1/\r\nContent-Length: 0\r\n\r\n"
-    response, *_ = exchange(LOCAL, answer)
-    assert response.status_code == 302
 
 
 def test_a_proxy_of_the_environment_is_not_used(monkeypatch):

@@ -2,7 +2,6 @@
 
 import importlib
 import os
-from pathlib import Path
 
 import pytest
 
@@ -105,11 +104,6 @@ def test_database_and_its_file_are_not_both_given(monkeypatch, tmp_path):
         service_settings()
 
 
-def test_child_process_inherits_the_rest_of_the_environment(monkeypatch, tmp_path):
-    monkeypatch.setenv("SOMETHING_ELSE", "kept")
-    assert ServiceSettings(data_dir=tmp_path).environment()["SOMETHING_ELSE"] == "kept"
-
-
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])
 def test_loopback_address_needs_no_key_unless_keys_are_required(host):
     assert not ServiceSettings(host=host).keys_needed
@@ -122,9 +116,3 @@ def test_loopback_address_needs_no_key_unless_keys_are_required(host):
 def test_other_addresses_need_keys(host):
     assert ServiceSettings(host=host).keys_needed
     assert not ServiceSettings(host=host).allow_fmus
-
-
-def test_database_is_in_the_data_folder_unless_another_is_given(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert ServiceSettings(data_dir=Path("data")).url == f"sqlite:///{tmp_path}/data/islands.db"
-    assert ServiceSettings(database="postgresql://x").url == "postgresql://x"

@@ -170,11 +170,6 @@ def test_other_roles_wait_for_the_first_heartbeat_of_the_api(supervised: Start) 
     assert running.order("start", "ready")[:2] == ["api start", "api ready"]
 
 
-def test_other_roles_start_after_a_limit_without_the_api(supervised: Start) -> None:
-    running = supervised(role("api", "note('start'); time.sleep(60)"), role("work"), _API_HEAD_START=0.3)
-    running.started(1, "work")
-
-
 #: Needs another role while the journal has an odd number of demands.
 NEEDY = """
 def live():
@@ -242,17 +237,6 @@ def test_role_that_always_fails_at_its_start_ends_the_supervisor(supervised: Sta
     assert running.order("signalled", "end") == ["api signalled", "api end"]
 
 
-def test_role_that_has_run_for_a_while_is_always_restarted(supervised: Start) -> None:
-    script = (
-        "count = open(os.environ['JOURNAL']).read().count('start')\n"
-        "note('start'); heartbeat(); time.sleep(0.0 if count else 0.3); sys.exit(7)"
-    )
-    running = supervised(role("api", script), _STABLE_AFTER=0.2, _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
-    running.started(8)
-    running.end()
-    assert running.process.returncode == 0
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signal_ends_the_roles_one_after_the_other_in_order(
     supervised: Start, number: signal.Signals
@@ -273,14 +257,6 @@ def test_role_that_does_not_end_is_killed(supervised: Start) -> None:
     assert "api does not end: it is killed" in running.end()
     assert running.process.returncode == 0
     assert running.order("signalled", "end") == ["api signalled", "work signalled", "work end"]
-
-
-def test_ctrl_c_in_the_terminal_does_not_reach_the_children(supervised: Start) -> None:
-    running = supervised(role("api", "signal.signal(signal.SIGINT, lambda *_: note('interrupted'))\nstay()"))
-    running.started()
-    os.killpg(running.process.pid, signal.SIGINT)
-    running.said()
-    assert running.order("signalled", "interrupted", "end") == ["api signalled", "api end"]
 
 
 def test_killed_supervisor_sends_each_role_its_parent_death_signal(supervised: Start) -> None:
@@ -327,24 +303,6 @@ def test_roles_share_one_ray_token_that_differs_between_services(
     assert len(tokens[0].pop()) == len("token-") + 32
 
 
-def test_full_heartbeat_pipe_does_not_block_a_role(supervised: Start) -> None:
-    flood = (
-        "note('start'); time.sleep(0.3)\n"
-        "for _ in range(20_000):\n"
-        "    try: os.write(int(os.environ['ISLANDS_LIFELINE']), b'.' * 64)\n"
-        "    except BlockingIOError: pass\n"
-        "note('done'); stay()"
-    )
-    running = supervised(role("api", flood), role("work"))
-    running.started()
-    os.kill(running.process.pid, signal.SIGSTOP)
-    try:
-        eventually(lambda: running.entries("done"))
-    finally:
-        os.kill(running.process.pid, signal.SIGCONT)
-    running.started(1, "work")
-
-
 def test_folder_that_other_users_may_enter_is_made_private(tmp_path):
     """The database in it has the mode of an ordinary file."""
     folder = tmp_path / "data"
@@ -373,20 +331,3 @@ def test_data_folder_is_locked_by_one_service(tmp_path: Path) -> None:
             pass
     with folder_lock(folder):
         pass
-
-
-def test_lock_of_a_killed_service_is_released(tmp_path: Path) -> None:
-    script = (
-        "import sys, time; from pathlib import Path; from islands_service.supervisor import folder_lock\n"
-        "with folder_lock(Path(sys.argv[1])): print('mine', flush=True); time.sleep(60)"
-    )
-    command = [sys.executable, "-c", script, str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as owner:
-        assert owner.stdout is not None
-        assert owner.stdout.readline() == "mine\n"
-        with pytest.raises(DataDirLockedError, match=f"process {owner.pid}"), folder_lock(tmp_path):
-            pass
-        owner.kill()
-        owner.wait()
-        with folder_lock(tmp_path):
-            assert (tmp_path / "lock").read_text() == f"{os.getpid()}\n"

@@ -195,28 +195,3 @@ def test_silence_is_reported_once_until_the_process_is_gone(
         role.check()
         assert role.log.getvalue().count("has sent no heartbeat") == silences
         assert role.log.getvalue().count("ended (-9): it is started again") == silences
-
-
-def test_role_with_heartbeats_keeps_running(start_role: StartRole) -> None:
-    role = start_role(LIVE, patience=5.0)
-    process = role.role.process
-    for _ in range(5):
-        role.wait_for_heartbeat()
-        role.check(4.9)
-    assert process is not None
-    assert alive([process.pid])
-    assert role.log.getvalue() == ""
-
-
-@pytest.mark.ci
-def test_starting_role_may_take_longer_until_its_first_heartbeat(start_role: StartRole) -> None:
-    """Ray takes seconds to start, and the compilation of kernels a minute."""
-    role = start_role(SILENT, patience=5.0)
-    process = role.role.process
-    assert process is not None
-    role.check(supervisor._STARTUP_TIMEOUT - 0.1)
-    assert alive([process.pid])
-    role.check(0.2)
-    role.ended(0.1)
-    assert process.returncode == -signal.SIGKILL
-    assert "api has sent no heartbeat for 120.1 s" in role.log.getvalue()

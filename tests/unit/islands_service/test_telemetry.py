@@ -2,7 +2,6 @@
 
 import socket
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
 from threading import Thread
 
 import httpx
@@ -10,8 +9,6 @@ import pytest
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 
 from islands.errors import SettingsError
-from islands_api.cli.commands.serve import roles
-from islands_service.settings import ServiceSettings
 from islands_service.telemetry import Traces, make_registry, serve_metrics
 from support.service import served
 from support.service_processes import free_port
@@ -30,16 +27,6 @@ def test_a_port_in_use_is_refused() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(SettingsError, match=rf"port {port} .*set ISLANDS_METRICS_HOST"):
             serve_metrics(make_registry("coordinator"), "127.0.0.1", port)
-
-
-def test_coordinators_of_one_service_have_different_ports(tmp_path: Path) -> None:
-    def ports(**changes: int) -> list[str]:
-        settings = ServiceSettings(data_dir=tmp_path, coordinators=2, **changes)
-        commands = [role.command for role in roles(settings, 3, 4) if role.name.startswith("coordinator")]
-        return [command[-1] for command in commands if "--metrics-port" in command]
-
-    assert ports(metrics_port=9100) == ["9100", "9101"]
-    assert ports() == []
 
 
 @pytest.fixture

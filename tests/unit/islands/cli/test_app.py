@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.cli import options
 from islands.cli.output_folder import check_folder
 from islands.errors import IslandsError, SettingsError
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
-from islands.persistence.models import read_model, write_model
+from islands.persistence.models import write_model
 from islands.records.dataset import Dataset
 from islands.records.reading.row_range import parse_rows
 from islands.records.writer import write_record
@@ -65,14 +64,6 @@ def fitted(fit, run):
 
 
 # Options.
-
-
-@pytest.mark.parametrize(
-    ("texts", "names"),
-    [(["u_V"], ["u_V"]), (["a,b", "c"], ["a", "b", "c"]), (["a,,b,"], ["a", "b"]), ([""], [])],
-)
-def test_inputs_are_repeated_or_separated_by_commas(texts, names):
-    assert options.columns(texts) == names
 
 
 @pytest.mark.parametrize(
@@ -136,19 +127,6 @@ def test_fit_prints_the_models_and_the_output_folder(fitted):
     assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
 
 
-def test_simulate_reads_the_columns_of_the_model(run, fitted):
-    code, out, _ = run("simulate", "out/models/01.json", "r.csv", "--mode", "one-step", "--out", "s.csv")
-    assert code == 0
-    assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step after a warm-up of 3 samples: ok"]
-    assert "um  fit" in out
-    assert Path("s.csv").read_text().startswith("time,y_sim\n")
-    renamed = Dataset(record().u, record().y, 0.01, ("volt_V",), "way_um")
-    write_record(renamed, "other.csv")
-    assert run("simulate", "out/models/01.json", "other.csv")[0] == 2
-    columns = ("--input", "volt_V", "--output", "way_um")
-    assert run("simulate", "out/models/01.json", "other.csv", *columns)[0] == 0
-
-
 def test_simulate_writes_prediction_bands(run, fitted):
     arguments = ("simulate", "out", "r.csv", "--out", "s.csv", "--bands")
     code, out, _ = run(*arguments, "0.9")
@@ -167,17 +145,6 @@ def test_simulate_writes_prediction_bands(run, fitted):
     shutil.copyfile("out/models/01.json", "model.json")
     code, _, error = run("simulate", "model.json", "r.csv", "--bands", "0.9")
     assert (code, "need a model of a result folder" in error) == (2, True)
-
-
-def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(run, fitted):
-    shutil.copyfile("out/models/01.json", "model.json")
-    lag = read_model("model.json").maximum_lag
-    assert f"after a warm-up of {lag} samples" in run("simulate", "model.json", "r.csv")[1]
-    assert "after a warm-up of 9 samples" in run("simulate", "out", "r.csv", "--set", "warm_up=9")[1]
-    assert "the warm-up has 0" in run("simulate", "out", "r.csv", "--set", "warm_up=0")[2]
-    Path("out/result.json").write_text("{}")
-    code, _, error = run("simulate", "out", "r.csv")
-    assert (code, "result.json holds no model" in error) == (2, True)
 
 
 @pytest.mark.parametrize("name", ["u_V", "u_V+1"])
@@ -207,14 +174,6 @@ def test_simulate_takes_a_record_whose_output_has_its_first_values_only(run, fit
     assert (code, "nan" in out) == (0, False)
     assert "y_um is measured in 4 of the simulated samples: too few for an error" in out
     assert np.isfinite(np.loadtxt("s.csv", delimiter=",", skiprows=4)).all()
-
-
-def test_simulate_rejects_another_sampling_time(run):
-    write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
-    code, _, err = run("simulate", "published:12", "slow.csv")
-    assert code == 2
-    assert "the model has a sampling time of 0.001 s, the record of 0.0011 s: resample the record" in err
-    assert "--set resample=0.001" in err
 
 
 def test_systems_make_writes_into_a_folder_with_brackets(run):

@@ -35,15 +35,6 @@ def test_command_with_a_closed_output_exits_quietly(arguments: str, is_joined: b
     assert (found.stderr or b"", found.returncode) == (b"", CLOSED_OUTPUT)
 
 
-@pytest.mark.ci
-def test_head_receives_its_lines_from_a_shell() -> None:
-    shell = f"set -o pipefail; {ISLANDS} --help | head -n 2"
-    found = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, check=False)
-    assert (found.stderr, "Usage: islands" in found.stdout) == ("", True)
-    # All of the help may be in the pipe before its reader ends.
-    assert found.returncode in (0, CLOSED_OUTPUT)
-
-
 def test_a_signal_after_the_end_of_a_command_does_not_change_its_exit_code() -> None:
     """Ctrl-C killed a command whose result was complete while Python ended."""
     code = (

@@ -49,22 +49,6 @@ def at(generation, evaluations, *history):
     return SearchState(Archipelago(tuple(islands)), evaluations, history=points)
 
 
-def test_display_has_generation_speed_time_left_and_best_by_size(displayed):
-    found = displayed(
-        Settings(population=50, generations=20),
-        *(at(0, 50, [0.25]), at(2, 150, [0.25], [0.25], [0.0625])),
-    )
-    assert [(text, lines) for text, _, lines, _ in found] == [
-        ("generation 0/20, 0/s", ["  RMSE by terms  1:2 3:0.5"]),
-        ("generation 2/20, 25/s", ["  RMSE by terms  1:2 3:0.25"]),
-    ]
-    # The first generation includes compilation and is not counted: 100 in 4 s, 18 generations of 50 left. The
-    # final models follow.
-    assert found[0][3] is None
-    assert found[1][3] > 36.0
-    assert 0.0 < found[0][1] < found[1][1] < 1.0
-
-
 def test_each_island_has_its_best_error_and_its_age(displayed):
     state = at(3, 50, [4.0, 1.0, inf], [1.0, 1.0, inf], [1.0, 1.0, inf], [0.25, 1.0, inf])
     assert displayed(Settings(islands=3), state)[0][2][1:] == [

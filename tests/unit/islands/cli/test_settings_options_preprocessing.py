@@ -2,12 +2,10 @@ import numpy as np
 import pytest
 
 import islands
-from islands.expressions.parsing import parse
-from islands.models.narx import make_model
 from islands.records.signal_map import match_rate
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
-from support.command_line import fail, succeed
+from support.command_line import succeed
 from support.exported_programs import run_c
 from support.undrawn import undrawn_figures
 
@@ -107,36 +105,3 @@ def test_every_path_from_a_folder_gives_the_output_of_the_command(folder, tmp_pa
     # Programs start from the largest lag; the file leaves out the samples before the first prediction.
     assert best.warm_up == best.model.maximum_lag
     np.testing.assert_allclose(found[first:], expected[np.isfinite(expected)], rtol=1e-9)
-
-
-def test_a_model_without_steps_may_read_a_record_less_its_means(folder, tmp_path):
-    """The records of case 2 of the paper are used without drift and means."""
-    record = write(tmp_path / "r.csv", 3)
-    wide = np.genfromtxt(record, delimiter=",", names=True)
-    deviations = tmp_path / "deviations.csv"
-    table = np.column_stack(
-        [wide["t_s"], wide["u_V"] - wide["u_V"].mean(), wide["y_um"] - wide["y_um"].mean()]
-    )
-    np.savetxt(deviations, table, delimiter=",", header="t_s,u_V,y_um", comments="", fmt="%.12g")
-    free = tmp_path / "free.json"
-    terms = ((parse("y(k-1)"), 0.98), (parse("u(k-1)"), 0.04))
-    islands.write_model(make_model(terms, ("u_V",), "y_um", 0.01), free)
-    simulated = []
-    for name, path, options in (("a", record, ("--set", "detrend=constant")), ("b", deviations, ())):
-        succeed("simulate", free, path, *options, "--out", tmp_path / f"{name}.csv")
-        simulated.append(np.genfromtxt(tmp_path / f"{name}.csv", delimiter=",", skip_header=1)[:, 1])
-    np.testing.assert_allclose(*simulated, atol=1e-9)
-    message = fail("simulate", folder / "out", record, "--set", "detrend=constant")
-    assert "a model that states its preprocessing reads the record as measured" in message
-
-
-def test_wrong_values_are_errors_of_one_line(tmp_path):
-    record = write(tmp_path / "r.csv", 0)
-    for option, value, words in (
-        ("--set", "detrend=square", "detrend is"),
-        ("--set", "decimate=0", "decimate is"),
-    ):
-        message = fail(
-            "fit", record, "--input", "u_V", "--output", "y_um", option, value, "--out", tmp_path / "out"
-        )
-        assert words in message

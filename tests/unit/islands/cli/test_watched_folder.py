@@ -29,16 +29,6 @@ def test_files_come_in_the_order_of_recording_and_once(tmp_path):
     assert not watched.has_unfinished
 
 
-def test_times_in_names_precede_numbers(tmp_path):
-    for name in ("b_2026-11-02T01-00.csv", "c_20261101_2300.csv", "a_2026-11-03.csv"):
-        write(tmp_path / name)
-    assert names(WatchedFolder(tmp_path, 2.0)) == [
-        "c_20261101_2300.csv",
-        "b_2026-11-02T01-00.csv",
-        "a_2026-11-03.csv",
-    ]
-
-
 def test_a_file_that_grows_is_not_read(tmp_path):
     watched = WatchedFolder(tmp_path, 2.0)
     path = write(tmp_path / "a.csv", "1", age=0.5)
@@ -59,15 +49,6 @@ def test_a_file_with_an_old_time_that_still_grows_is_not_read(tmp_path):
     write(path, "12", age=100.0)
     assert names(watched, NOW + 1.0) == []
     assert names(watched, NOW + 3.0) == ["a.csv"]
-
-
-def test_a_file_that_is_written_again_is_a_new_one(tmp_path):
-    watched = WatchedFolder(tmp_path, 2.0)
-    path = write(tmp_path / "a.csv")
-    assert names(watched) == ["a.csv"]
-    write(path, "other", age=30.0)
-    assert names(watched, NOW + 1.0) == []
-    assert names(watched, NOW + 4.0) == ["a.csv"]
 
 
 def test_the_interval_is_that_of_the_names(tmp_path):

@@ -49,16 +49,7 @@ def test_a_name_that_leaves_a_coloured_error_is_no_more_than_probable():
     assert [each.confidence for each in limited.causes] == [MAX_CONFIDENCE_WITHOUT_GAIN]
 
 
-@pytest.mark.ci
-def test_an_extension_without_gain_and_with_coloured_rest_is_not_offered():
-    found = islands.diagnose(make_sensor_record(8.0), "linear:1", effects=LAG)
-    lost = replace(found, gain=replace(found.gain, ci95=(-5.0, 20.0)))
-    limited = limit_confidences(lost, make_target(lost.record, lost.estimation_samples, {}))
-    assert [each.confidence for each in limited.causes] == [MAX_CONFIDENCE_WITHOUT_GAIN]
-    assert "not reduce the error on the hold-out part" in limited.refusal
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_valve_that_sticks_behind_a_held_input_is_no_more_than_probable():
     rng = np.random.default_rng(4)
     held = np.repeat(rng.standard_normal(40), 25)

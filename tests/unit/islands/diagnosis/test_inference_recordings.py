@@ -11,18 +11,15 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import cross_validate_gain
 from islands.diagnosis.inference.noise_detectors import DETECTORS, NoiseFinding
-from islands.diagnosis.inference.noise_floor import explainable_variance, noise_variance_from_periods
+from islands.diagnosis.inference.noise_floor import explainable_variance
 from islands.diagnosis.inference.residual_structure import find_residual_structure
-from islands.diagnosis.inference.screening import bic_penalty
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import choose_reference_fit
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.records.dataset import join
-from islands.records.noise_model import fit_noise
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.extended import make_context as make_record_context
-from islands.simulators.interface import input_coordinate, output_coordinate
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.specification.factory import make_simulator
 from support.simulated_records import made
@@ -50,14 +47,6 @@ def detect(name: str, y: np.ndarray, residual: np.ndarray, lengths: tuple[int, .
     return found if found is not None and found.score_gain > MIN_GAIN else None
 
 
-@pytest.mark.parametrize("make", [input_coordinate, output_coordinate])
-def test_typical_rate_is_that_within_the_recordings(make: object) -> None:
-    parts = draw_inputs()
-    expected = np.std(np.concatenate([np.diff(part) for part in parts])) / 0.01
-    signal = np.concatenate(parts)
-    assert make(make_context(signal), signal).rate == pytest.approx(expected)
-
-
 def test_lost_samples_end_with_a_recording() -> None:
     rng = np.random.default_rng(2)
     parts = [rng.standard_normal(length) for length in LENGTHS]
@@ -76,20 +65,6 @@ def test_first_samples_of_recordings_are_no_outliers() -> None:
     assert detect("outliers", slow, slow, (1000,)) is not None
     assert detect("outliers", slow, slow, lengths) is None
     assert detect("heteroscedastic-noise", np.ones(1000), slow, lengths) is None
-
-
-def test_noise_of_periods_is_measured_within_recordings() -> None:
-    rng = np.random.default_rng(4)
-    u = np.concatenate([np.resize(rng.standard_normal(period), 300) for period in (50, 64, 140)])
-    noise = 0.1 * rng.standard_normal(u.size)
-    drift = np.repeat([0.0, 7.0, -3.0], 300)
-    assert noise_variance_from_periods(u, u + noise + drift) is None
-    found = noise_variance_from_periods(u, u + noise + drift, (300, 300, 300))
-    assert found == pytest.approx(0.01, rel=0.2)
-    # The last recording has two periods only.
-    y = u + noise
-    y[600:] += 5.0 * rng.standard_normal(300)
-    assert noise_variance_from_periods(u, y, (300, 300, 300)) == pytest.approx(found, rel=0.1)
 
 
 def test_past_of_another_recording_does_not_explain_a_residual() -> None:
@@ -131,22 +106,6 @@ def make_fit(segments: tuple[int, ...]) -> tuple[CalibrationResult, Target]:
     target = Target(np.roll(u, 3), np.arange(SAMPLES) < 750, None, {}, segments=segments, fitted=750)
     simulation = ExtendedSimulator(simulator, (), context)
     return evaluate_fit(simulation, target, simulation.nominal + 0.05), target
-
-
-def test_noise_of_a_fit_is_that_within_its_recordings() -> None:
-    fit, target = make_fit(LENGTHS)
-    residual = (target.y - fit.output)[:750]
-    expected = fit_noise(residual, segments=(400, 300, 50))
-    assert fit.noise.coefficients.tolist() == expected.coefficients.tolist()
-    assert fit.noise.variance != fit_noise(residual).variance
-
-
-def test_penalty_counts_the_initial_states_of_every_recording() -> None:
-    (several, _), (single, _) = make_fit(LENGTHS), make_fit(())
-    log = np.log(750.0)
-    assert bic_penalty(CATALOGUE["second-hysteresis"], single) == pytest.approx(4 * log)
-    assert bic_penalty(CATALOGUE["second-hysteresis"], several) == pytest.approx(6 * log)
-    assert bic_penalty(CATALOGUE["coulomb-friction"], several) == pytest.approx(log)
 
 
 def test_reference_at_nominal_values_keeps_the_initial_states_of_recordings() -> None:

@@ -8,9 +8,7 @@ import pytest
 
 from islands.diagnosis import procedure
 from islands.diagnosis.inference import noise_floor
-from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import (
-    ALTERNATIVES,
     COMBINATIONS,
     EVIDENCE,
     EXTENSION,
@@ -24,7 +22,6 @@ from islands.diagnosis.interim_findings import (
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
-from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document
 from islands.simulators.recorded_output import RecordedOutput
@@ -78,27 +75,6 @@ def test_steps_left_out_are_those_from_the_current_one_on(stopped: list[Diagnosi
     assert stopped[-1].left_out == ()
 
 
-def test_effects_screened_so_far_are_candidates(stopped: list[Diagnosis]) -> None:
-    during = [each for each in stopped if each.left_out and each.left_out[0].startswith(SCREENING)]
-    assert {len(each.candidates) for each in during} == {0, 1, 2, 3}
-    assert all(f"({len(each.candidates)} are screened)" in each.left_out[0] for each in during[1:])
-    for each in during:
-        scores = [candidate.score for candidate in each.candidates]
-        assert scores == sorted(scores, reverse=True)
-
-
-def test_verdict_is_that_of_the_tested_evidence(stopped: list[Diagnosis]) -> None:
-    complete = stopped[-1]
-    assert [each.name for each in complete.causes] == ["offset"]
-    for each in stopped[:-1]:
-        is_tested = not {EVIDENCE, COMBINATIONS} & {*each.left_out}
-        assert each.verdict == (complete.verdict if is_tested else Verdict.STOPPED)
-        assert [cause.name for cause in each.causes] == (["offset"] if is_tested else [])
-        assert (each.gain is not None) == is_tested
-        assert each.nominal_rmse == complete.nominal_rmse
-        assert ALTERNATIVES not in each.left_out or not is_tested
-
-
 def test_document_and_summary_state_what_was_left_out(stopped: list[Diagnosis]) -> None:
     for each in stopped:
         assert as_json(diagnosis_document(each))
@@ -136,11 +112,3 @@ def test_a_step_that_fails_leaves_the_findings_before_it(
     assert not found.left_out
     text = DiagnosisResult.from_diagnosis(found).summary
     assert f"Not computed: {steps}: {reason}." in text
-
-
-def test_an_error_of_the_caller_ends_a_diagnosis() -> None:
-    def refuse(_message: str, _fraction: float | None = None, /) -> None:
-        raise SettingsError("the job has ended")
-
-    with pytest.raises(SettingsError, match="the job has ended"):
-        diagnose(RECORD, RecordedOutput("theirs", U), progress=refuse, catalogue=EFFECTS)

@@ -52,28 +52,3 @@ def test_values_have_units_and_intervals_that_contain_the_true_values() -> None:
         assert low < true < high
         assert high - low < 0.1 * true
     assert values["k"].estimate.unit == "mm/V/s"
-
-
-@pytest.mark.ci
-def test_values_of_an_exact_record_have_no_intervals() -> None:
-    record = make_record(0.0)
-    values = diagnose(record, make_simulator(PROCESS, record)).values
-    assert {each.name: each.estimate.value for each in values} == pytest.approx(TRUE, rel=1e-6)
-    assert all(each.estimate.ci95 is None for each in values)
-
-
-@pytest.mark.ci
-def test_equations_of_a_linear_simulation_are_compared_with_it() -> None:
-    rng = np.random.default_rng(3)
-    u = np.repeat(rng.uniform(0.0, 100.0, 40), 20)
-    y = [20.0]
-    for power in u[:-1].tolist():
-        rate = (20.0 + 0.8 * power - y[-1]) / (60.0 if 20.0 + 0.8 * power > y[-1] else 120.0)
-        y.append(y[-1] + 2.0 * rate)
-    record = Dataset(u, np.array(y) + 0.1 * rng.standard_normal(u.size), 2.0, ("u_W",), "y_K", ("W",), "K")
-    found = diagnose(record, make_simulator("linear:1", record))
-    values = {each.name: each for each in found.values}
-    assert {"K", "T", "level"} <= set(values)
-    assert all(each.before is None for each in values.values())
-    alone = {name: values[name].alone for name in ("K", "T", "level")}
-    assert alone == pytest.approx({"K": 0.8, "T": 90.0, "level": 20.0}, rel=0.3)

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from islands.diagnosis import assembly as diagnosis_assembly
-from islands.diagnosis import procedure as diagnosis
-from islands.diagnosis.calibration.intersample_selection import get_discretisation
 from islands.diagnosis.calibration.preparation import MIN_SAMPLES
 from islands.diagnosis.inference.finding import describe_effects
 from islands.diagnosis.inference.verdict import Verdict
@@ -17,9 +15,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset
-from islands.records.split import HOLDOUT_FRACTION
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document
-from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from lab.diagnosis.injection.measurement import inject
@@ -35,12 +31,6 @@ def record() -> Dataset:
 @pytest.fixture(scope="module")
 def found(record: Dataset) -> Diagnosis:
     return diagnose(record, make_piezo(), TOLERANCE)
-
-
-def with_input(record: Dataset, column: int, values: object) -> Dataset:
-    u = np.array(record.u)
-    u[:, column] = values
-    return replace(record, u=u)
 
 
 @pytest.mark.ci
@@ -63,26 +53,10 @@ def test_injected_drag_is_named_with_its_strength_and_gain(found: Diagnosis) -> 
     assert found.candidates[0].name == "quadratic-drag"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_diagnosis_is_reproducible(record: Dataset, found: Diagnosis) -> None:
     again = diagnose(record, make_piezo(), TOLERANCE)
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
-
-
-@pytest.mark.ci
-def test_holdout_part_only_changes_the_gain(record: Dataset, found: Diagnosis) -> None:
-    y = np.array(record.y)
-    fitted = int((1 - HOLDOUT_FRACTION) * record.samples)
-    y[fitted:] += 1.0
-    other = diagnose(replace(record, y=y), make_piezo(), TOLERANCE)
-    assert (other.effects, other.candidates, other.verdict) == (
-        found.effects,
-        found.candidates,
-        found.verdict,
-    )
-    assert other.gain is not None
-    assert found.gain is not None
-    assert other.gain.after.rmse > 5 * found.gain.after.rmse
 
 
 @pytest.fixture(scope="module")
@@ -92,11 +66,6 @@ def clean() -> Dataset:
 
 #: A simulator with two parameters far from those of the records.
 DETUNED = make_piezo(dp=1.3, A=0.7)
-
-
-@pytest.mark.ci
-def test_parameter_without_a_tolerance_is_calibrated(clean: Dataset) -> None:
-    assert diagnose(clean, DETUNED).verdict == Verdict.NOTHING
 
 
 @pytest.mark.ci
@@ -126,7 +95,7 @@ def test_cause_of_little_confidence_is_unknown(monkeypatch: pytest.MonkeyPatch) 
     assert found.best is found.base
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_only_the_improbable_cause_of_several_is_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     def describe(*arguments: Any) -> tuple:
         findings, equivalents = describe_effects(*arguments)
@@ -191,86 +160,29 @@ def test_tolerance_of_a_parameter_that_is_zero_is_rejected(record: Dataset) -> N
         diagnose(record, PythonFunctionSimulator(function, "function"), {"offset": 0.1})
 
 
-def test_diverging_simulation_is_rejected(record: Dataset) -> None:
-    with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
-        diagnose(record, make_piezo(gamma=-5.0))
-
-
-@pytest.mark.ci
-def test_better_of_two_intersample_behaviours_counts_if_neither_is_confirmed(
-    record: Dataset, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each search selects the behaviour of the other one."""
-    held, effects = ResampledSimulator(make_piezo(), InterSample.ZOH, 1), [CATALOGUE["quadratic-drag"]]
-    once = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
-    # Before the search, after the screening, after the search, and after the search with the held input.
-    selected = iter([make_piezo(), make_piezo(), held, make_piezo()])
-    monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
-    found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
-    assert next(selected, None) is None
-    assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 1)
-    assert np.array_equal(found.best.values, once.best.values)
-
-
-@pytest.mark.ci
-def test_finer_step_that_suits_all_effects_is_kept(record: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One of them, with a larger residual, does not decide again after the screening."""
-    fine, effects = ResampledSimulator(make_piezo(), InterSample.FOH, 4), [CATALOGUE["quadratic-drag"]]
-    # Before the search, after the screening, after the search, and after the search with finer steps.
-    selected = iter([make_piezo(), make_piezo(), fine, fine])
-    monkeypatch.setattr(diagnosis, "select_intersample", lambda *_: next(selected))
-    found = diagnose(record, make_piezo(), TOLERANCE, catalogue=effects)
-    assert next(selected, None) is None
-    assert get_discretisation(found.best.simulation.simulator) == (InterSample.FOH, 4)
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("effects", "core", "noise", "seed"),
     [
         # A hold fits better next to one of the effects alone, and makes the others half a sample early.
-        pytest.param(
-            *(("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
-            marks=pytest.mark.nightly,
-        ),
-        pytest.param(
-            *(("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
-            marks=pytest.mark.nightly,
-        ),
+        (("rate-limit", "input-offset"), "cascaded-tanks", "white", 7750016),
+        (("offset", "state-clip"), "cascaded-tanks", "white", 7750017),
         # A jump of many standard deviations is sharper than the step that is calibrated.
         (("ageing", "jump"), "cascaded-tanks", "white", 7750012),
         # The effects next to a discovered term lead to the third one.
-        pytest.param(
-            *(("input-saturation", "cyclic-error", "ageing"), "cascaded-tanks", "white", 7996002),
-            marks=pytest.mark.nightly,
-        ),
+        (("input-saturation", "cyclic-error", "ageing"), "cascaded-tanks", "white", 7996002),
         # The instants that the calibration starts from are many samples apart.
-        pytest.param(
-            *(("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
-            marks=pytest.mark.nightly,
-        ),
+        (("thermal-drift", "gain-step"), "bouc-wen-piezo", "ar", 7990001),
         # With a linear input between samples, a resonance explains more than a delay.
-        pytest.param(
-            *(("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
-            marks=pytest.mark.nightly,
-        ),
+        (("delay", "second-hysteresis", "exponential-creep"), "second-order", "white", 7996005),
         # A noise model takes the response to any two of the causes for noise.
-        pytest.param(
-            *(("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
-            marks=pytest.mark.nightly,
-        ),
+        (("input-saturation", "ageing", "state-clip"), "cascaded-tanks", "white", 7996000),
         # A step that is slightly too large is made up for by a gain.
-        pytest.param(
-            *(("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
-            marks=pytest.mark.nightly,
-        ),
+        (("sensor-gain", "quantised-input"), "bouc-wen-piezo", "white", 6996002),
         # A hold fits better next to two of the effects, and terms explain the third one.
-        pytest.param(
-            *(("offset", "thermal-drift", "cyclic-error"), "cascaded-tanks", "white", 6999011),
-            marks=pytest.mark.nightly,
-        ),
+        (("offset", "thermal-drift", "cyclic-error"), "cascaded-tanks", "white", 6999011),
         # The path of the hysteresis is that of an input that jumps between samples.
-        pytest.param(*(("stiction",), "bouc-wen-piezo", "white", 7996002), marks=pytest.mark.nightly),
+        (("stiction",), "bouc-wen-piezo", "white", 7996002),
     ],
 )
 def test_errors_of_the_calibration_are_no_further_causes(

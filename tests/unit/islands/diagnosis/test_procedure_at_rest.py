@@ -5,7 +5,6 @@ import pytest
 
 import islands
 from islands.diagnosis.inference.noise_detectors import DETECTORS
-from islands.diagnosis.inference.verdict import Verdict
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.records.dataset import Dataset
@@ -36,12 +35,6 @@ MOTIONS = {
 ESSENTIAL = (("exponential-creep", 50.0), ("exponential-creep", 0.0))
 
 
-@pytest.fixture(scope="module")
-def crept() -> islands.DiagnosisResult:
-    """Diagnosis of a creep test with a free gain."""
-    return islands.diagnose(rest(50.0, CREEP), islands.function_simulator(static))
-
-
 @pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "level"),
@@ -60,17 +53,6 @@ def test_motion_at_a_resting_input_is_named(name: str, level: float) -> None:
     assert found.gain.after.rmse == pytest.approx(0.01, rel=0.3)
     if name == "exponential-creep":
         assert found.effects[0].parameters["log_tau"].value == pytest.approx(np.log(8.0), abs=0.15)
-
-
-def test_resting_output_without_motion_has_no_discrepancy() -> None:
-    found = islands.diagnose(rest(50.0, 0.0 * TIME), islands.function_simulator(static))
-    assert (found.verdict, found.effects) == (Verdict.NOTHING, ())
-
-
-@pytest.mark.ci
-def test_effects_that_are_offsets_at_rest_are_not_searched_for(crept: islands.DiagnosisResult) -> None:
-    assert {each.name for each in crept.candidates} >= {"exponential-creep", "linear-drift", "jump"}
-    assert not {each.name for each in crept.candidates} & {"even-nonlinearity", "backlash", "gain-step"}
 
 
 def test_extended_simulation_of_a_creep_test_repeats_the_creep() -> None:

@@ -7,14 +7,11 @@ import pytest
 import scipy
 
 import islands
-from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.inference.noise_floor import noise_variance_from_periods
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
-from islands.facade.explain_residual import explain_residual
 from islands.records.dataset import Dataset
-from islands.records.segments import count_runs, fill_gaps, find_runs, split_at_gaps
-from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
+from islands.records.segments import count_runs, find_runs, split_at_gaps
 from support.simulated_records import recorded, wave
 
 RNG = np.random.default_rng(3)
@@ -75,37 +72,12 @@ def test_record_with_gaps_gives_the_names_of_the_complete_record(noise: str, cas
         assert finding.parameters["share"][0] == pytest.approx(LOST[case].mean())
 
 
-@pytest.mark.ci
-def test_strength_and_gain_are_those_of_the_known_samples() -> None:
-    found = run(lose(0.8 * U + DRIFT + WHITE, "a tenth at random"))
-    assert found.effects[0].parameters["c"].value == pytest.approx(0.3, rel=0.1)
-    assert found.gain is not None
-    known = ~np.isnan(found.record.y) & (np.arange(SAMPLES) >= found.estimation_samples)
-    rmse = np.sqrt(np.mean((found.record.y - found.best.output)[known] ** 2))
-    assert found.gain.after.rmse == pytest.approx(rmse)
-    assert all(draw(found).axes for draw in DIAGNOSIS_FIGURES.values())
-    assert explain_residual(found) is None
-
-
-def test_missing_samples_are_not_part_of_the_calibration() -> None:
-    record = lose(0.8 * U + WHITE, "every fifth sample")
-    target = make_target(record, 450, {})
-    assert not np.isnan(target.residual(0.8 * U)).any()
-    assert target.residual(0.8 * U).size == 450 - np.count_nonzero(LOST["every fifth sample"][:450])
-    assert set(target.fitted_segments) == {2, 4}
-
-
 def test_runs_end_at_gaps_and_at_recordings() -> None:
     known = np.array([False, True, True, False, True, True, True, False])
     assert find_runs(known, (5, 3)) == ((1, 3), (4, 5), (5, 7))
     assert count_runs(known, (5, 3)) == (2, 1, 2)
     assert split_at_gaps(known, (5, 3)) == (1, 2, 1, 1, 2, 1)
     assert split_at_gaps(np.ones(8, bool), (5, 3)) == count_runs(np.ones(8, bool), (5, 3)) == (5, 3)
-
-
-def test_gaps_are_filled_for_estimates_only() -> None:
-    nan = np.nan
-    assert fill_gaps(np.array([nan, 1.0, nan, 3.0, nan])).tolist() == [1.0, 1.0, 2.0, 3.0, 3.0]
 
 
 def test_noise_from_periods_skips_missing_samples() -> None:

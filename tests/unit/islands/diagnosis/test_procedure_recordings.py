@@ -13,19 +13,11 @@ from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
 from islands.records.split import MIN_RECORDING_SAMPLES, estimation_part
-from islands.report.documents.diagnosis_json import diagnosis_document
 from islands.report.documents.extension_json import extended_document
-from islands.simulators.specification.factory import make_simulator
-from lab.diagnosis.surrogates import make_surrogates
-from support.joined_oscillator import DT, SIGMA, STATES, oscillator_recordings
+from support.joined_oscillator import SIGMA, oscillator_recordings
 
 #: Effects that are searched for in a fast test.
 FEW = tuple(CATALOGUE[name] for name in ("coulomb-friction", "cubic-stiffness", "offset", "jump", "delay"))
-
-
-def get_initial_states(found: Diagnosis) -> list[float]:
-    document = diagnosis_document(found)
-    return [value for name, value in document["calibrated"].items() if name.startswith("initial")]
 
 
 @pytest.fixture(scope="module")
@@ -50,22 +42,7 @@ def test_effect_is_named_and_predicts_whole_recordings(found: Diagnosis) -> None
     assert found.gain.before.rmse > 3 * SIGMA
 
 
-@pytest.mark.ci
-def test_every_recording_has_its_own_initial_state(found: Diagnosis) -> None:
-    # A recording that is held out as a whole too: its initial state is fitted, and nothing else.
-    assert get_initial_states(found) == pytest.approx(np.ravel(STATES), abs=0.01)
-
-
-@pytest.mark.ci
-def test_held_out_recordings_do_not_change_the_estimate(stiffened: Dataset, found: Diagnosis) -> None:
-    y = np.array(stiffened.y)
-    y[found.estimation_samples :] *= 1.01
-    other = islands.diagnose(replace(stiffened, y=y), "second-order", effects=FEW[:3])
-    assert other.best.values[:3].tolist() == found.best.values[:3].tolist()
-    assert other.candidates == found.candidates
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_extended_simulation_fits_the_initial_states_of_new_recordings(
     stiffened: Dataset, found: Diagnosis
 ) -> None:
@@ -74,27 +51,6 @@ def test_extended_simulation_fits_the_initial_states_of_new_recordings(
     other = islands.join(oscillator_recordings(2, (150, 100), "cubic-stiffness", 300.0))
     error = other.y - islands.simulate(document, other).y
     assert np.sqrt(np.mean(error**2)) == pytest.approx(SIGMA, rel=0.2)
-
-
-@pytest.mark.ci
-def test_clean_recordings_have_no_discrepancy() -> None:
-    found = islands.diagnose(islands.join(oscillator_recordings(3)), "second-order", effects=FEW)
-    assert found.verdict == Verdict.NOTHING
-    assert found.best.mean_square == pytest.approx(SIGMA**2, rel=0.1)
-
-
-@pytest.mark.ci
-def test_many_short_recordings_are_diagnosed() -> None:
-    rng = np.random.default_rng(6)
-    recordings = []
-    for _ in range(15):
-        u = np.cumsum(rng.standard_normal(30))
-        recordings.append(Dataset(u=u, y=u + 0.3 + 0.05 * rng.standard_normal(30), dt=DT))
-    record = islands.join(tuple(recordings))
-    columns = {"theirs": record.u[:, 0]}
-    found = islands.diagnose(record, "column:theirs", columns=columns, effects=FEW)
-    assert [each.name for each in found.effects] == ["offset"]
-    assert found.effects[0].parameters["c"].value == pytest.approx(0.3, rel=0.02)
 
 
 @pytest.mark.ci
@@ -115,7 +71,7 @@ def test_recording_that_is_held_out_as_a_whole_is_no_part_of_an_estimate() -> No
     assert two.gain is None or two.gain.after.rmse > 2 * SIGMA
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_change_between_two_recordings_is_a_jump_at_the_boundary() -> None:
     first, second = oscillator_recordings(5, (500, 300))
     record = islands.join((first, replace(second, y=second.y + 0.005)))
@@ -135,20 +91,6 @@ def test_complete_catalogue_names_friction_only_if_there_is_some(seed: int) -> N
     assert found.effects[0].parameters["F"].value == pytest.approx(0.5, rel=0.03)
     clean = islands.diagnose(islands.join(oscillator_recordings(seed)), "second-order")
     assert clean.verdict == Verdict.NOTHING
-
-
-@pytest.mark.ci
-def test_noise_of_surrogates_is_independent_between_recordings(found: Diagnosis) -> None:
-    record = found.record
-    surrogates = make_surrogates(found, make_simulator("second-order", record), {})
-    slow = replace(
-        surrogates,
-        noise=replace(surrogates.noise, coefficients=np.array([0.999]), variance=1.0),
-    )
-    drawn = np.array([slow.draw_noise(seed) for seed in range(200)])
-    (_, end), _, _ = record.bounds
-    assert np.corrcoef(drawn[:, end - 2], drawn[:, end - 1])[0, 1] > 0.99
-    assert abs(np.corrcoef(drawn[:, end - 1], drawn[:, end])[0, 1]) < 0.3
 
 
 def test_short_recording_is_rejected() -> None:

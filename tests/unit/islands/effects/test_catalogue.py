@@ -19,10 +19,6 @@ def test_the_plain_name_of_an_effect_on_a_state_contains_the_state() -> None:
     assert get_title(wrong_parameter(Parameter("m", "kg", 1.0, 0.01)).name) == "wrong parameter m"
 
 
-def test_an_effect_outside_of_the_catalogue_has_no_plain_name() -> None:
-    assert get_title("own-effect") == ""
-
-
 def test_known_effects_keep_their_order_where_another_one_acts() -> None:
     dead_zone, saturation, _, quantiser, backlash, *_ = ACTUATOR_MAPS
     known = (backlash, dead_zone)

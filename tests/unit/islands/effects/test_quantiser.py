@@ -59,12 +59,3 @@ def test_offset_is_zero_if_multiples_of_a_step_round_the_input_alike() -> None:
     step, offset = centre(QUANTISED_INPUT, np.array([0.41, 0.003]), context)
     assert offset == 0.0
     assert step == pytest.approx(0.41, abs=0.01)
-
-
-def test_stiction_of_a_held_input_moves_all_the_way() -> None:
-    """A continuous input passes the breakaway between two samples; a held one jumps beyond it."""
-    context = make_context(25, 0)
-    moved = apply_map(STICTION, context.u, np.array([0.5]), context)
-    has_moved = np.diff(moved) != 0.0
-    assert np.array_equal(moved[1:][has_moved], context.u[1:][has_moved])
-    assert np.max(np.abs(moved - context.u)) <= 0.5

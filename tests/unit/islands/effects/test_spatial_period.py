@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import islands
-from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import ForceCoordinate, SimulationContext
 from islands.effects.interface.effect import Effect
 from islands.effects.spatial_period import COGGING, CYCLIC_ERROR
@@ -47,13 +46,6 @@ def test_starting_points_have_the_period_over_the_position(effect: Effect, pitch
     assert found[0] == pytest.approx(1.0 / pitch, abs=0.25 / RANGE)
 
 
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
-def test_starting_points_ignore_the_level_and_trends_over_the_position(effect: Effect) -> None:
-    x = move_back_and_forth()
-    found = find_frequencies(effect, x, 7.0 + 0.3 * x + 0.2 * x**2 + 0.1 * np.sin(2 * np.pi * x / 0.1))
-    assert found[0] == pytest.approx(10.0, abs=0.25 / RANGE)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_a_cyclic_error_has_its_line_over_the_simulated_position(seed: int) -> None:
     """The reading falls where the position rises; the simulated position has the line."""
@@ -76,40 +68,6 @@ def test_cogging_needs_a_position_that_is_the_output() -> None:
     driven = replace(context, force_coordinate=replace(context.force_coordinate, is_output=False))
     assert not COGGING.is_applicable(driven)
     assert CYCLIC_ERROR.is_applicable(driven)
-
-
-def simulate_axis(cogging: float, pitch: float, samples: int, rng: np.random.Generator) -> islands.Dataset:
-    """Simulate ``2 x'' + 6 x' + 4 tanh(x'/0.05) + cogging sin(2 pi x/pitch) = u`` with noise of 0.2 %."""
-    time, h = DT * np.arange(samples), DT / STEPS
-    frequencies, phases = rng.uniform(0.2, 2.0, 12), rng.uniform(0.0, 6.3, 12)
-    u = 10.0 * np.sin(2 * np.pi * np.outer(time, frequencies) + phases).sum(axis=1) * np.minimum(1.0, time)
-    pushed = np.interp(h * (0.5 + np.arange(samples * STEPS)), time, u).tolist()
-
-    def accelerate(x: float, v: float, u: float) -> float:
-        friction = 6.0 * v + 4.0 * np.tanh(v / 0.05)
-        return float(u - friction - cogging * np.sin(2 * np.pi * x / pitch)) / 2.0
-
-    x = v = 0.0
-    y = np.empty(samples)
-    for step, force in enumerate(pushed):
-        if step % STEPS == 0:
-            y[step // STEPS] = x
-        middle_x, middle_v = x + h / 2 * v, v + h / 2 * accelerate(x, v, force)
-        x, v = x + h * middle_v, v + h * accelerate(middle_x, middle_v, force)
-    y += 0.002 * np.std(y) * rng.standard_normal(samples)
-    return islands.Dataset(*(u, y, DT, ("u_N",)), output_name="x_m", input_units=("N",), output_unit="m")
-
-
-@pytest.mark.nightly
-def test_cogging_of_an_axis_is_named_with_its_pitch() -> None:
-    others = ("coulomb-friction", "periodic-disturbance", "backlash")
-    effects = [*EFFECTS, *(CATALOGUE[name] for name in others)]
-    record = simulate_axis(1.0, 0.24, 1000, np.random.default_rng(3))
-    found = islands.diagnose(record, "rigid-axis", effects=effects)
-    assert [each.name for each in found.effects] == ["cogging"]
-    values = {name: each.value for name, each in found.effects[0].parameters.items()}
-    assert values["frequency"] == pytest.approx(1.0 / 0.24, rel=0.01)
-    assert np.hypot(values["cosine"], values["sine"]) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.ci

@@ -8,13 +8,9 @@ import islands
 from islands.effects.interface.context import SimulationContext
 from islands.effects.sweep import (
     SWEPT_DISTURBANCE,
-    SWEPT_INTERFERENCE,
-    compute_response,
     find_sweep,
     measure_line,
-    respond,
 )
-from lab.diagnosis.trial import Trial, run_trial
 
 DT, SAMPLES = 0.005, 2000
 
@@ -60,14 +56,6 @@ def test_noise_and_a_steady_line_are_no_sweep() -> None:
     assert find_sweep(np.zeros(SAMPLES), None, 4.0) is None
 
 
-def test_the_response_from_input_to_output_is_that_of_the_system() -> None:
-    u, wave = draw_input(3), make_wave(0.5, 15.0)
-    response = compute_response(u, move(u))
-    error = respond(wave, response) - move(wave)
-    assert error.std() < 0.1 * move(wave).std()
-    assert not compute_response(np.zeros(SAMPLES), u).any()
-
-
 def make_context(u: np.ndarray, measured: np.ndarray) -> SimulationContext:
     return SimulationContext(u, DT, {}, {}, 1.0, 1.0, "N", "mm", 7.5, measured=measured)
 
@@ -79,17 +67,6 @@ def test_a_sweep_behind_a_resonance_starts_with_the_force_that_acts() -> None:
     cosine, sine, frequency, rate = point
     assert (frequency, rate) == (pytest.approx(0.5, abs=0.15), pytest.approx(1.45, abs=0.02))
     assert np.hypot(cosine, sine) == pytest.approx(0.4, rel=0.2)
-
-
-def test_a_sweep_is_not_searched_for_if_the_input_is_a_line() -> None:
-    """A distortion of the response to a sweep is a sweep as well."""
-    for effect in (SWEPT_DISTURBANCE, SWEPT_INTERFERENCE):
-        for u, is_searched in (
-            (draw_input(5), True),
-            (make_wave(1.0, 20.0), False),
-            (make_wave(3.0, 3.0), False),
-        ):
-            assert effect.is_applicable(make_context(u, u)) == is_searched
 
 
 def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:
@@ -112,10 +89,3 @@ def test_a_sweep_is_named_by_the_place_where_it_acts(acts_at_input: bool) -> Non
     assert values["rate"].value == pytest.approx(14.5 / (SAMPLES * DT), abs=0.01)
     assert f"{name} sweeps from 0." in found.summary
     assert found.effects[0].depends_on_time
-
-
-@pytest.mark.nightly
-def test_a_weak_force_is_found_though_the_response_spreads_its_sweep() -> None:
-    """At half of the noise, its search began at 34 Hz, and an interference had a confidence of 1.00."""
-    found = run_trial(Trial(("swept-disturbance",), 6999000, band=(0.2, 1.0), core="second-order"))
-    assert found.within_set

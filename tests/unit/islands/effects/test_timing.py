@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 import islands
 from islands.effects.interface.context import SimulationContext
-from islands.effects.timing import DELAY, VARYING_DELAY
+from islands.effects.timing import VARYING_DELAY
 from islands.kernels.lagrange import interpolate_at
 from islands.kernels.memory_operators import lag_by_gap
 
@@ -46,22 +46,13 @@ def test_a_delay_that_swings_starts_with_its_frequency(frequency: float) -> None
         assert np.hypot(cosine, sine) == pytest.approx(0.3, rel=0.4)
 
 
-def test_a_delay_without_a_swing_is_a_constant_delay() -> None:
-    u = draw_levels(2)
-    context = make_context(u, u)
-    for form in (VARYING_DELAY.form, DELAY.form):
-        assert callable(form)
-    swung = VARYING_DELAY.form(u, np.array([0.34, 0.0, 0.0, 0.02]), context)
-    assert np.array_equal(swung, DELAY.form(u, np.array([0.34]), context))
-
-
 def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:
     noise = 0.01 * y.std() * np.random.default_rng(3).standard_normal(y.size)
     record = islands.Dataset(u[:, None], y + noise, DT, ("u_V",), "y_V", ("V",), "V")
     return islands.diagnose(record, "linear:1")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_delay_that_swings_is_named_with_its_values() -> None:
     u = draw_levels(4)
     found = diagnose(u, follow(swing(u, 0.7, 0.4, 0.02)))
@@ -72,7 +63,7 @@ def test_a_delay_that_swings_is_named_with_its_values() -> None:
     assert np.hypot(values["cosine"].value, values["sine"].value) == pytest.approx(0.4, abs=0.03)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_lag_that_grows_with_its_error_is_named_and_holds_on_another_record() -> None:
     u = draw_levels(5)
     found = diagnose(u, lag_by_gap(follow(u), DT, 0.7, 1.4))

@@ -74,26 +74,6 @@ def test_draws_of_refined_parameters_scatter_about_them():
     assert (deviation > 0.0).all()
 
 
-def test_a_seed_determines_the_draws():
-    data = record(samples=300)
-    model = estimate(LINEAR, data).model
-    assert (draw(model, data) == draw(model, data)).all()
-    assert (draw(model, data) != draw(model, data, seed=4)).all()
-
-
-def test_draws_follow_the_unit_of_the_output():
-    one, thousand = record(), record(scale=1000.0)
-    drawn = draw(estimate(LINEAR, one).model, one)
-    scaled = draw(estimate(LINEAR, thousand).model, thousand)
-    assert scaled == pytest.approx(drawn * [1.0, 1000.0], rel=1e-7)
-
-
-def test_parameters_without_a_free_direction_are_repeated():
-    data = record()
-    model = estimate(terms("y(k-1)"), data, "hysteresis").model
-    assert (draw(model, data, draws=5, constraints="hysteresis") == model.parameters).all()
-
-
 def test_no_draw_has_an_excluded_sign():
     """The law lacks the term: without the constraint, many draws have the other sign."""
     data = record(samples=300)

@@ -1,13 +1,11 @@
 """The table of estimators, and the measured bias of least squares."""
 
-import numpy as np
 import pytest
 
 from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with, least_squares_bias
-from islands.estimation.refinement import refine
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
@@ -42,15 +40,6 @@ def test_intervals_of_least_squares_miss_the_true_pole_under_coloured_noise(nois
     assert min(least_squares_bias(start(record).model, record) for record in records) > 4.0
 
 
-def test_bias_of_least_squares_is_small_under_white_noise():
-    found = []
-    for seed in range(20):
-        record = make_noisy_record("equation", seed, 1000)
-        found.append(least_squares_bias(start(record).model, record))
-    assert max(found) < 2.0
-    assert np.median(found) == 0.0
-
-
 def test_every_estimator_recovers_the_parameters_of_noise_free_data():
     record = make_noisy_record("equation", 0, 400, 0.0)
     first = start(record)
@@ -58,16 +47,6 @@ def test_every_estimator_recovers_the_parameters_of_noise_free_data():
         found = estimate_with(name, first, record, shooting=50)
         assert found.model.theta == pytest.approx((0.9, 0.3, -0.1), abs=1e-9), name
         assert (found.least_squares_bias is None) == (name == "least-squares")
-
-
-def test_shooting_and_free_run_are_refinements():
-    record = make_noisy_record("output", 1, 400)
-    first = start(record)
-    for name, interval in (("shooting", 50), ("free-run", None)):
-        found = estimate_with(name, first, record, shooting=50)
-        assert found.model == refine(first.model, record, interval).model
-        steps = np.abs(np.subtract(found.model.theta, first.model.theta))
-        assert found.least_squares_bias == pytest.approx(max(steps / found.model.standard_errors))
 
 
 def test_extended_least_squares_meets_the_constraints_of_hysteresis():

@@ -55,13 +55,6 @@ def test_white_noise_needs_no_noise_terms():
     assert np.array_equal(found.estimate.standard_errors, expected.standard_errors)
 
 
-def test_noise_free_data_need_no_noise_terms():
-    psi, y = make_problem(scale=0.0)
-    found = estimate(psi, y)
-    assert found.noise == ()
-    np.testing.assert_allclose(found.estimate.theta, [0.8, 0.5], rtol=1e-12)
-
-
 def test_extended_least_squares_meets_its_constraints():
     psi, y = make_problem()
     S, c = np.array([[1.0, 2.0]]), np.array([1.8])
@@ -88,16 +81,6 @@ def test_failures_are_those_of_constrained_least_squares():
     assert estimate(psi[:, :2], y[:2]).verdict is Status.TOO_FEW_ROWS
     S, c = np.zeros((1, 2)), np.zeros(1)
     assert estimate(psi, y, S, c).verdict is Status.INFEASIBLE
-
-
-def test_estimate_scales_with_units():
-    psi, y = make_problem()
-    units = np.array([1e-6, 1e3])
-    found, scaled = estimate(psi, y), estimate(psi * units[:, None], y)
-    np.testing.assert_allclose(scaled.estimate.theta * units, found.estimate.theta, rtol=1e-7)
-    np.testing.assert_allclose(
-        scaled.estimate.standard_errors * units, found.estimate.standard_errors, rtol=1e-6
-    )
 
 
 def test_segments_are_filtered_separately():

@@ -6,7 +6,6 @@ import pytest
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import (
-    MODAL_ORDERS,
     ORDERS,
     _remove_idle_units,
     estimate_models,
@@ -46,11 +45,6 @@ def test_a_system_with_many_resonances_has_modes():
     poles = np.linalg.eigvals(found.layout.split(np.array(found.theta))["A"])
     for frequency in FREQUENCIES:
         assert np.abs(np.angle(poles) / (2 * np.pi) - frequency).min() < 1e-3
-
-
-@pytest.mark.ci
-def test_no_large_order_is_kept_that_does_not_gain_much():
-    assert not {each.order for each in fit(spring_record(1200, noise=0.02))} & set(MODAL_ORDERS)
 
 
 def make_system(**values):

@@ -34,26 +34,6 @@ def test_filtered_signals_fulfil_the_same_equation(coefficients):
     assert solve(whitened, A).squares < 1e-20 * problem.y @ problem.y
 
 
-def test_segments_that_the_filter_and_the_initial_states_take_are_left_out():
-    noise = NoiseModel(np.array([0.5, 0.2, 0.1]), 1.0, 1.0)
-    assert make_problem((80, 5, 90, 6)).whiten(noise).lengths == [77, 87, 3]
-
-
-def test_filtered_constant_has_the_coefficient_of_the_constant():
-    problem = make_problem((200,)).with_constant()
-    raised = replace(problem, y=problem.y + 3.0).whiten(NoiseModel(np.array([0.9]), 1.0, 1.0))
-    coefficients = project(raised.divide(A, raised.columns), raised.y)
-    assert coefficients[-3:] == pytest.approx([*B, 3.0 * (1.0 + A.sum())])
-
-
-def test_part_is_where_the_inputs_vary_most():
-    problem = make_problem((300, 150, 450))
-    weights = np.where(np.arange(900) // 200 == 2, 1.0, 1e-2)
-    part = replace(problem, columns=problem.columns * weights).take_part(200)
-    assert np.array_equal(part.y, problem.y[400:600])
-    assert part.lengths == [50, 150]
-
-
 def test_part_has_no_segment_that_its_initial_states_take():
     problem = make_problem((401, 499))
     weights = np.where(np.arange(900) // 200 == 2, 1.0, 1e-2)

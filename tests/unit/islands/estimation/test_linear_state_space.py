@@ -39,15 +39,5 @@ def test_the_model_of_a_linear_system_has_its_poles_and_its_response(direct):
     assert y[200:] == pytest.approx(record.y[200:], abs=1e-5)
 
 
-def test_states_have_the_standard_deviation_1():
-    record = make_record(noise=0.01)
-    found = fit_linear_state_space(record, 2)
-    x, states = np.zeros(2), []
-    for row in record.u:
-        states.append(x)
-        x = found.a @ x + found.b @ row
-    assert np.std(states[80:], axis=0) == pytest.approx([1.0, 1.0], rel=1e-6)
-
-
 def test_a_record_that_is_too_short_has_no_model():
     assert fit_linear_state_space(make_record()[:20], 4) is None

@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lfilter
 
 from islands.estimation.estimate import estimate
-from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR
 from islands.estimation.output_error import fit_output_error
 from islands.estimation.refinement import refine
 from islands.records.dataset import Dataset, join
@@ -83,16 +82,6 @@ def test_initial_states_differ_between_segments():
     assert found.residual_variance**0.5 == pytest.approx(TANK_NOISE, rel=0.15)
 
 
-def test_the_longest_segments_of_many_are_used():
-    parts = [make_tank(seed, 20 + 2 * seed) for seed in range(30)]
-    (model, used), (other, alone) = (
-        (found.model, found.residual_variance)
-        for found in (fit_output_error(join(tuple(some)))[0] for some in (parts, parts[14:]))
-    )
-    assert model == other
-    assert used == alone
-
-
 def test_dead_times_shift_the_lags_of_their_inputs():
     random = np.random.default_rng(4)
     u = np.repeat(random.uniform(-1.0, 1.0, (200, 2)), 4, axis=0)
@@ -142,20 +131,6 @@ def test_intervals_contain_the_true_parameters():
     assert 0.9 < np.mean(inside) < 0.99
 
 
-def test_white_noise_gives_no_second_model():
-    found = [
-        each.model.size for each in fit_output_error(make_record(2, [0.1, 0.15], [1.0, -1.5, 0.7], 0.05))
-    ]
-    assert found == sorted(set(found))
-
-
-def test_residual_variance_of_a_second_model_is_that_of_the_innovations():
-    first, second = fit_pair(make_coloured_record(1, 3000))
-    assert (first.criterion, second.criterion) == (OUTPUT_ERROR, BOX_JENKINS)
-    assert second.residual_variance == pytest.approx(0.05**2, rel=0.1)
-    assert first.residual_variance > 10.0 * 0.05**2
-
-
 @pytest.mark.ci
 def test_whitened_error_of_coloured_noise_has_the_smaller_variance():
     true = np.array([1.5, -0.7, 0.1, 0.15])
@@ -179,23 +154,5 @@ def test_intervals_of_the_whitened_error_contain_the_true_parameters():
     assert 0.9 < np.mean(inside) < 0.99
 
 
-def test_largest_model_has_at_most_the_given_number_of_terms():
-    record = make_record(1, [0.1, 0.15], [1.0, -1.5, 0.7], 0.01)
-    assert max(each.model.size for each in fit_output_error(record)) >= 4
-    assert max(each.model.size for each in fit_output_error(record, max_terms=3)) <= 3
-    assert fit_output_error(record, max_terms=1) == []
-
-
 def test_record_that_is_too_short_has_no_model():
     assert fit_output_error(make_tank(0, 10)) == []
-
-
-def test_output_of_zeros_has_no_model():
-    record = make_tank(0, 100)
-    assert fit_output_error(replace(record, y=np.zeros(100))) == []
-
-
-def test_same_record_gives_the_same_bits():
-    record = make_tank(7, 300)
-    first, second = (fit_output_error(replace(record)) for _ in range(2))
-    assert [each.model for each in first] == [each.model for each in second]

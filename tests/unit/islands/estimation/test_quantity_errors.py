@@ -86,13 +86,6 @@ def test_standard_errors_do_not_depend_on_the_coordinates_of_the_states():
     assert found[0].quantity_errors == pytest.approx(found[1].quantity_errors, rel=1e-3)
 
 
-def test_a_standard_error_decreases_with_the_samples():
-    def measure(samples):
-        return np.array(with_quantity_errors(SPRING, make_record(SPRING, 3, samples)).quantity_errors)
-
-    assert measure(400) / measure(6400) == pytest.approx(np.full(3, 4.0), rel=0.5)
-
-
 @pytest.mark.parametrize("poles", [(0.9, 0.9), (0.7, 1.0 - 1e-9)])
 def test_a_mode_that_changes_its_kind_within_a_step_has_no_standard_error(poles):
     """Equal poles become a resonance or two time constants; a pole next to 1 does not decay any more."""

@@ -16,7 +16,7 @@ from islands.expressions.parsing import parse
 from islands.expressions.tree import Apply, Lagged
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
-from islands.records.dataset import Dataset, join
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums
@@ -78,13 +78,6 @@ def test_refinement_recovers_true_parameters_from_noise_free_data(interval):
     assert 2 <= found.steps <= 30
 
 
-def test_constrained_refinement_recovers_true_parameters():
-    record = make_record(CLUSTERED)
-    start = model({**CLUSTERED, "y(k-1)": 0.65, "y(k-2)": 0.35, "u(k-1)*y(k-1)": 0.1, "u(k-2)*y(k-2)": -0.1})
-    found = refine_model(start, record, 60, "hysteresis")
-    assert found.model.parameters == pytest.approx(model(CLUSTERED).parameters, rel=1e-5)
-
-
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("interval", [1, 40, None])
 @pytest.mark.parametrize("constraints", ["none", "hysteresis"])
@@ -110,16 +103,6 @@ def test_refinement_never_increases_the_error_and_keeps_constraints(seed, interv
         assert found.model.parameters[0] != start.parameters[0] or interval == 1
 
 
-def test_refinement_reduces_the_shooting_error_of_least_squares():
-    """The least-squares estimate is optimal one step ahead, but not over an interval."""
-    record = make_record(CLUSTERED, noise=0.05)
-    start = estimate(model(CLUSTERED).regressors, record, "hysteresis").model
-    found = refine_model(start, record, 40, "hysteresis")
-    assert found.after < 0.96 * found.before
-    ahead = refine_model(start, record, 1, "hysteresis")
-    assert ahead.after == pytest.approx(ahead.before, rel=1e-6)
-
-
 def test_model_without_free_directions_is_unchanged():
     record = make_record(HYSTERESIS)
     only = model({"y(k-1)": 1.0})
@@ -127,15 +110,6 @@ def test_model_without_free_directions_is_unchanged():
     assert (found.model.parameters, found.steps) == ((1.0,), 0)
     assert found.model.standard_errors == (0.0,)
     assert found.before == found.after
-
-
-def test_number_of_steps_is_limited():
-    record = make_record(HYSTERESIS)
-    start = perturb(HYSTERESIS, 0.3)
-    one = refine_model(start, record, 50, max_steps=1)
-    assert one.steps == 1
-    assert refine_model(start, record, 50, max_steps=0).model.parameters == start.parameters
-    assert refine_model(start, record, 50).after < one.after
 
 
 def test_standard_errors_match_a_monte_carlo():
@@ -165,20 +139,6 @@ def test_one_step_ahead_refinement_equals_least_squares(constraints):
     assert found.model.standard_errors == pytest.approx(start.standard_errors, rel=1e-6)
 
 
-def test_standard_errors_account_for_the_constraint():
-    """Two parameters with a fixed sum have equal standard errors."""
-    record = make_record(CLUSTERED, noise=0.02)
-    found = refine_model(
-        estimate(model(CLUSTERED).regressors, record, "hysteresis").model, record, None, "hysteresis"
-    )
-    errors = dict(
-        zip((item.text for item in found.model.regressors), found.model.standard_errors, strict=True)
-    )
-    assert errors["y(k-1)"] == pytest.approx(errors["y(k-2)"], rel=1e-6)
-    assert errors["y(k-1)*u1(k-1)"] == pytest.approx(errors["y(k-2)*u1(k-2)"], rel=1e-6)
-    assert min(errors.values()) > 0
-
-
 @pytest.mark.parametrize("interval", [30, None])
 def test_jacobian_matches_higher_order_finite_differences(interval):
     record = make_record(HYSTERESIS, noise=0.02)
@@ -197,20 +157,6 @@ def test_jacobian_matches_higher_order_finite_differences(interval):
     length = np.linalg.norm(jacobian, axis=1)
     assert np.all(np.abs(normal - jacobian @ jacobian.T) < 1e-5 * length[:, None] * length)
     assert np.all(np.abs(gradient - jacobian @ error) < 1e-5 * length * np.linalg.norm(error))
-
-
-def test_residual_is_prediction_minus_measurement():
-    record = make_record(HYSTERESIS, noise=0.02)
-    start = perturb(HYSTERESIS)
-    expected = multiple_shooting(start, record, 30, 5)
-    error = ShootingResidual(start, record, 30, 5)(np.array(start.parameters))
-    assert error == pytest.approx((expected.y - record.y)[5:], abs=1e-15)
-
-
-def test_segments_are_refined_together():
-    parts = make_record(HYSTERESIS, 300, seed=1), make_record(HYSTERESIS, 200, seed=2)
-    found = refine_model(perturb(HYSTERESIS), join(parts), None)
-    assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
 def test_diverging_steps_are_rejected(monkeypatch):
@@ -259,12 +205,6 @@ def test_primitive_of_the_user_is_refined_by_differences():
     assert found.parameters == pytest.approx(known.parameters, rel=1e-6)
     assert found.standard_errors == pytest.approx(known.standard_errors, rel=1e-6)
     assert found.parameters != known.parameters
-
-
-def test_parameter_that_starts_at_zero_is_refined():
-    start = model({**HYSTERESIS, "u(k-1)*phi1(u(k-1), u(k-2))": 0.0})
-    found = refine_model(start, make_record(HYSTERESIS), 50)
-    assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
 # Several outputs.

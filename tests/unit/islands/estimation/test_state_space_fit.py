@@ -38,14 +38,6 @@ def test_the_parameters_of_a_record_without_noise_are_found():
     )  # up to the scale of the states
 
 
-def test_segments_have_their_own_initial_states():
-    record = spring_record(600)
-    fit = begin(cut(record, 200, 450))
-    fit.advance(30)
-    assert fit.mean_square < 1e-10
-    assert not np.allclose(fit.states[0], fit.states[1], atol=0.05)
-
-
 def test_the_error_of_noise_is_reached_and_falls_with_each_step():
     record = spring_record(2000, noise=0.05)
     fit = begin(cut(record, 1000), 0.9 * MODEL.theta)
@@ -67,15 +59,6 @@ def test_missing_outputs_have_no_influence():
         assert fit.mean_square < 1e-10
     whole.y[100:140] = 50.0
     assert begin(SegmentLanes([whole])).mean_square > 1.0
-
-
-def test_fixed_parameters_do_not_move():
-    free = np.zeros(MODEL.theta.size, bool)
-    free[-1] = True
-    fit = begin(cut(spring_record(600)), MODEL.theta + 0.1 * free, free)
-    fit.advance(10)
-    assert (fit.theta[:-1] == MODEL.theta[:-1]).all()
-    assert fit.theta[-1] == pytest.approx(0.3, abs=1e-6)
 
 
 def test_no_step_is_taken_once_a_stop_is_requested():
@@ -118,20 +101,3 @@ def test_no_admissible_change_reduces_the_error_after_the_last_step():
         )[0].theta
         other = StateSpaceFit(theta, fit.places, fit.codes, fit.segments, fit.states, fit.conditions)
         assert other.mean_square > least
-
-
-def test_correct_conditions_cost_no_error():
-    text = "fixed-point = 0, 0.3; gain = 0.564"
-    fit = begin_under(text, cut(spring_record(600)), 0.97 * MODEL.theta)
-    fit.advance(100)
-    assert fit.meets_conditions
-    assert fit.mean_square < 1e-10
-
-
-def test_conditions_that_exclude_each_other_are_not_met():
-    linear = np.where(np.arange(MODEL.theta.size) == MODEL.layout.names.index("e2_1"), 0.0, MODEL.theta)
-    text, segments = "gain = 0.5 at 0, 0; gain = 0.6 at 1, 1", cut(spring_record(300, noise=0.02))
-    fit = begin_under(text, segments, linear, linear != 0.0)
-    fit.advance(20)
-    assert not fit.meets_conditions
-    assert fit.mean_square == np.inf

@@ -1,7 +1,5 @@
 """Index of genes: their numbers, the numbers of their regressors, and the order of these."""
 
-import numpy as np
-
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.gene_index import ZERO, GeneIndex
 from islands.evolution.gene_structure import phi
@@ -25,14 +23,6 @@ def test_genes_of_one_regressor_have_one_term():
     assert [item.text for item in index.regressors(terms[3:5])] == ["y(k-1)", "tanh(u1(k-1))"]
 
 
-def test_equal_genes_have_one_number_and_one_object():
-    index, genes = make_index(), [parse(text) for text in TEXTS]
-    numbers = [index.number_gene(gene) for gene in genes]
-    assert len(set(numbers)) == len(TEXTS)
-    assert [index.number_gene(parse(text)) for text in TEXTS] == numbers
-    assert [index.genes[number] for number in numbers] == genes
-
-
 def test_equal_parts_of_genes_are_one_object():
     index = GeneIndex(constraint("none"), (Lagged(0, 0), Lagged(0, 1)), structure=phi)
     texts = "phi1(q2(u(k-1)), u(k-1))*y(k-1)", "tanh(phi1(q2(u(k-1)), u(k-1)))", "q2(u(k-1))"
@@ -53,17 +43,3 @@ def test_numbers_of_genes_remain_when_the_table_grows():
     assert index.table.repaired.size > room
     assert index.table.arity.size > 64
     assert [index.number_gene(parse(plain(gene))) for gene in genes] == numbers
-
-
-def test_order_of_terms_does_not_depend_on_the_order_of_insertion():
-    orders = []
-    for texts in (TEXTS, TEXTS[::-1]):
-        index = make_index()
-        numbers = [index.index_of(parse(text)) for text in texts]
-        structures = np.array([[*numbers[:2], *numbers[3:]], [numbers[1], ZERO, ZERO, numbers[0]]])
-        given = index.sort_by_content(structures)
-        assert given.lengths.tolist() == [4, 2]
-        rows = zip(given.terms.tolist(), given.lengths.tolist(), strict=True)
-        orders.append([[item.text for item in index.regressors(row[:length])] for row, length in rows])
-    assert orders[0][0] == orders[1][0]
-    assert [set(order[1]) < set(order[0]) for order in orders] == [True, True]

@@ -1,6 +1,5 @@
 """Tournament selection."""
 
-from collections import Counter
 from math import inf, isfinite, nan
 
 import numpy as np
@@ -39,15 +38,6 @@ def winners(among, count, contestants, draw):
     return [among[place] for place in found]
 
 
-def test_fittest_of_many_contestants_wins():
-    assert [each.fitness for each in winners(pool(3.0, 1.0, 2.0), 3, 60, stream())] == [1.0] * 3
-
-
-def test_tournament_of_one_contestant_is_a_uniform_draw():
-    counted = Counter(each.fitness for each in winners(pool(3.0, 1.0, 2.0), 3000, 1, stream()))
-    assert all(abs(count - 1000) < 4 * (3000 * 2 / 9) ** 0.5 for count in counted.values())
-
-
 @pytest.mark.parametrize("contestants", [2, 3, 5])
 def test_best_individual_wins_as_often_as_drawn(contestants):
     """With replacement its probability to be among k contestants is 1 - (1 - 1/n)^k."""
@@ -69,17 +59,6 @@ def test_tournaments_take_one_draw_per_contestant():
         drawn = [other.choice(among) for _ in range(4)]
         assert each is min(drawn, key=lambda contestant: contestant.fitness)
     assert draw.randrange(10**9) == other.randrange(10**9)
-
-
-def test_zero_tournaments_take_no_draw():
-    draw = stream()
-    assert winners(pool(1.0), 0, 3, draw) == []
-    assert draw.randrange(10**9) == stream().randrange(10**9)
-
-
-def test_nan_counts_as_the_worst_fitness():
-    assert Individual((Lagged(0),), fitness=nan).fitness == inf
-    assert winners(pool(nan, 7.0, nan), 1, 60, stream())[0].fitness == 7.0
 
 
 seeds = st.integers(0, 2**32 - 1)
@@ -129,11 +108,3 @@ def test_winners_do_not_depend_on_abandoned_individuals(drawn, count, contestant
         if all(fitness[place] > threshold for place in met):
             needed |= {place for place in met if abandoned[place]}
     assert sorted(evaluated) == sorted(needed)
-
-
-def test_contestant_at_the_threshold_beats_abandoned_contestants():
-    assert set(run([2.0, inf], [False, True], 20, 60, stream(), 2.0, expect_no_evaluation)) == {0}
-
-
-def test_known_failure_is_never_evaluated_again():
-    assert run([inf], [False], 3, 2, stream(), 1.0, expect_no_evaluation) == [0] * 3

@@ -1,8 +1,5 @@
 """Search for state spaces on islands: determinism, elite, migration and storage."""
 
-import pickle
-from dataclasses import replace
-
 import pytest
 
 from islands.estimation.fitted_state_space import FittedStateSpace
@@ -43,13 +40,6 @@ def test_the_number_of_threads_does_not_matter(problem, archipelagos):
     assert evolution.step(island) == problem.open(threads=3).step(island)
 
 
-def test_islands_and_seeds_have_different_populations(problem):
-    evolution = problem.open()
-    first = [evolution.first_generation(*each)[0].population for each in ((0, 5), (1, 5), (0, 6))]
-    assert first[0] != first[1]
-    assert first[0] != first[2]
-
-
 def test_a_search_that_continues_has_the_same_islands(problem, archipelagos):
     continued = SerialEngine().run(problem, archipelagos[1], never_stop)
     assert [each.archipelago for each in continued] == archipelagos[2:]
@@ -63,24 +53,11 @@ def test_the_error_of_the_fittest_never_increases(archipelagos):
         assert least[-1] < least[0]
 
 
-def test_migrants_of_the_other_island_are_in_the_elite(problem, archipelagos):
-    alone = replace(problem, settings=replace(SETTINGS, topology="isolated"))
-    isolated = [each.archipelago for each in SerialEngine().run(alone, empty_archipelago(2, 5), never_stop)]
-    assert isolated[1] == archipelagos[1]
-    assert isolated[2] != archipelagos[2]
-
-
 def test_a_checkpoint_has_every_number_of_the_islands(archipelagos):
     text = checkpoint_text(archipelagos[-1], {"seed": 5})
     read, about = archipelago_from_document(text, "a checkpoint")
     assert read == archipelagos[-1]
     assert about == {"seed": 5}
-
-
-def test_a_problem_can_be_pickled(problem, archipelagos):
-    copy = pickle.loads(pickle.dumps(problem))
-    island = archipelagos[0].islands[0]
-    assert copy.open().step(island) == problem.open().step(island)
 
 
 def test_the_model_of_an_individual_is_that_of_the_record(problem, archipelagos):

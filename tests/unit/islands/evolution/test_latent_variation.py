@@ -8,7 +8,7 @@ import pytest
 from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import fit_linear_systems
 from islands.evolution import latent_variation
-from islands.evolution.latent_variation import MOST_UNITS, begin_system, cross, mutate
+from islands.evolution.latent_variation import begin_system, cross, mutate
 from islands.models.unit_functions import parse_unit
 from islands.progress import Steps
 from support.latent_systems import spring_record
@@ -50,18 +50,6 @@ def test_a_unit_of_the_same_system_has_the_same_argument(data, system):
     assert blocks["W"][2] == pytest.approx(blocks["W"][place], rel=1e-6, abs=1e-9)
     assert blocks["s"][2] == pytest.approx(blocks["s"][place], rel=1e-6, abs=1e-9)
     assert blocks["E"][:, 2] == pytest.approx(0.5 * blocks["E"][:, place], rel=1e-6, abs=1e-9)
-
-
-def test_a_unit_of_another_order_reads_the_states_of_the_system(data, linear, system):
-    draft = cross(linear[2], system, data, "auto", np.random.default_rng(0))
-    assert (draft.layout.order, len(draft.units)) == (3, 1)
-    assert draft.estimate(data).mean_square < linear[2].mean_square
-
-
-def test_a_crossover_needs_a_unit_and_room(data, linear, system):
-    assert cross(system, linear[1], data, "auto", np.random.default_rng(0)) is None
-    full = begin_system(linear[0], ("tanh",) * MOST_UNITS, "auto", np.random.default_rng(0)).estimate(data)
-    assert cross(full, system, data, "auto", np.random.default_rng(0)) is None
 
 
 @pytest.mark.parametrize(
@@ -114,12 +102,6 @@ def test_offspring_have_the_zeros_of_the_structure(data, linear, structure, name
     for draft in drafts:
         block = draft.layout.split(draft.free)[name]
         assert not (block[:, : draft.layout.order] if name == "W" else block).any()
-
-
-def test_equal_seeds_give_equal_drafts(system):
-    one, other = (mutate(system, "auto", np.random.default_rng(7)) for _ in range(2))
-    assert np.array_equal(one.theta, other.theta)
-    assert one.units == other.units
 
 
 def test_functions_grow_to_trees_and_shrink_again():

@@ -4,7 +4,6 @@ import pickle
 from dataclasses import replace
 from itertools import pairwise
 
-import numpy as np
 import pytest
 
 from islands.evolution.evaluation import Evaluator, Limits
@@ -44,17 +43,6 @@ def test_step_from_individuals_equals_the_step_from_arrays(evaluator, islands):
         for other in (before, replace(before, population=tuple(before.population))):
             assert repr(step(other, small)) == repr((after, info))
         assert repr(found) == repr(after)
-
-
-def test_individuals_as_arrays_are_those_of_the_offspring(evaluator, islands):
-    population = islands[-1].population
-    arrays, read = population.parents, evaluator.read(tuple(population))
-    assert read.places.tolist() == arrays.places.tolist()
-    assert read.fitness.tolist() == arrays.fitness.tolist()
-    assert read.abandoned.tolist() == arrays.abandoned.tolist()
-    for row, (gene, length) in enumerate(zip(*read.genes, strict=True)):
-        assert gene[:length].tolist() == arrays.genes.genes[row, :length].tolist()
-    assert np.unique(arrays.places).size < len(population)
 
 
 def test_generation_makes_only_the_individuals_that_may_enter_elite_or_hall():

@@ -1,14 +1,11 @@
 """Presets: the settings of the paper, parsed from its printed lists."""
 
-from dataclasses import asdict, fields
+from dataclasses import asdict
 
 import pytest
 
-from islands.evolution.presets import AUTO, PRESETS, common_settings, resolve_kinds
+from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
-from islands.expressions.parsing import parse
-from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Apply, height
 
 #: Sections 6.1 and 6.2 and Appendix A, as printed (the fitness function's sentence is shortened).
 CASE_1 = (
@@ -66,25 +63,11 @@ def test_paper_presets_have_the_printed_numbers(preset, printed):
         assert made[setting] == read(text.strip()), name
 
 
-@pytest.mark.parametrize("preset", ["paper-case1", "paper-case2"])
-def test_paper_cases_are_constrained_and_not_seeded(preset):
-    made = PRESETS[preset]
-    assert (made.structure, made.constraints, made.fitness) == ("phi", "hysteresis", "shooting")
-    assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
-
-
 @pytest.mark.parametrize("preset", ["paper-appendix", "paper-appendix-s2"])
 def test_paper_appendix_minimises_the_one_step_error_of_polynomials(preset):
     made = PRESETS[preset]
     assert (made.structure, made.constraints, made.fitness) == ("free", "none", "one-step")
     assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
-
-
-@pytest.mark.parametrize("preset", [name for name in PRESETS if name.startswith("paper")])
-def test_paper_presets_complete_the_paper_by_the_toolbox_of_its_authors(preset):
-    made = PRESETS[preset]
-    assert (made.tournament, made.distinct, made.niches) == (2, True, False)
-    assert (made.overlong, made.prune_copies) == ("parent", False)
 
 
 def test_paper_presets_differ_only_in_the_printed_settings():
@@ -109,33 +92,3 @@ def test_presets_with_a_constraint_have_primitives_that_meet_it(preset):
         assert made.structure != "free"
         assert {"phi1", "phi2"} <= set(made.primitives)
         assert not {"sub", "sign"} & set(made.primitives)
-
-
-def test_all_documented_presets_exist():
-    assert {"paper-case1", "paper-case2", "paper-appendix", "hysteresis", "narx"} <= set(PRESETS)
-
-
-def test_presets_are_immutable():
-    with pytest.raises(TypeError):
-        PRESETS["paper-case1"] = Settings()
-    with pytest.raises(AttributeError):
-        PRESETS["paper-case1"].population = 3
-
-
-def test_phi_functions_are_single_nodes_with_two_arguments():
-    """If back-shifts count, model (13) of the paper has a height of exactly 5."""
-    assert PRIMITIVES["phi1"].arity == PRIMITIVES["phi2"].arity == 2
-    gene = parse("phi2(q5(q5(q4(u(k-1)))), q5(q5(q1(u(k-1)))))")
-    assert isinstance(gene, Apply)
-    assert height(gene) == 4
-
-
-def test_common_settings_do_not_depend_on_the_record():
-    assert common_settings("narx") == {
-        each.name: getattr(PRESETS["narx"], each.name) for each in fields(Settings)
-    }
-    kinds = resolve_kinds({}).values()
-    common = common_settings(AUTO)
-    assert all(getattr(kind, name) == value for kind in kinds for name, value in common.items())
-    assert "tolerance" in common
-    assert not {"library", "structure"} & common.keys()

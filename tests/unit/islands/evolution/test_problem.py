@@ -12,8 +12,7 @@ from islands.evolution.individual import make_regressor
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.settings import ISLAND_PROFILES, Settings
 from islands.expressions.parsing import parse
-from islands.expressions.printing import plain
-from islands.expressions.tree import Apply, height, walk
+from islands.expressions.tree import Apply, walk
 from islands.models.candidate_library import candidates
 from islands.models.narx import canonical_order
 from islands.records.dataset import Dataset
@@ -29,11 +28,6 @@ def record(**changes):
     for k in range(2, 400):
         y[k] = y[k - 1] + (u[k - 1] - u[k - 2]) * (0.8 - 0.1 * u[k - 1] ** 2)
     return Dataset(u, y + 1e-3 * rng.normal(size=400), 0.1, **changes)
-
-
-def test_problem_without_a_library_has_no_seeds_and_no_pool():
-    search_problem = make_problem(record(), Settings())
-    assert (search_problem.seeds, search_problem.pool) == ((), ())
 
 
 def test_pool_is_the_library_and_seeds_are_its_forward_selection():
@@ -72,21 +66,6 @@ def test_with_phi_replaces_differences_of_one_input(canonical, written):
     assert make_regressor(parse(written)) == make_regressor(parse(canonical))
 
 
-@pytest.mark.parametrize(
-    ("max_height", "pool"), [(0, ["y(k-1)"]), (1, ["y(k-1)", "phi1(u(k-1), u(k-2))", "phi1(u(k-2), u(k-3))"])]
-)
-def test_regressors_above_the_height_limit_are_left_out_of_the_library(max_height, pool):
-    setting = replace(SETTINGS, max_height=max_height, initial_height=0)
-    search_problem = make_problem(record(), setting)
-    assert sorted(plain(gene) for gene in search_problem.pool) == sorted(pool)
-    assert all(height(gene) <= max_height for genes in search_problem.seeds for gene in genes)
-
-
-def test_seeds_have_at_most_max_terms_genes():
-    search_problem = make_problem(record(), replace(SETTINGS, max_terms=3, initial_terms=(1, 3)))
-    assert [len(genes) for genes in search_problem.seeds] == [1, 2, 3]
-
-
 def test_profiles_are_assigned_to_the_islands_in_turn():
     search_problem = Problem(record(), Settings(islands=5, characters=("plain", "explorer", "pruner")))
     plain_, explorer, pruner = (
@@ -102,11 +81,6 @@ def test_profiles_are_assigned_to_the_islands_in_turn():
         explorer,
     ]
     assert len({plain_, explorer, pruner}) == 3
-
-
-def test_islands_without_profiles_have_equal_settings():
-    search_problem = Problem(record(), Settings(islands=3))
-    assert all(search_problem.settings_of(island) == search_problem.settings for island in range(3))
 
 
 def test_too_large_library_and_incomplete_record_raise_an_error():

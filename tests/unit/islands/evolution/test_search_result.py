@@ -3,10 +3,8 @@
 import itertools
 from math import nan
 
-import pytest
-
 import islands
-from islands.evolution.search_result import SearchStatistics, rank_models
+from islands.evolution.search_result import rank_models
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 
@@ -50,20 +48,3 @@ def test_ties_are_broken_by_size_and_then_by_text():
         entry(0.1, terms=("u(k-1)",)), entry(0.1, terms=("u(k-2)",)), entry(0.1, terms=("y(k-1)",))
     )
     assert_ranked_in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))
-
-
-def test_text_of_a_tie_includes_all_digits_of_the_parameters():
-    assert_ranked_in_any_order(
-        entry(0.1, theta=0.1), entry(0.1, theta=0.1 + 2e-17), entry(0.1, theta=0.30000000000000004)
-    )
-
-
-def test_ranking_of_no_models_is_empty():
-    assert rank_models(()) == ()
-
-
-def test_evaluations_per_second_is_none_without_a_wall_time():
-    search = SearchStatistics(8, {"ok": 8}, {"candidates": 10, "bytes": 800})
-    assert search.evaluations_per_second is None
-    timed = SearchStatistics(8, {"ok": 8}, {"candidates": 10, "bytes": 800}, wall_s=0.5)
-    assert timed.evaluations_per_second == pytest.approx(16.0)

@@ -49,25 +49,6 @@ def test_history_keeps_the_first_and_last_of_equal_consecutive_points(epochs):
 
 
 @given(EPOCHS)
-def test_only_the_last_point_of_a_history_is_replaced(epochs):
-    """A store can append the other points once."""
-    before = ()
-    for state in states(epochs):
-        assert state.history[: len(before)] == before
-        before = state.history[:-1]
-
-
-@given(EPOCHS)
-def test_counts_include_points_that_are_not_kept(epochs):
-    generations = len(complete(epochs))
-    *_, last = states(epochs)
-    assert last.evaluations == 20 * generations == last.history[-1].evaluations
-    assert last.duplicates == 6 * generations
-    assert last.outcomes == {"ok": 20 * generations}
-    assert last.history[-1].generation == generations - 1
-
-
-@given(EPOCHS)
 def test_history_does_not_depend_on_the_division_into_epochs(epochs):
     *_, cut = states(epochs)
     *_, whole = states([[pair for epoch in epochs for pair in epoch]])

@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from islands.estimation.forward_selection import forward_selection
 from islands.evolution import swap_search as module
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import with_phi
@@ -54,35 +53,12 @@ def test_exchange_of_one_gene_cannot_improve_the_best_structure(data, settings):
     assert min(same_size) >= (1.0 - 1e-3) * best.fitness
 
 
-def test_structures_of_a_size_are_ordered_distinct_and_at_most_depth():
-    found = swap_search(Evaluator(smooth(), SMOOTH), pool(SMOOTH), depth=7)
-    assert [each.size for population in found for each in population] == [
-        size for size, population in enumerate(found, start=1) for _ in population
-    ]
-    for population in found:
-        errors = [each.fitness for each in population]
-        assert errors == sorted(errors)
-        assert len({each.key for each in population}) == len(population) <= 7
-
-
 def test_search_over_pairs_equals_the_exhaustive_search():
     """From the best single gene, exchanges reach the best pair of this record."""
     settings = replace(SMOOTH, max_terms=2, initial_terms=(1, 2))
     evaluator, genes = Evaluator(smooth(), settings), pool(settings)
     pairs, _ = evaluator.evaluate([(Individual(pair), False) for pair in combinations(genes, 2)])
     assert swap_search(evaluator, genes)[1][0].fitness == min(each.fitness for each in pairs)
-
-
-def test_no_size_is_worse_than_its_start():
-    """The starts are the structures of forward selection, which minimises another error."""
-    library = candidates("phi-polynomial", 2, 3, 1)
-    selected = forward_selection(library, record(), "hysteresis", 4)
-    starts = [tuple(with_phi(item.expression) for item in structure) for structure in selected]
-    evaluator = Evaluator(record(), HYSTERESIS)
-    best = {population[0].size: population[0].fitness for population in swap_search(evaluator, [], starts)}
-    searched = {each[0].size: each[0].fitness for each in swap_search(evaluator, pool(HYSTERESIS), starts)}
-    assert len(best) >= 3
-    assert all(searched[size] <= fitness for size, fitness in best.items())
 
 
 def test_budget_of_evaluations_ends_the_search(monkeypatch):

@@ -13,17 +13,13 @@ from islands.evolution.settings import Settings
 from islands.evolution.variation import random_individuals, repair_genes
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.expressions.tree import Lagged, height, walk
 from islands.expressions.user_primitive import primitive
 from support.variation import (
     breed_compiled,
     breed_trees,
-    high_level_crossover,
     inner_mutation,
-    low_level_crossover,
     make_index,
     outer_mutation,
-    random_gene,
     random_genes,
 )
 
@@ -116,87 +112,7 @@ def test_kernel_draws_the_random_genes_of_the_first_population(name):
 # High-level crossover: whole genes.
 
 
-def test_high_level_crossover_cuts_parents_at_different_positions():
-    lengths = set()
-    for seed in SEEDS:
-        first, second = high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed))
-        lengths.add((len(first), len(second)))
-        # A child is the head of one parent and the tail of the other; no gene is changed or lost.
-        if len(first) + len(second) == 6:
-            assert sorted(texts(first + second)) == sorted(texts(LETTERS + NUMBERS))
-        head = next((place for place, gene in enumerate(first) if gene in NUMBERS), len(first))
-        assert first[:head] == LETTERS[:head] or first == LETTERS
-        assert first[head:] == NUMBERS[len(NUMBERS) - len(first) + head :]
-    # There are fifteen pairs of cuts, some of which leave no genes.
-    assert len(lengths) >= 7
-    assert max(first for first, _ in lengths) == 6
-    assert min(min(pair) for pair in lengths) >= 1
-
-
-def test_child_without_genes_is_replaced_by_the_parent():
-    """A cut before the first gene of one parent and after the last gene of the other leaves no genes."""
-    empty = []
-    for seed in SEEDS:
-        draw = stream(seed)
-        if (draw.randrange(5), draw.randrange(3)) == (0, 2):
-            empty.append(high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed)))
-    assert len(empty) > 5
-    assert set(empty) == {(LETTERS, NUMBERS + LETTERS)}
-
-
-def test_child_with_too_many_genes_is_truncated():
-    tight = replace(SETTINGS, max_terms=4, initial_terms=(1, 4))
-    for seed in SEEDS:
-        for child in high_level_crossover(LETTERS, NUMBERS, tight, stream(seed)):
-            assert 1 <= len(child) <= 4
-
-
-def test_parent_takes_the_place_of_a_child_with_too_many_genes():
-    tight = replace(SETTINGS, max_terms=4, initial_terms=(1, 4), overlong="parent")
-    replaced = 0
-    for seed in SEEDS:
-        expected = high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed))
-        children = high_level_crossover(LETTERS, NUMBERS, tight, stream(seed))
-        for child, whole, parent in zip(children, expected, (LETTERS, NUMBERS), strict=True):
-            assert child == (whole if len(whole) <= 4 else parent)
-            replaced += len(whole) > 4
-    assert replaced > 10
-
-
 # Low-level crossover: subtrees of one gene each.
-
-
-def test_low_level_crossover_exchanges_subtrees_of_one_gene_each():
-    one, other = genes("y(k-1)", "tanh(q1(u(k-1)))"), genes("q2(y(k-1)*u(k-1))")
-    seen = set()
-    for seed in SEEDS:
-        first, second = low_level_crossover(one, other, SETTINGS, stream(seed))
-        assert (len(first), len(second)) == (2, 1)
-        assert sum(a != b for a, b in zip(first, one, strict=True)) <= 1
-        # The children together have the leaves of the parents together.
-        before, after = (
-            Counter(plain(node) for gene in pair for node in walk(gene) if isinstance(node, Lagged))
-            for pair in (one + other, first + second)
-        )
-        assert before == after
-        seen.add((texts(first), texts(second)))
-    # Four nodes each give 16 pairs of positions.
-    assert (("y(k-1)", "tanh(q1(y(k-1)*u(k-1)))"), ("q2(u(k-1))",)) in seen
-    assert (("q2(y(k-1)*u(k-1))", "tanh(q1(u(k-1)))"), ("y(k-1)",)) in seen
-    assert len(seen) >= 14
-
-
-def test_child_above_the_height_limit_keeps_the_gene_of_its_parent():
-    tight = replace(SETTINGS, max_height=2, initial_height=2)
-    one, other = genes("tanh(q1(u(k-1)))"), genes("q2(y(k-1)*u(k-1))")
-    kept = 0
-    for seed in SEEDS:
-        first, second = low_level_crossover(one, other, tight, stream(seed))
-        free_first, free_second = low_level_crossover(one, other, SETTINGS, stream(seed))
-        assert first == (free_first if height(free_first[0]) <= 2 else one)
-        assert second == (free_second if height(free_second[0]) <= 2 else other)
-        kept += height(free_first[0]) > 2
-    assert kept > 20
 
 
 # Mutations.
@@ -262,31 +178,6 @@ def test_random_genes_use_all_leaves_functions_and_back_shifts():
         assert part in seen
     for part in ("q1(", "q3(", "phi", "k-2"):
         assert part not in seen
-
-
-def test_random_phi_functions_have_lags_of_inputs_as_arguments():
-    setting = replace(SETTINGS, structure="phi", primitives=("phi1",), shifts=(1,))
-    found = Counter(plain(random_gene(setting, 1, stream(seed))) for seed in range(2000))
-    phis = {text for text in found if text.startswith("phi1")}
-    assert {"phi1(u(k-1), q1(u(k-1)))", "phi1(q1(q1(u(k-1))), u(k-1))"} <= phis
-    assert not any("y" in text for text in phis)
-
-
-def test_phi_functions_of_free_genes_have_arbitrary_arguments():
-    setting = replace(SETTINGS, structure="free", primitives=("phi1",), shifts=(1,))
-    found = {plain(random_gene(setting, 1, stream(seed))) for seed in range(500)}
-    assert "phi1(y(k-1), u(k-1))" in found
-    assert any("phi1(phi1(" in text for text in found)
-    assert repair_genes((parse("phi1(y(k-1), u(k-1))"),), setting) == (parse("phi1(y(k-1), u(k-1))"),)
-
-
-def test_repair_adds_the_linear_output_if_the_constraint_needs_it():
-    constrained = replace(SETTINGS, constraints="hysteresis", structure="phi")
-    assert texts(repair_genes(NUMBERS, constrained)) == ("y(k-1)", "u(k-1)", "u(k-2)")
-    assert repair_genes(genes("u(k-1)", "q3(y(k-1))"), constrained) == genes("u(k-1)", "q3(y(k-1))")
-    full = genes(*(f"u(k-{lag})" for lag in range(1, 7)))
-    assert repair_genes(full, constrained) == (Lagged(0), *full[:5])
-    assert repair_genes(NUMBERS, replace(constrained, constraints="none")) == NUMBERS
 
 
 def test_repair_for_increment_structure_replaces_linear_outputs():

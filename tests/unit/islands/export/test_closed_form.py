@@ -1,6 +1,5 @@
 """Closed form of an extended simulation: its free run is the simulation."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -65,14 +64,6 @@ def test_the_free_run_is_the_simulation(core, effects, record):
     late = record.samples - run.y.size
     np.testing.assert_allclose(run.y[known], simulated[late:][known], rtol=1e-9, atol=1e-9)
     assert (found.dt, found.column_names, found.output_name) == (DT, ("u_V",), "y_um")
-
-
-def test_effects_add_up_over_nested_simulations(record):
-    inner = extended(CORES["model"], EFFECTS["output"])
-    spec = extended(json.loads(inner.model_dump_json(by_alias=True)), EFFECTS["input"])
-    simulated = simulate_spec(spec, record)
-    run = free_run(closed_form(spec), replace(record, y=simulated))
-    np.testing.assert_allclose(run.y[2:], simulated[2:], rtol=1e-9)
 
 
 @pytest.mark.parametrize(

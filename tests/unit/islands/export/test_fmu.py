@@ -12,9 +12,7 @@ from fmpy.validation import validate_fmu
 
 from islands.errors import ModelError
 from islands.export import write_export
-from islands.export.fmu import compile_library
 from islands.systems.published_models import PUBLISHED
-from support.block_cases import OF_STATES
 from support.exported_programs import needs_compiler
 from support.programs import HOSTILE_NAMES, model
 
@@ -99,17 +97,6 @@ def test_a_state_is_stored_and_set_again(session):
 
 
 @needs_compiler
-def test_a_reset_instance_begins_again_with_the_default_start_values(session):
-    session.set([3], [8.0])
-    session.start()
-    assert session.get([1]) == [4.0]
-    session.fmu.terminate()
-    session.fmu.reset()
-    session.start()
-    assert session.get([1]) == [0.0]
-
-
-@needs_compiler
 def test_a_long_communication_step_takes_several_samples_with_a_constant_input(session):
     session.set([3], [8.0])
     session.start()
@@ -142,17 +129,6 @@ def test_an_output_that_is_not_finite_is_an_error(session):
     session.step(np.inf, 0.125)
     with pytest.raises(fmpy.fmi1.FMICallException):
         session.step(1.0, 0.125)
-
-
-@needs_compiler
-@pytest.mark.parametrize("kind", FORMATS)
-def test_the_sources_compile_without_warnings(kind, tmp_path):
-    write_export(OF_STATES["several inputs"], kind, tmp_path / "model.fmu")
-    with zipfile.ZipFile(tmp_path / "model.fmu") as archive:
-        archive.extractall(tmp_path)
-    flags = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-    (source,) = (tmp_path / "sources").glob("fmi?.c")
-    compile_library(source, tmp_path / "library", flags)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -198,9 +174,3 @@ def test_a_column_name_is_a_variable_or_an_error(name, kind, tmp_path, monkeypat
 def test_a_model_without_a_sampling_time_is_refused(tmp_path):
     with pytest.raises(ModelError, match="no sampling time"):
         write_export(model({"u(k-1)": 1.0}), "fmu", tmp_path / "model.fmu")
-
-
-def test_two_columns_with_one_name_are_refused(tmp_path):
-    exported = replace(model({"u(k-1)": 1.0}), input_names=("y",), dt=0.1)
-    with pytest.raises(ModelError, match="the column 'y'"):
-        write_export(exported, "fmu", tmp_path / "model.fmu")

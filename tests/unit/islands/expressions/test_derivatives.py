@@ -63,14 +63,6 @@ def test_derivative_at_a_kink_is_nan(text):
     assert math.isnan(slopes(parse(text), u=0.0, y=0.0)[0])
 
 
-def test_constant_argument_at_a_kink_does_not_matter():
-    assert slopes(parse("y(k-1)*abs(u(k-1))"), u=0.0, y=2.0)[1] == 0.0
-
-
-def test_exponential_is_constant_where_it_is_clipped():
-    assert slopes(parse("exp(u(k-1))"), u=60.0)[0] == 0.0
-
-
 @pytest.mark.parametrize(("scale", "at"), [(1.0, 0.3), (100.0, -40.0)])
 def test_user_primitive_has_a_derivative_of_ten_digits(scale, at):
     softplus = islands.primitive("softplus", lambda a: math.log1p(math.exp(min(a, 50.0) / 100.0)))

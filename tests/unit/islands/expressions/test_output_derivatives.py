@@ -40,36 +40,12 @@ def test_each_primitive_has_the_derivative_along_a_direction(entry, output):
     assert found == pytest.approx(expected, rel=1e-14)
 
 
-def test_each_lag_has_its_own_derivative():
-    y1, y2, u1 = (SIGNALS[key] for key in ((0, 1), (0, 2), (1, 1)))
-    found = derivatives(make_regressor("y(k-1)^2*y(k-2)*tanh(y(k-2)*u(k-1))"))
-    curve = math.tanh(y2 * u1)
-    assert found == pytest.approx(
-        {1: 2 * y1 * y2 * curve, 2: y1**2 * (curve + y2 * u1 * (1 - curve**2))}, rel=1e-14
-    )
-
-
-def test_equal_products_are_merged():
-    ((lag, weight, factors),) = differentiate_by_outputs(make_regressor("y(k-1)^3*u(k-1)"))
-    assert (lag, weight, len(factors)) == (1, 3.0, 3)
-
-
-@pytest.mark.parametrize("text", ["u(k-1)*exp(u(k-2))", "sign(y(k-1))", "u(k-1)*sign(y(k-1) - y(k-2))"])
-def test_derivative_of_inputs_and_steps_is_zero(text):
-    assert differentiate_by_outputs(make_regressor(text)) == ()
-
-
 @pytest.mark.parametrize(
     ("text", "at_zero"), [("abs(y(k-1))", 0.0), ("sqrt(y(k-1))", 0.0), ("max(y(k-1), 0)", 0.5)]
 )
 def test_derivative_at_a_kink_is_finite(text, at_zero, monkeypatch):
     monkeypatch.setitem(SIGNALS, (0, 1), 0.0)
     assert derivatives(make_regressor(text)) == {1: at_zero}
-
-
-def test_exponential_is_constant_where_its_argument_is_clipped(monkeypatch):
-    monkeypatch.setitem(SIGNALS, (0, 1), 51.0)
-    assert derivatives(make_regressor("exp(y(k-1))")) == {1: 0.0}
 
 
 def test_derivative_of_a_primitive_of_the_user_is_not_known():

@@ -38,9 +38,3 @@ def test_parity_is_that_of_the_value(text, expected):
         assert there == pytest.approx(expected * here, rel=1e-14)
     else:
         assert abs(there) != pytest.approx(abs(here))
-
-
-def test_only_reversed_channels_count():
-    expression = parse("y(k-1)*u2(k-1)")
-    assert parity(expression, lambda channel: channel == 0) == -1
-    assert parity(expression, lambda channel: channel == 1) == 1

@@ -1,6 +1,5 @@
 """Text and tree of an equation convert to each other, and the text has the value of mathematics."""
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +8,7 @@ from islands.expressions.evaluation import evaluate
 from islands.expressions.parsing import parse_expression
 from islands.expressions.primitives import EQUATION_FUNCTIONS
 from islands.expressions.printing import render
-from islands.expressions.tree import Apply, Constant, Symbol, find_symbols
+from islands.expressions.tree import Apply, Constant, Symbol
 
 #: Trees as the parser makes them: a negative number is one number.
 LEAVES = st.one_of(
@@ -53,10 +52,3 @@ def test_expressions_have_the_value_of_mathematics(text: str, value: float) -> N
     tree = parse_expression(text)
     assert evaluate(tree, {"x": 2.0, "y": 3.0}) == pytest.approx(value)
     assert evaluate(parse_expression(render(tree)), {"x": 2.0, "y": 3.0}) == pytest.approx(value)
-
-
-def test_evaluation_accepts_arrays_and_values_of_rates() -> None:
-    tree = parse_expression("where(x > 0, x, rate(F))")
-    found = evaluate(tree, {"x": np.array([-1.0, 2.0]), "rate(F)": 5.0})
-    assert found.tolist() == [5.0, 2.0]
-    assert set(find_symbols(tree)) == {"x", "F"}

@@ -8,7 +8,6 @@ from islands.errors import ModelError
 from islands.expressions.parsing import parse, parse_expression, parse_formula
 from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SUB
 from islands.expressions.printing import (
-    LARGEST_POWER,
     EquationMathmlPrinter,
     EquationTextPrinter,
     at_rest,
@@ -138,16 +137,6 @@ def test_parse_error_names_the_unreadable_part(text, message):
         parse(text)
 
 
-def test_parser_accepts_the_largest_power():
-    assert len(parse(f"u(k-1)^{LARGEST_POWER}").arguments) == LARGEST_POWER
-
-
-def test_parser_refuses_a_function_missing_from_the_table():
-    table = {name: PRIMITIVES[name] for name in ("mul", "sub")}
-    with pytest.raises(ModelError, match=r"unknown function 'tanh': take one of mul, sub, or pass"):
-        parse("tanh(u(k-1))", table)
-
-
 @pytest.mark.parametrize(
     ("expression", "inputs", "text"),
     [
@@ -188,10 +177,6 @@ def test_latex_of_an_expression(text, written):
     assert latex(parse(text)) == written
 
 
-def test_latex_does_not_split_a_large_power():
-    assert latex(mul(*[U] * 243)) == "u_{k-1}^{243}"
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -223,12 +208,6 @@ def test_mathml_is_one_element_with_the_structure_of_the_expression(text: str, s
     tags = [each.tag for each in ElementTree.fromstring(f"<math>{written}</math>").iter()]
     assert len(ElementTree.fromstring(f"<math>{written}</math>")) == 1
     assert all(tag in tags for tag in shown)
-
-
-def test_a_difference_keeps_the_brackets_of_its_second_part() -> None:
-    written = EquationMathmlPrinter().write(parse_expression("a - (b + c)"))
-    assert written.count("<mo>(</mo>") == 1
-    assert "<mo>(</mo>" not in EquationMathmlPrinter().write(parse_expression("(a - b)/(c + d)"))
 
 
 def test_a_name_from_a_user_is_escaped() -> None:

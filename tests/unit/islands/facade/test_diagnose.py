@@ -60,14 +60,6 @@ def test_user_defined_effect_is_named(record: tuple[islands.Dataset, Signal]) ->
 
 
 @pytest.mark.ci
-def test_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Dataset, Signal]) -> None:
-    data, simulated = record
-    found = islands.diagnose(data, "column:theirs", columns={"theirs": simulated})
-    assert "thermal-gain" not in {each.name for each in found.candidates}
-    assert len(islands.EFFECTS) == len({effect.name for effect in islands.EFFECTS})
-
-
-@pytest.mark.ci
 def test_a_recorded_simulation_is_a_column_of_a_frame(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     frame = {"u": data.u[:, 0], "y": data.y, "theirs": simulated}
@@ -93,28 +85,6 @@ def test_function_simulator_is_diagnosed_like_the_function_of_a_file(
     same = islands.diagnose(data, f"python:{file}:proportional", effects=(THERMAL_GAIN,))
     assert [each.name for each in found.effects] == ["thermal-gain"]
     assert found.best.values.tolist() == same.best.values.tolist()
-
-
-class Stage(islands.Simulator):
-    """Amplifier with the methods that a simulator must have, and one parameter."""
-
-    name = "stage"
-    sites = frozenset((islands.Site.INPUT, islands.Site.OUTPUT))
-    parameters = (islands.Parameter("gain", "um/V", 0.8, 0.008),)
-
-    def simulate(self, values: Signal, x: Signal, *_further: object) -> Signal:
-        return values[0] * x
-
-
-@pytest.mark.ci
-def test_simulator_of_the_user_is_diagnosed_like_a_function(
-    record: tuple[islands.Dataset, Signal],
-) -> None:
-    data, _ = record
-    found = islands.diagnose(data, Stage(), effects=(THERMAL_GAIN,))
-    same = islands.diagnose(data, islands.function_simulator(_proportional), effects=(THERMAL_GAIN,))
-    assert [each.name for each in found.effects] == ["thermal-gain"]
-    assert found.best.values == pytest.approx(same.best.values, rel=1e-6)
 
 
 def test_simulator_of_the_user_derives_from_the_base_class(record: tuple[islands.Dataset, Signal]) -> None:

@@ -67,13 +67,6 @@ def test_ray_passes_its_address_and_its_cores(installed, choice, opened):
     assert OPENED[0] == opened
 
 
-def test_an_engine_object_is_used_as_it_is(installed):
-    mine = SerialEngine()
-    with open_engine(mine) as engine:
-        assert engine is mine
-    assert not OPENED
-
-
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -90,11 +83,6 @@ def test_an_engine_that_is_not_installed_is_named_in_one_line(installed, name, m
 def test_impossible_cores_of_ray_are_refused(arguments):
     with pytest.raises(islands.SettingsError, match="core"):
         islands.Ray(**arguments)
-
-
-def test_ray_is_installed_under_its_name():
-    (entry,) = engine_choice.entry_points(group=engine_choice.GROUP)
-    assert (entry.name, entry.value) == ("ray", "islands_service.engines:ray_engine")
 
 
 def test_the_typed_changes_of_a_preset_are_the_settings():

@@ -6,7 +6,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, unique_structures
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
-from islands.facade.final_models import completed_parts, screen
+from islands.facade.final_models import screen
 from islands.models.narx import make_model
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
@@ -42,14 +42,3 @@ def test_screening_keeps_the_structures_with_the_least_validation_error():
         for count in (1, 4):
             kept = screen(individuals, validation, warm_up, count)
             assert [each.key for each in kept] == expected[:count]
-
-
-def test_large_models_of_a_long_record_take_most_of_the_final_estimation():
-    """Of 20 000 samples, the first 11 of 15 sizes took 0.36 of the time."""
-    short, long = (completed_parts(range(1, 16), samples) for samples in (200, 20_000))
-    for parts in (short, long):
-        assert parts[0] == 0.0
-        assert parts == sorted(parts)
-        assert parts[-1] < 1.0
-    assert abs(short[11] - 11 / 15) < 0.05
-    assert 0.3 < long[11] < 0.5

@@ -10,7 +10,7 @@ import pytest
 import islands
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset
-from islands.report.documents.result_folder import record_document, result_document, result_json
+from islands.report.documents.result_folder import result_document, result_json
 from islands.report.figures.names import ALL_FIGURES
 from islands.report.text.statements import describe
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
@@ -73,16 +73,6 @@ def test_an_extrapolating_validation_is_a_warning_before_the_fit() -> None:
         islands.fit(data, validation=within, **settings)
 
 
-def test_models_are_ordered_by_error_and_have_ranks(result):
-    assert [model.rank for model in result.models] == [1, 2, 3, 4, 5]
-    assert result.best.model == result.models[result.recommendation.rank - 1].model
-    errors = [model.metrics["validation"]["free_run"].rmse for model in result.models]
-    assert errors == sorted(errors)
-    assert sorted(model.model.size for model in result.models) == [1, 2, 3, 4, 5]
-    sentences = describe(result_document(result.search_result))
-    assert " ".join(sentences[-1].split()) in " ".join(str(result).split())
-
-
 def test_model_simulates_a_record_in_three_modes(result):
     record, model = piezo(200, seed=9), result.best.model
     shooting = result.search_result.settings["shooting"]
@@ -111,9 +101,6 @@ def test_free_run_uses_measured_outputs_only_in_the_warm_up(result):
     assert np.array_equal(blind.y, result.best.simulate(record, warm_up=2).y, equal_nan=True)
     with pytest.raises(RecordError, match=r"missing at sample 2, .* a shorter warm-up"):
         result.best.simulate(with_output(record, y))
-
-
-KINDS = ("free-run", "loop", "hold", "residuals")
 
 
 def test_result_is_saved_as_a_folder(result, tmp_path):
@@ -149,28 +136,6 @@ def test_equal_arguments_give_equal_bits(result):
 # Validation data.
 
 
-def test_fraction_at_the_end_of_the_record_validates():
-    split = islands.fit(tank(), validation=0.1, library="polynomial", max_terms=2).search_result.split
-    assert (split.estimation.samples, split.validation.samples) == (360, 40)
-    assert np.array_equal(split.validation.y, tank().y[360:])
-
-
-def test_validation_record_does_not_affect_the_parameters_of_a_structure():
-    whole = islands.fit(tank(), validation=tank(150, seed=5), library="polynomial", max_terms=3)
-    other = islands.fit(tank(), validation=tank(150, seed=6), library="polynomial", max_terms=3)
-    described = whole.search_result.settings["validation"]
-    assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
-    assert whole.search_result.split.estimation.samples == 400
-    assert whole.search_result.split.validation.samples == 150
-    by_structure = [{m.model.regressors: m for m in made.models} for made in (whole, other)]
-    common = by_structure[0].keys() & by_structure[1].keys()
-    assert common
-    for structure in common:
-        assert by_structure[0][structure].model == by_structure[1][structure].model
-        errors = [entry[structure].metrics["validation"]["free_run"].rmse for entry in by_structure]
-        assert errors[0] != errors[1]
-
-
 def test_validation_data_need_the_same_inputs_and_sampling_time():
     record, renamed = piezo(), piezo(200, seed=1, input_names=("u_val_V",), output_name="y_val_um")
     made = islands.fit(record, library="phi-polynomial", validation=renamed, max_terms=2)
@@ -183,12 +148,6 @@ def test_validation_data_need_the_same_inputs_and_sampling_time():
 
 
 # Records of every kind.
-
-
-def test_model_of_one_term_is_fitted():
-    made = islands.fit(piezo(), library="phi-polynomial", max_terms=1)
-    assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
-    assert islands.fit(tank(), library="polynomial", max_terms=1).best.model.size == 1
 
 
 @pytest.fixture(params=["undrawn", pytest.param("drawn", marks=pytest.mark.ci)])
@@ -208,31 +167,6 @@ def test_constant_output_gives_a_model_of_one_term(tmp_path, drawing):
     assert "-" in row.split()
     assert "nan" not in str(made)
     made.save(tmp_path, figures=ALL_FIGURES)
-
-
-@pytest.mark.ci
-def test_models_that_diverge_one_step_ahead_are_ranked_last(tmp_path, drawing):
-    calm, u = tank(), tank().u.copy()
-    u[200] = 1e5
-    made = islands.fit(calm, validation=Dataset(u, calm.y, 1.0), library="polynomial", max_terms=6)
-    lost = [m for m in made.models if not m.assessment.outcomes["validation"]["one_step_ahead"]]
-    assert 0 < len(lost) < len(made.models)
-    assert [m.rank for m in lost] == list(range(len(made.models) - len(lost) + 1, len(made.models) + 1))
-    assert not any(m.residual_tests.passed for m in lost)
-    for kind in KINDS:
-        assert lost[0].plot(kind).axes
-    made.save(tmp_path, figures=ALL_FIGURES)
-
-
-@pytest.mark.ci
-def test_structures_without_estimates_are_counted_by_outcome():
-    # Nine samples give six rows after the warm-up, which suffice for five parameters.
-    held_out = tank(100, seed=1)
-    made = islands.fit(tank(9), validation=held_out, library="polynomial", max_terms=10, certificate=0)
-    outcomes = made.search_result.search.outcomes
-    assert set(outcomes) == {"ok", "too_few_rows"}
-    assert outcomes["ok"] >= len(made.models) == 5
-    assert sum(outcomes.values()) == made.search_result.search.evaluations
 
 
 # Progress.
@@ -277,11 +211,6 @@ def test_too_short_record_raises_an_error_with_advice(samples, error, message):
     with pytest.raises(error) as caught:
         islands.fit(tank(samples), library="polynomial")
     assert message in str(caught.value)
-
-
-@pytest.mark.ci
-def test_shortest_possible_record_is_fitted():
-    assert islands.fit(tank(24), library="polynomial").models
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(0, 0.003), pytest.param(4, 0.01, marks=pytest.mark.ci)])

@@ -81,18 +81,6 @@ def test_constraints_are_exact_for_terms_that_contribute_little(text):
         assert worst_residual(model, text) < 1e-15
 
 
-@pytest.mark.parametrize("text", [TRUE[0], TRUE[2], TRUE[5]])
-def test_correct_constraint_improves_the_parameters(text):
-    """Compare the errors of the parameters over records in which noise biases least squares."""
-    errors = {text: [], "none": []}
-    for seed in range(20):
-        data = make_record(150, seed)
-        for constraints, found in errors.items():
-            theta = estimate(terms(*LAW), data, constraints).model.parameters
-            found.append(np.linalg.norm(np.array(theta) - [0.6, 0.5, 0.3, 0.1]))
-    assert np.mean(errors[text]) < 0.95 * np.mean(errors["none"])
-
-
 def test_static_gain_is_that_of_a_simulated_step():
     text = "fixed-point = 1, 2.25; gain = 2.75 at 1, 2.25"
     model = estimate(terms(*LAW, "u(k-1)*y(k-1)"), make_record(), text).model
@@ -103,15 +91,6 @@ def test_static_gain_is_that_of_a_simulated_step():
     assert (levels[1] - levels[2]) / 0.002 == pytest.approx(2.75, rel=1e-5)
 
 
-def test_odd_model_reverses_its_free_run():
-    data = make_record()
-    result = islands.fit(data, library="polynomial", degree=3, lags=2, max_terms=5, constraints="odd")
-    for fitted in result.models:
-        run = free_run(fitted.model, data).y
-        reversed_run = free_run(fitted.model, Dataset(-data.u, -data.y, 1.0)).y
-        np.testing.assert_array_equal(run, -reversed_run)
-
-
 def test_term_with_the_wrong_sign_is_removed():
     data = make_record()
     free = estimate(terms(*LAW), data).model
@@ -119,34 +98,6 @@ def test_term_with_the_wrong_sign_is_removed():
     assert free.theta[2] > 0.0
     assert bound == estimate(terms(*(name for name in LAW if name != "u(k-2)")), data).model
     assert estimate(terms(*LAW), data, "[u(k-2)] >= 0").model == free
-
-
-def test_sign_holds_during_refinement():
-    """The free refinement crosses zero, the bounded one does not."""
-    data = make_record()
-    start = islands.make_model([(parse(name), 0.5 * theta) for name, theta in LAW.items()], dt=1.0)
-    start = start.with_parameters([*start.theta[:2], -0.2, start.theta[3]])
-    free, bound = (refine(start, data, None, text).model for text in ("none", "[u(k-2)] <= 0"))
-    assert free.theta[2] > 0.2
-    assert -0.2 < bound.theta[2] <= 0.0
-
-
-@pytest.mark.ci
-def test_every_model_of_a_fit_meets_its_constraints():
-    result = islands.fit(
-        make_record(), library="polynomial", degree=3, lags=2, max_terms=6, constraints=TRUE[2]
-    )
-    assert len(result.models) >= 3
-    for fitted in result.models:
-        assert [check.text for check in fitted.constraints] == ["gain = 2", "fixed-point = 1, 2.25"]
-        assert all(check.met for check in fitted.constraints)
-        assert worst_residual(fitted.model, TRUE[2]) < 1e-9
-
-
-def test_integrator_is_no_model_of_a_static_gain():
-    result = islands.fit(make_record(), library="polynomial", degree=1, lags=1, constraints="gain = 2")
-    assert result.search_result.search.outcomes["infeasible"] == 1
-    assert [fitted.model.size for fitted in result.models] != [1]
 
 
 #: Settings with which a search takes a fraction of a second and has few seeds.
@@ -180,12 +131,6 @@ def test_every_identified_model_meets_its_constraints(text):
             assert worst_residual(fitted.model, text) < 1e-9
     outcomes = result.search_result.search.outcomes
     assert outcomes["ok"] + outcomes.get("abandoned", 0) > 0.5 * sum(outcomes.values())
-
-
-@pytest.mark.ci
-def test_search_under_constraints_can_be_repeated():
-    first, again = (islands.identify(make_record(), **SEARCH, constraints=TRUE[5]) for _ in range(2))
-    assert [fitted.model for fitted in first.models] == [fitted.model for fitted in again.models]
 
 
 def test_statement_that_the_record_does_not_fit_raises_settings_error():

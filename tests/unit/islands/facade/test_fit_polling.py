@@ -8,7 +8,6 @@ from time import process_time
 import pytest
 
 import islands
-from islands.facade.coupled.identification import StoppedCouplingError
 from islands.progress import Stop, StoppedError
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
@@ -53,38 +52,6 @@ def test_stop_function_is_called_at_least_every_second(name: str) -> None:
     calls.append(process_time())
     gaps = [after - before for before, after in pairwise(calls)]
     assert max(gaps) < LONGEST
-
-
-@pytest.mark.ci
-def test_stopped_search_of_several_outputs_keeps_its_results() -> None:
-    calls: list[None] = []
-
-    def count_results(last: int) -> int:
-        """Return the number of outputs with models after a stop at a call; 3 for a coupled model."""
-        calls.clear()
-
-        def stop() -> bool:
-            calls.append(None)
-            return len(calls) >= last
-
-        try:
-            found = RUNS["fit_coupled"](400, stop)
-        except StoppedCouplingError as stopped:
-            return sum(bool(result.best.equation) for result in stopped.found)
-        except StoppedError:
-            return 0
-        assert isinstance(found, islands.CoupledResult)
-        assert found.equation
-        assert bool(found.left_out) == (last < total)
-        return 3
-
-    total = 10**9
-    assert count_results(total) == 3
-    total = len(calls) + 1
-    # The first quarter of the calls is that of the separate fits.
-    kept = [count_results(1 + int(part * (total - 2))) for part in (0.0, 0.15, 0.3, 0.6, 1.0)]
-    assert kept == sorted(kept)
-    assert {0, 1, 3} <= set(kept)
 
 
 def test_search_that_is_stopped_before_its_first_step_has_no_result() -> None:

@@ -36,17 +36,6 @@ def test_noise_of_the_measured_output_adds_no_terms():
     assert exact >= 9
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.003])
-def test_least_squares_is_kept_under_noise_of_the_equation(noise):
-    record = drive(3, equation_noise=noise)
-    found, squares = (
-        islands.fit(record, **SETTINGS),
-        islands.fit(record, estimator="least-squares", **SETTINGS),
-    )
-    assert found.best.model == squares.best.model
-    assert [each.model for each in found.models] == [each.model for each in squares.models]
-
-
 def test_a_stop_leaves_the_refinement_out():
     stages = []
 

@@ -42,17 +42,6 @@ def test_time_left_is_never_constant_while_time_passes(name):
     assert not find_standstills(replay(name))
 
 
-def test_a_longer_search_has_a_larger_share():
-    def share(generations):
-        phases = identification_phases(AUTO, 1000, Settings(generations=generations))
-        return next(phase.share for phase in phases if phase.beginning == "search") / sum(
-            phase.share for phase in phases
-        )
-
-    assert share(10) < share(100) < share(10_000)
-    assert share(10_000) > 0.9
-
-
 @pytest.mark.parametrize(
     "phases", [identification_phases("narx", 1000, Settings(), ("a", "b")), fit_phases(AUTO, ("a", "b"))]
 )

@@ -1,4 +1,3 @@
-import json
 import shlex
 
 import numpy as np
@@ -6,7 +5,6 @@ import pytest
 
 import islands
 from islands.cli.options import columns
-from islands.records.inspection.findings import SCHEMA
 from islands.records.reading.options import ReadingOptions
 from islands.report.text.inspection import WIDTH, format_inspection
 from support.known_records import delay, lag, measure, steps
@@ -97,19 +95,6 @@ def test_the_suggested_command_can_read_the_record(tmp_path, change, option):
     assert islands.read_record(file, ["u_V"], "y_um", **repair).samples > 1400
 
 
-def test_a_record_in_memory_has_the_same_facts(tmp_path):
-    file = write(tmp_path / "r.csv")
-    record = islands.read_record(file, ["u_V"], "y_um")
-    assert islands.inspect_record(record).facts == islands.inspect_record(file).facts
-
-
-def test_the_document_is_json(tmp_path):
-    found = islands.inspect_record(write(tmp_path / "r.csv", drop=[50]))
-    document = json.loads(json.dumps(found.as_document(), allow_nan=False))
-    assert document["schema"] == SCHEMA
-    assert {fact["name"] for fact in document["facts"]} >= {"dead-time", "rest", "noise"}
-
-
 def test_text_has_80_columns(tmp_path):
     long = "t_s,u_" + "very_long_name_" * 5 + "V,y_um"
     for options in ({}, {"header": long}, {"drop": range(100, 900, 50)}):
@@ -117,19 +102,6 @@ def test_text_has_80_columns(tmp_path):
         lines = [line for line in text.splitlines() if "very_long" not in line and str(tmp_path) not in line]
         assert max(map(len, lines)) <= WIDTH
         assert "Next:" in text
-
-
-def test_a_column_of_dates_is_read_with_that_of_the_time_of_day(tmp_path):
-    """It was stated as unusable, with the advice to rename it."""
-    lines = ["Datum;Uhrzeit;u;y"]
-    lines += [
-        f"0{2 + k // 30}.03.2026;{'23:59' if k < 30 else '00:00'}:{2 * (k % 30):02d};{k % 7};{k % 5}"
-        for k in range(60)
-    ]
-    (tmp_path / "r.txt").write_text("\n".join(lines) + "\n")
-    found = islands.inspect_record(tmp_path / "r.txt")
-    assert [(column.role, column.problem) for column in found.columns[:2]] == [("date", ""), ("time", "")]
-    assert found.sampling.dt == 2.0
 
 
 def test_a_remedy_makes_the_record_usable_and_has_no_problem_left(tmp_path):

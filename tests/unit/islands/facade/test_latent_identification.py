@@ -69,24 +69,6 @@ def test_a_saturation_of_the_input_is_found():
 
 
 @pytest.mark.ci
-def test_the_same_seed_gives_the_same_models(result):
-    again = identify(spring_record(400, noise=0.02))
-    assert [each.model for each in again.models] == [each.model for each in result.models]
-    assert again.search_result.search.history == result.search_result.search.history
-
-
-@pytest.mark.ci
-def test_a_search_that_continues_has_the_same_result(result):
-    states = []
-    identify(spring_record(400, noise=0.02), on_epoch=lambda state, _settings: states.append(state))
-    assert [state.archipelago.generation for state in states] == [0, 2, 4]
-    continued = identify(spring_record(400, noise=0.02), start=states[1])
-    assert [each.model for each in continued.models] == [each.model for each in result.models]
-    with pytest.raises(SettingsError, match="another seed"):
-        identify(spring_record(400, noise=0.02), start=states[1], seed=1)
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(("structure", "absent"), [("wiener", "e"), ("hammerstein", "w"), ("feedback", "f")])
 def test_a_structure_has_its_zeros(structure, absent):
     found = identify(saturated_record(400, 1), structure=structure)
@@ -94,14 +76,6 @@ def test_a_structure_has_its_zeros(structure, absent):
     for each in found.models:
         assert not any(name.startswith(absent) for name in each.model.names)
         assert np.isfinite(rmse(each.model, saturated_record(300, 7)))
-
-
-@pytest.mark.nightly
-def test_a_fit_of_latent_models_has_the_models_of_the_preset():
-    record = spring_record(160, noise=0.02)
-    fitted, searched = islands.fit(record, model="latent"), identify_record(record, preset="latent")
-    assert [each.model for each in fitted.models] == [each.model for each in searched.models]
-    assert (fitted.settings["method"], searched.settings["method"]) == ("fit", "identify")
 
 
 @pytest.mark.ci

@@ -1,13 +1,10 @@
 """Constraints of latent models: they hold in every model of a result, which states them."""
 
-from dataclasses import replace
-
 import pytest
 
 import islands
 from islands.errors import SettingsError
 from islands.facade.identify import identify_record
-from islands.simulation.predictors import free_run
 from support.latent_systems import spring_record
 
 #: A search that takes a second.
@@ -38,14 +35,6 @@ def test_every_model_meets_the_constraints_before_and_after_a_refit(result):
 
 
 @pytest.mark.ci
-def test_quantities_are_those_at_the_stated_gain(result):
-    for each in result.models:
-        assert each.model.operating_inputs == (0.0,)
-        gain = each.model.linearise(each.model.rest).static_gains
-        assert gain == pytest.approx([0.564], rel=1e-9)
-
-
-@pytest.mark.ci
 def test_a_saved_result_states_the_constraints(result, tmp_path):
     result.save(tmp_path, figures=())
     saved = islands.load(tmp_path)
@@ -57,52 +46,7 @@ def test_a_saved_result_states_the_constraints(result, tmp_path):
     assert f"so that they meet {KNOWN}." in " ".join((tmp_path / "method.txt").read_text("utf-8").split())
 
 
-@pytest.mark.ci
-def test_members_of_the_ensemble_meet_the_constraints(result):
-    drawn = 0
-    for structure in result.search_result.ensemble.structures:
-        for parameters in structure.parameters:
-            member = structure.model.with_parameters(parameters.tolist())
-            assert member.linearise(member.rest).static_gains == pytest.approx([0.564], rel=1e-9)
-        drawn += len(structure.parameters)
-    assert drawn > 10
-
-
-@pytest.mark.ci
-def test_an_odd_model_gives_the_reversed_output():
-    record = spring_record(400, noise=0.02)
-    record = replace(record, y=record.y - 0.3)
-    result = identify(record, constraints="odd", generations=4)
-    other = spring_record(300, seed=3)
-    assert any(each.model.units for each in result.models)
-    for each in result.models:
-        assert all(check.met for check in each.constraints)
-        reversed_record = replace(other, u=-other.u, y=-other.y)
-        runs = [free_run(each.model, data, each.model.memory).y for data in (other, reversed_record)]
-        assert runs[1] == pytest.approx(-runs[0], nan_ok=True)
-
-
-@pytest.mark.ci
-def test_a_fit_has_the_constraints_of_the_preset():
-    calls = iter(range(10_000))
-    found = islands.fit(
-        spring_record(160, noise=0.05),
-        model="latent",
-        structure="wiener",
-        constraints="gain = 0.5",
-        stop=lambda: next(calls) > 8,
-    )
-    assert found.settings["constraints"] == "gain = 0.5"
-    assert all(check.met for each in found.models for check in each.constraints)
-
-
-@pytest.mark.ci
-def test_statements_that_no_model_meets_are_an_error():
-    with pytest.raises(SettingsError, match="no latent model meets the constraints 'gain = 1; gain = 2'"):
-        identify(spring_record(200, noise=0.05), constraints="gain = 1; gain = 2")
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_models_that_cannot_meet_the_constraints_are_left_out_and_counted():
     # The slopes of a linear model are equal.
     text = "gain = 0.564 at 0, 0.3; gain = 0.4 at 1, 0.75"

@@ -81,7 +81,7 @@ def test_a_result_simulates_as_the_command(base, tmp_path, name, arguments):
     assert loaded.export("c") == succeed("show", folder, "--format", "c")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_diagnosis_simulates_as_the_command(base, tmp_path):
     folder, out = tmp_path / "diagnosis", tmp_path / "s.csv"
     succeed("diagnose", base / "r.csv", *COLUMNS, "--simulation", "linear:1", "--out", folder)

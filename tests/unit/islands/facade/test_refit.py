@@ -20,7 +20,7 @@ from islands.report.text.headlines import write_headline
 from islands.report.text.statements import describe
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.metrics import metrics
-from support.noisy_records import TERMS, TRUE, make_noisy_record
+from support.noisy_records import TERMS, make_noisy_record
 
 LAW = {"library": "polynomial", "degree": 2, "lags": 1, "max_terms": 3, "average": 1, "certificate": 0}
 
@@ -31,24 +31,6 @@ def fit_law(record, refit="all", **changes):
 
 def find_law(result):
     return next(each for each in result.models if tuple(each.model.equation().terms) == TERMS)
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("estimator", ["least-squares", "free-run"])
-def test_parameters_of_a_law_are_nearer_to_the_truth_and_less_uncertain(estimator):
-    ratios, distances = [], []
-    noise = {"least-squares": "equation", "free-run": "output"}[estimator]
-    for seed in range(12):
-        record = make_noisy_record(noise, seed, 900, 0.02)
-        found = find_law(fit_law(record, estimator=estimator, validation=0.5))
-        assert found.is_refitted
-        before = found.assessment.model
-        ratios.append(np.divide(found.model.standard_errors, before.standard_errors))
-        distances.append([np.abs(np.subtract(each.theta, TRUE)) for each in (before, found.model)])
-    # Standard errors fall with the square root of the number of samples, which is doubled.
-    assert (np.mean(ratios, axis=0) < 0.75).all()
-    before, after = np.mean(distances, axis=0)
-    assert (after < before).all()
 
 
 @pytest.mark.parametrize("estimator", ["", *ESTIMATORS])
@@ -102,16 +84,6 @@ def test_constraints_hold_after_a_refit(statements):
         assert each.model != each.assessment.model
         assert all(check.met for check in each.constraints)
         assert [check.value for check in each.constraints if "gain" in check.text] == [pytest.approx(3.0)]
-
-
-@pytest.mark.ci
-def test_identify_estimates_its_models_again():
-    record = make_noisy_record("output", 5, 600)
-    budget = {"preset": "narx", "population": 20, "generations": 2, "max_terms": 3, "shooting": 50}
-    without, found = (islands.identify(record, **budget, refit=refit) for refit in ("none", "all"))
-    assert [each.model for each in without.models] == [each.assessment.model for each in found.models]
-    assert any(each.is_refitted for each in found.models)
-    assert found.settings["refit"] == "all"
 
 
 @pytest.mark.nightly

@@ -29,11 +29,6 @@ def compiled(function):
     return njit(function)
 
 
-def test_literal_integers_share_one_version():
-    assert compiled(call_with_literals)(1.5, 4) == 1.5 * (2 + 3 + 4)
-    assert len(scale.callee.overloads) == 1
-
-
 def test_each_value_of_a_constant_has_its_version():
     assert compiled(call_with_constants)(1.5) == 8 * 1.5
     assert len(add_lanes.callee.overloads) == 2

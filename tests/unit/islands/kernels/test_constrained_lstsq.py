@@ -143,19 +143,6 @@ def test_estimate_ignores_the_data_if_every_term_is_a_pivot(route):
     assert estimated(route, psi, y, [2, 0, 1], [0.5, 4.0, 1.0]).tolist() == [-1.0, 0.25, 0.0]
 
 
-@every_route
-@given(st.permutations(range(5)), seeds)
-def test_estimate_does_not_depend_on_the_order_of_the_terms(route, order, seed):
-    psi, y = regression(5, seed=seed)
-    group, weight = np.array([0, 1, -1, 1, 0]), np.array([1.0, 2.0, 1.0, -1.0, 0.5])
-    order = list(order)
-    here, there = (
-        estimated(route, psi, y, group, weight),
-        estimated(route, psi[order], y, group[order], weight[order]),
-    )
-    assert here[order] == pytest.approx(there, rel=1e-10, abs=1e-10)
-
-
 # The pivots.
 
 
@@ -166,17 +153,6 @@ def test_pivot_of_a_group_has_the_largest_ratio_of_weight_to_norm():
     assert found.share.tolist() == pytest.approx([-1 / 6, 0.0, 1.0, -0.1 / 6, 1.0])
     assert found.fixed.tolist() == pytest.approx([0.0, 0.0, -1 / 6, 0.0, 0.0])
     assert found.free.tolist() == [0, 1, 3]
-
-
-def test_all_terms_are_free_without_groups():
-    found = reduced(np.eye(5))
-    assert found.pivot.tolist() == [-1] * 4
-    assert found.free.tolist() == [0, 1, 2, 3]
-    assert found.fixed.tolist() == [0.0] * 4
-
-
-def test_first_of_equal_members_is_the_pivot():
-    assert reduced(np.eye(4), [1, 1, 1], [2.0, -2.0, 2.0]).pivot.tolist() == [0, 0, 0]
 
 
 # Where the digits end.
@@ -307,50 +283,6 @@ def test_dependent_columns_are_refused(route, group):
 
 
 @every_route
-def test_equal_columns_whose_sum_is_fixed_are_refused(route):
-    psi, y = regression(3)
-    psi[2] = psi[1]
-    assert estimated(route, psi, y, [-1, 0, 0]) is None
-
-
-@every_route
 def test_fewer_rows_than_free_parameters_are_refused(route):
     psi, y = regression(5, rows=4)
     assert estimated(route, psi, y) is None
-
-
-@every_route
-def test_inputs_are_not_changed(route):
-    psi, y = regression(4)
-    gram = gram_of(psi, y)
-    program, rows = columns_as_record(psi, y)
-    given_ = [gram, *reduced(gram, [0, 0, -1, 1]), rows.signals]
-    before = [array.copy() for array in given_]
-    assert solved(route, gram, program, rows, parameter_reduction.Reduction(*given_[1:8])) is not None
-    for left, right in zip(given_, before, strict=True):
-        assert np.array_equal(left, right)
-
-
-@every_route
-def test_correction_does_not_change_an_accurate_result(route):
-    """The residual of an accurate result is orthogonal to the columns."""
-    psi, y = regression(4, rows=700)
-    group, weight = [0, -1, 0, -1], [1.0, 1.0, -2.0, 1.0]
-    theta = estimated(route, psi, y, group, weight)
-    S, _ = sums(group, weight)
-    normal = psi @ (y - theta @ psi)
-    assert np.abs(normal - S.T @ np.linalg.lstsq(S.T, normal, rcond=None)[0]).max() < 1e-11
-
-
-def test_gram_matrix_may_be_larger_than_the_terms():
-    psi, y = regression(3)
-    gram, larger = gram_of(psi, y), np.full((7, 7), np.nan)
-    larger[:4, :4] = gram
-    found = []
-    for matrix in (gram, larger):
-        reduction = parameter_reduction.reduce(
-            matrix, 3, np.array([0, -1, 0]), np.ones(3), np.array([1.0, 0.0, 1.0])
-        )
-        factor, eta = ConstrainedFactor(np.empty((2, 2)), np.empty(2)), np.empty(2)
-        found.append((from_gram(matrix, 3, reduction, factor, eta), *eta, *factor.scale))
-    assert found[0] == found[1]

@@ -120,33 +120,6 @@ def test_similar_candidates_keep_their_order_and_six_digits():
         assert [err for _, err in found] == pytest.approx([err for _, err in expected], rel=1e-6, abs=1e-9)
 
 
-@given(st.integers(0, 2**32 - 1), st.permutations(range(6)))
-def test_order_of_the_candidates_changes_only_their_indices(seed, order):
-    psi, y = problem(seed)
-    here = selected(gram_of(psi, y), 6)
-    there = selected(gram_of(psi[list(order)], y), 6)
-    same([(order[position], err) for position, err in there], here)
-
-
-def test_selection_does_not_change_the_gram_matrix():
-    gram = gram_of(*problem(2))
-    before = gram.copy()
-    selected(gram, 6)
-    pruned(gram, 6, 0.01)
-    assert np.array_equal(gram, before)
-
-
-def test_selection_is_empty_without_candidates_or_limit():
-    gram = gram_of(*problem(3))
-    assert selected(gram, 6, limit=0) == []
-    assert selected(np.array([[4.0]]), 0) == []
-    assert pruned(np.array([[4.0]]), 0, 0.0) == []
-
-
-def test_pruning_with_tolerance_one_leaves_nothing():
-    assert pruned(gram_of(*problem(4)), 6, 1.0) == []
-
-
 def null_space_columns(psi, y, group, sums, previous):
     """Return free positions, their columns and the target without the part that the constraints fix."""
     terms = len(psi)

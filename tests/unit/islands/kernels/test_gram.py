@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
@@ -84,14 +82,6 @@ def test_every_entry_is_the_inner_product_of_padded_columns_bit_for_bit(rows):
             assert found[i, j] == dot(one, 0, other, 0, one.size)
 
 
-@given(st.lists(st.integers(1, 600), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
-def test_summation_order_restarts_in_every_segment(rows, seed):
-    data = record(rows, seed)
-    psi = side_by_side(columns_of(TERMS, data), rows)
-    expected = [[dot(one, 0, other, 0, one.size) for other in psi] for one in psi]
-    assert np.array_equal(gram_of(TERMS, data), expected)
-
-
 @pytest.mark.parametrize("rows", ROWS)
 def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
     psi, found = columns_of(TERMS, record(rows)), gram_of(TERMS, record(rows))
@@ -101,32 +91,6 @@ def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
             assert abs(found[i, j] - math.fsum(products)) <= 1e-15 * math.fsum(map(abs, products))
 
 
-def test_gram_matrix_is_symmetric_and_positive_semidefinite():
-    found = gram_of(TERMS, record((10, 1, 700, 3)))
-    assert np.array_equal(found, found.T)
-    assert np.linalg.eigvalsh(found).min() > 0
-
-
-def test_entry_does_not_depend_on_the_other_terms():
-    data = record((300, 500))
-    together = gram_of(TERMS, data)
-    for i in range(len(TERMS)):
-        for j in range(len(TERMS)):
-            assert products_of([TERMS[i], TERMS[j]], data, [(0, 1)])[0] == together[i, j]
-
-
-place = st.integers(0, len(TERMS) - 1)
-
-
-@given(st.lists(st.tuples(place, st.lists(place, min_size=1, max_size=9)), min_size=1, max_size=6))
-def test_entry_does_not_depend_on_the_other_pairs(drawn):
-    """Neighbours that share their first term are computed four at a time, others alone."""
-    data = record((300, 40))
-    pairs = [(one, other) for one, others in drawn for other in others]
-    together = gram_of(TERMS, data)
-    assert products_of(TERMS, data, pairs).tolist() == [together[pair] for pair in pairs]
-
-
 def test_all_pairs_are_computed_if_several_passes_are_needed():
     data = record((5, 2))
     one = products_of(TERMS, data, SQUARE)
@@ -134,10 +98,6 @@ def test_all_pairs_are_computed_if_several_passes_are_needed():
     many = products_of(TERMS, data, np.tile(SQUARE, (repeats, 1)))
     assert many.size > 1 << 20
     assert np.array_equal(many, np.tile(one, repeats))
-
-
-def test_empty_list_of_pairs_gives_no_inner_products():
-    assert products_of(TERMS, record((5,)), np.empty((0, 2), np.int64)).size == 0
 
 
 @pytest.mark.parametrize("terms", [0, 3, 4, 7])

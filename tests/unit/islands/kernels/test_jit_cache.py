@@ -147,30 +147,6 @@ def test_second_process_loads_the_kernels_of_the_first_silently(request, kind):
     assert first["value"] == second["value"] == 1.5
 
 
-def test_kernel_divides_by_zero_without_exception_and_releases_the_gil(start):
-    code = """if True:
-        import json, toys
-        print(json.dumps([toys.ratio(1.0, 0.0) == float("inf"), toys.ratio.targetoptions["nogil"]]))
-    """
-    assert get_output(start(code)) == [True, True]
-
-
-def test_kernels_are_stored_in_the_users_cache_folder_by_default(start, tmp_path):
-    home = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "own"), "ISLANDS_CACHE_DIR": ""}
-    code = "import json, platformdirs; print(json.dumps(platformdirs.user_cache_dir('islands', False)))"
-    expected = Path(get_output(start(code, **home)))
-    assert Path(get_output(start(READY, **home))["folder"]).parent == expected / "kernels"
-    assert expected.is_relative_to(tmp_path)
-
-
-def test_cache_folder_is_named_after_the_processor(start, start_new):
-    here, haswell = get_output(start(READY)), get_output(start_new(READY, NUMBA_CPU_NAME="haswell"))
-    assert here["compiled"]
-    assert haswell["compiled"]
-    assert here["folder"] != haswell["folder"]
-    assert "-haswell-" in haswell["folder"]
-
-
 def test_processors_with_different_features_do_not_share_a_folder(start):
     plain = get_output(start(FOLDER, NUMBA_CPU_NAME="haswell"))
     wider = get_output(start(FOLDER, NUMBA_CPU_NAME="haswell", NUMBA_CPU_FEATURES="+avx2"))
@@ -232,16 +208,6 @@ def test_numba_cache_dir_applies_to_other_functions(start, tmp_path, users):
     assert Path(ours).is_relative_to(tmp_path / "cache")
 
 
-def test_functions_of_a_factory_are_cached_by_the_enclosed_number(start):
-    code = """if True:
-        import json, toys
-        adders = [toys.adder(amount) for amount in range(3)]
-        print(json.dumps([[add(10.0) for add in adders], [toys.hits(add) for add in adders]]))
-    """
-    assert get_output(start(code)) == [[10.0, 11.0, 12.0], [0, 0, 0]]
-    assert get_output(start(code)) == [[10.0, 11.0, 12.0], [1, 1, 1]]
-
-
 def test_concurrent_saves_lose_and_mix_nothing(start, tmp_path):
     # Each process pauses between reading and writing the index, as on a busy machine.
     save = """if True:
@@ -274,18 +240,6 @@ def test_concurrent_saves_lose_and_mix_nothing(start, tmp_path):
         print(json.dumps([one(10.0), two(10.0), hits(one), hits(two)]))
     """
     assert get_output(start(load)) == [11.0, 12.0, 1, 1]
-
-
-def test_second_cold_process_waits_for_the_first_and_loads(start, tmp_path):
-    # The compiling process continues only after the other one has reported that it waits.
-    both = [start(READY, "waiting"), start(READY, "waiting")]
-    found = sorted(map(get_output, both), key=lambda it: it["compiled"])
-    assert [each["compiled"] for each in found] == [False, True]
-    waited, compiled = found
-    assert ["waiting" in line for line in waited["messages"]] == [True]
-    assert ["compiling" in line for line in compiled["messages"]] == [True]
-    assert (waited["hits"], compiled["hits"]) == (1, 0)
-    assert waited["value"] == compiled["value"] == 1.5
 
 
 def test_killed_process_releases_the_lock_and_leaves_no_stamp(start, tmp_path):
@@ -344,16 +298,6 @@ def test_a_complete_folder_is_used_where_nothing_can_be_written(start, tmp_path)
     code = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + READY
     found = get_output(start(code, "never"))
     assert (found["compiled"], found["hits"], found["value"]) == (False, 1, 1.5)
-
-
-def test_kernel_that_cannot_be_saved_is_still_used(start, tmp_path):
-    code = """if True:
-        import json, shutil, toys
-        shutil.rmtree(toys.cache_folder())
-        toys.cache_folder().write_text("in the way")
-        print(json.dumps(toys.ratio(3.0, 2.0)))
-    """
-    assert get_output(start(code)) == 1.5
 
 
 @pytest.mark.parametrize("moment", ["before", "while", "after"])

@@ -1,7 +1,6 @@
 """Interpolation through six neighbours."""
 
 import numpy as np
-import pytest
 from numpy.polynomial import Polynomial
 
 from islands.kernels.lagrange import interpolate_at
@@ -18,8 +17,3 @@ def test_samples_are_exact_and_the_end_values_are_held():
     signal = np.random.default_rng(0).normal(size=20)
     found = interpolate_at(signal, np.array([-3.0, 0.0, 7.0, 19.0, 40.0]))
     np.testing.assert_array_equal(found, signal[[0, 0, 7, 19, 19]])
-
-
-@pytest.mark.parametrize("samples", [1, 2, 3])
-def test_a_constant_signal_is_constant_with_any_number_of_samples(samples):
-    assert interpolate_at(np.full(samples, 2.0), np.array([0.4])) == pytest.approx(2.0, rel=1e-15)

@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 import scipy
-from hypothesis import given
-from hypothesis import strategies as st
 
-from islands.kernels.linear_filter import divide_rows, filter_linearly, low_pass_cubic
-
-signals = st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=60).map(np.array)
+from islands.kernels.linear_filter import divide_rows, filter_linearly
 
 
 @pytest.mark.parametrize(("zeros", "poles"), [(0, 0), (1, 0), (0, 1), (1, 1), (0, 3), (2, 2), (4, 4)])
@@ -24,14 +20,6 @@ def test_a_filter_has_the_bits_of_scipy(zeros, poles, samples):
     assert np.array_equal(state, given_state)
 
 
-@given(signals, st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4).map(np.array), st.floats(0.0, 1.0))
-def test_a_low_pass_filters_the_weighted_neighbours(x, weights, decay):
-    seen = np.concatenate([[0.0], x - x[0], [x[-1] - x[0]]])
-    moved = np.convolve(seen, weights[::-1], mode="valid")
-    expected = np.append(x[0], scipy.signal.lfilter([1.0], [1.0, -decay], moved) + x[0])
-    assert np.array_equal(low_pass_cubic(x, weights, decay), expected)
-
-
 @pytest.mark.parametrize("series", [1, 3, 4, 6])
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_every_segment_of_every_series_is_divided_from_rest(series, order):
@@ -45,10 +33,3 @@ def test_every_segment_of_every_series_is_divided_from_rest(series, order):
     for first, last in zip([0, *ends[:-1]], ends, strict=True):
         expected = scipy.signal.lfilter([1.0], np.append(1.0, a), x[:, first:last])
         np.testing.assert_allclose(divided[:, first:last], expected, rtol=0, atol=1e-13)
-
-
-def test_bits_of_a_divided_series_do_not_depend_on_the_others():
-    rng = np.random.default_rng(0)
-    a, x, ends = np.array([-1.5, 0.7]), rng.normal(size=(7, 200)), np.array([80, 200])
-    alone = [divide_rows(a, x[row : row + 1], ends)[0] for row in range(7)]
-    assert np.array_equal(divide_rows(a, x, ends), alone)

@@ -5,8 +5,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import scipy
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.effects import hysteresis
@@ -55,10 +53,6 @@ def drag(_x, rate, _z, numbers):
 
 def state_force(_x, _rate, z, numbers):
     return numbers[0] * z
-
-
-def rate_integral(_x, rate, _z, _numbers):
-    return rate
 
 
 def leaky_integral(x, rate, z, numbers):
@@ -133,13 +127,6 @@ def test_linear_oscillator_matches_reference_solution() -> None:
     assert simulate(elements(), 2e-3) == pytest.approx(reference(lambda *_: 0.0, None, 0.0, 2e-3), abs=1e-8)
 
 
-def test_cubic_spring_matches_reference_solution() -> None:
-    parts = elements((cubic, None, -1.0, 0.0, (4e4,)))
-    known = reference(lambda x, _v, _z: 4e4 * x**3, None, 0.0, 2e-3)
-    assert simulate(parts, 2e-3) == pytest.approx(known, abs=1e-7)
-    assert np.max(np.abs(known - simulate(elements(), 2e-3))) > 0.01
-
-
 def test_hysteresis_element_matches_reference_solution() -> None:
     form, numbers = hysteresis.SECOND_HYSTERESIS.form, (60.0, 40.0, -15.0, 0.01)
     parts = elements((form.force, form.state_derivative, -1.0, 0.01, numbers))
@@ -163,41 +150,6 @@ def test_halving_the_step_divides_the_motion_error_by_sixteen() -> None:
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
 
 
-@given(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.1, 9.0))
-def test_motion_without_elements_is_linear_in_the_input(one: float, other: float, pitch: float) -> None:
-    def second(t):
-        return np.cos(pitch * t)
-
-    parts = elements()
-    combined = simulate(parts, 0.01, u=lambda t: one * input_force(t) + other * second(t))
-    superposition = one * simulate(parts, 0.01) + other * simulate(parts, 0.01, u=second)
-    assert combined == pytest.approx(superposition, abs=1e-12)
-
-
-def test_motion_restarts_from_the_given_state() -> None:
-    parts = elements((cubic, None, -1.0, 0.0, (4e4,)))
-    whole = simulate(parts, 0.01, interval=150, restart=(0.03, -0.4))
-    assert whole[150] == 0.03
-    assert np.array_equal(whole[:150], simulate(parts, 0.01)[:150])
-    later = simulate(parts, 0.01, seconds=2.5, u=lambda t: input_force(t + 1.5), start=(0.03, -0.4))
-    assert whole[150:300] == pytest.approx(later[:150], abs=1e-12)
-
-
-def test_element_state_is_kept_at_a_restart() -> None:
-    """The state integrates the rate of the whole motion, so the force is continuous at a restart."""
-    parts = elements((state_force, rate_integral, -1.0, 0.0, (30.0,)))
-    plain = simulate(parts, 0.005)
-    # Restart from the current position and rate: only the error of the rate differs.
-    t = 0.005 * np.arange(plain.size)
-    rate = float(np.gradient(plain, t)[401])
-    again = simulate(parts, 0.005, interval=401, restart=(float(plain[401]), rate))
-    assert again == pytest.approx(plain, abs=1e-4)
-    displaced = simulate(parts, 0.005, interval=401, restart=(float(plain[401]) + 0.02, rate))
-    # The state ignores the jump in position, so its spring has a different equilibrium afterwards.
-    known = 30.0 * 0.02 / (STIFFNESS + 30.0)
-    assert (displaced - plain)[-100:].mean() == pytest.approx(known, rel=0.2)
-
-
 def test_motion_is_nan_after_an_overflow() -> None:
     with np.errstate(all="ignore"):
         x = simulate(elements((cubic, None, -1.0, 0.0, (-1e9,))), 0.01)
@@ -216,13 +168,6 @@ def test_forces_along_a_motion_match_their_formulas() -> None:
     parts = elements((cubic, None, 1.0, 0.0, (2.0,)), (drag, None, -1.0, 0.0, (0.7,)))
     integrate_along(x, rate, dt, parts, found)
     assert found == pytest.approx(np.array([2.0 * x**3, -0.7 * rate]), abs=1e-13)
-
-
-def test_element_state_along_a_motion_starts_at_its_initial_value() -> None:
-    x, rate, dt = motion()
-    found = np.empty((1, x.size))
-    integrate_along(x, rate, dt, elements((state_force, rate_integral, 1.0, 0.4, (3.0,))), found)
-    assert found[0] == pytest.approx(3.0 * (0.4 + x - x[0]), abs=1e-12)
 
 
 def test_element_state_along_a_motion_matches_reference_solution() -> None:

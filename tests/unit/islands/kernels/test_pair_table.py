@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.kernels.pair_table import FREE, PLACE_BYTES, Pairs, clear, find_pair, pair_key, pair_table
+from islands.kernels.pair_table import FREE, PLACE_BYTES, Pairs, find_pair, pair_key, pair_table
 
 term = st.integers(0, 2**31 - 1)
 #: Small indices form the same pair more often, and their keys differ in few bits.
@@ -46,15 +46,6 @@ def test_table_behaves_as_a_dictionary_even_if_nearly_full(places, data):
             assert pairs.keys[find_pair(pairs, key)] == FREE
 
 
-def test_table_can_be_filled_except_for_one_place():
-    pairs = table(1024)
-    keys = [pair_key(one, other) for one in range(200) for other in range(one, 200)][: 1024 - 1]
-    for key in keys:
-        put(pairs, key, float(key % 1000))
-    assert np.count_nonzero(pairs.keys == FREE) == 1
-    assert [pairs.values[find_pair(pairs, key)] for key in keys] == [float(key % 1000) for key in keys]
-
-
 @pytest.mark.parametrize(("terms", "places"), [(128, 1 << 14), (360, 1 << 17)])
 def test_pairs_of_a_search_rarely_collide(terms, places):
     """At half load a key is found after less than one step on average, for every size of the table."""
@@ -66,15 +57,6 @@ def test_pairs_of_a_search_rarely_collide(terms, places):
         steps.append((at - find_pair(empty, key)) % places)
     assert len(steps) > 0.45 * places
     assert np.mean(steps) < 1.0
-
-
-def test_clear_empties_a_table():
-    pairs = table(64)
-    for one in range(9):
-        put(pairs, pair_key(one, one + 1), 1.0)
-    clear(pairs)
-    assert (pairs.keys == FREE).all()
-    assert pairs.taken.tolist() == [0]
 
 
 @pytest.mark.parametrize("limit", [0, 15, 16, 1000, 16 * 1024, 16 * 1025, 10**6, 1 << 20])

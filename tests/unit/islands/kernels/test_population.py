@@ -21,7 +21,6 @@ from islands.kernels.population import (
     NO_TERMS,
     OK,
     OVERFLOW,
-    TOO_FEW_ROWS,
     Groups,
     PopulationContext,
     SelectedTerms,
@@ -212,13 +211,6 @@ def test_results_do_not_depend_on_the_table_or_on_other_individuals(constrained,
     assert pairs.taken[0] == taken
 
 
-@given(population)
-def test_results_do_not_depend_on_other_terms_of_the_pool(drawn):
-    structures, pruned = zip(*drawn, strict=True)
-    others = [regressor(parse(f"exp(u(k-{lag}))*y(k-1)^{lag}"))[1] for lag in range(1, 4)]
-    assert same(evaluated(structures, pruned), evaluated(structures, pruned, before=others))
-
-
 @given(positions, st.booleans(), st.floats(0.0, 2.0))
 def test_allowed_error_abandons_only_larger_errors(structure, pruned, share):
     (whole,) = evaluated([structure], [pruned])
@@ -252,31 +244,6 @@ def get_status(texts, data=RECORD, constrained=False, pruned=False):
 )
 def test_status_of_a_structure_follows_from_its_columns(texts, status):
     assert get_status(texts) == status
-
-
-def test_unstable_structure_diverges():
-    # The output of one segment triples with every sample; the estimate is unstable for the other segment.
-    y = np.concatenate([3.0 ** np.arange(15), np.full(60, 1e5)])
-    assert get_status(["y(k-1)"], Dataset(np.zeros(75), y, 0.1, segments=(15, 60))) == DIVERGED
-    assert get_status(["y(k-1)"], Dataset(np.zeros(15), y[:15], 0.1)) == OK
-
-
-def test_structure_without_y_is_infeasible():
-    assert get_status(["u(k-1)", "u(k-2)"], constrained=True) == INFEASIBLE
-    assert get_status(["u(k-1)"], constrained=True) == NO_TERMS
-    assert get_status(["y(k-1)", "u(k-1)"], constrained=True) == OK
-
-
-def test_pruning_of_unrelated_terms_leaves_none():
-    noise = np.random.default_rng(2).normal(size=(2, 3000))
-    assert get_status(["sign(u(k-1))"], Dataset(noise[0], noise[1], 0.1), pruned=True) == NO_TERMS
-
-
-@pytest.mark.parametrize(("rows", "status"), [(1, TOO_FEW_ROWS), (3, TOO_FEW_ROWS), (6, OK)])
-def test_as_many_parameters_as_rows_are_refused(rows, status):
-    texts = ["y(k-1)", "u(k-1)", "u(k-2)", "u(k-3)"]
-    data = record(segments=(WARM_UP + rows,))
-    assert get_status(texts, data) == status
 
 
 def test_slow_record_is_estimated_to_six_digits():

@@ -31,27 +31,12 @@ def nearly_parallel(condition, columns=6, rows=800, seed=1):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_columns_become_orthonormal(shape):
-    q, *_, dependent = factored(random(*shape)[0])
-    assert dependent == -1
-    np.testing.assert_allclose(q @ q.T, np.eye(shape[0]), rtol=0, atol=1e-14)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
 def test_product_of_the_factors_is_the_matrix(shape):
     matrix, _ = random(*shape)
     q, triangle, *_ = factored(matrix)
     assert np.array_equal(triangle, np.triu(triangle))
     assert (np.diag(triangle) > 0).all()
     np.testing.assert_allclose(triangle.T @ q, matrix, rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_triangle_equals_that_of_householder_reflections(shape):
-    matrix, _ = random(*shape)
-    reference = np.linalg.qr(matrix.T)[1]
-    reference *= np.sign(np.diag(reference))[:, None]
-    np.testing.assert_allclose(factored(matrix)[1], reference, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -82,18 +67,6 @@ def test_nearly_parallel_columns_stay_orthogonal(condition):
     np.testing.assert_allclose(triangle.T @ q, matrix, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("size", [2.0**-300, 2.0**-40, 2.0**200])
-def test_unit_of_a_column_changes_only_the_triangle(size):
-    matrix, target = random(5, 400)
-    matrix[2] *= 1 / 3
-    here = factored(matrix, target)
-    matrix[2] *= size
-    there = factored(matrix, target)
-    here[1][:, 2] *= size
-    for left, right in zip(here, there, strict=True):
-        assert np.array_equal(left, right)
-
-
 @pytest.mark.parametrize("rows", [10, 257, 1000])
 def test_rows_of_zeros_before_and_after_change_no_bit(rows):
     matrix, target = random(5, rows)
@@ -118,22 +91,11 @@ def test_columns_of_one_segment_each_become_orthonormal_with_columns_of_all():
     np.testing.assert_allclose(projection @ q + residual, target, rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("position", [0, 1, 4])
-def test_zero_column_is_reported(position):
-    matrix, target = random(5, 300)
-    matrix[position] = 0.0
-    assert factored(matrix, target)[-1] == position
-
-
 def test_first_dependent_column_is_reported():
     matrix, target = random(6, 300)
     matrix[3] = 2.0 * matrix[0] - 1e-3 * matrix[2]
     matrix[5] = matrix[1]
     assert factored(matrix, target)[-1] == 3
-
-
-def test_more_columns_than_rows_depend_on_each_other():
-    assert factored(random(5, 4)[0])[-1] == 4
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -6,7 +6,7 @@ import pytest
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Constant, Lagged
+from islands.expressions.tree import Lagged
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK
 from islands.models.regressor import regressor
@@ -63,28 +63,10 @@ def test_every_row_of_every_segment_is_the_value_of_the_expression(signals):
     assert np.array_equal(found, oracle([term.expression for term in terms], signals, first, rows))
 
 
-def test_longer_warm_up_only_omits_rows(signals):
-    terms = [made(text) for text in TERMS]
-    short, long = (evaluated(terms, signals, [first], [600 - first], first) for first in (9, 40))
-    assert np.array_equal(short[:, 31:], long)
-
-
 def test_term_may_read_the_present(signals):
     target = Lagged(0, 0)
     assert np.array_equal(evaluated([target, made("y(k-1)")], signals, [1], [500], 1)[0], signals[0, 1:501])
     assert np.array_equal(evaluated([target], signals, [0], [500], 0)[0], signals[0, :500])
-
-
-def test_constant_term_is_a_column_of_ones(signals):
-    assert np.array_equal(evaluated([made("1"), made("y(k-1)")], signals, [1], [300], 1)[0], np.ones(300))
-    assert made("1").expression == Constant(1.0)
-
-
-def test_term_does_not_depend_on_the_other_terms(signals):
-    terms = [made(text) for text in TERMS]
-    together = evaluated(terms, signals, [9], [400], 9)
-    for position, term in enumerate(terms):
-        assert np.array_equal(evaluated([term], signals, [9], [400], 9)[0], together[position])
 
 
 @pytest.mark.parametrize("name", [name for name in PRIMITIVES if name not in ("phi1", "phi2")])

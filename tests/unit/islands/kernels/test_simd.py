@@ -12,16 +12,13 @@ from islands.kernels.simd import (
     VECTOR,
     address,
     any_outside,
-    broadcast,
     fold,
     gather,
     load,
     outer,
     outer_upper,
-    padded_size,
     read,
     repeat,
-    sign,
     store,
     write,
 )
@@ -76,15 +73,6 @@ def pairwise(name, count):
     return run
 
 
-@cache
-def signs(count):
-    @njit
-    def run(x, out):
-        store(out, 0, sign(load(x, 0, count)))
-
-    return run
-
-
 @njit
 def gathered(x, a, b, c, d, out):
     store(out, 0, gather(x, a, b, c, d))
@@ -121,11 +109,6 @@ def moved(x, x_at, out, out_at):
 
 
 @njit
-def filled(number, out, at):
-    store(out, np.uint64(at), broadcast(number, 3))
-
-
-@njit
 def moved_by_address(x, x_at, out, out_at):
     write(address(out, out_at), read(address(x, x_at), 3))
     # The arrays are used once more, so that they live until here.
@@ -141,15 +124,6 @@ def test_arithmetic_applies_to_every_lane(name, count, data):
     pairwise(name, count)(x, y, out)
     with np.errstate(all="ignore"):
         assert same(out, getattr(np, name)(x, y))
-
-
-@pytest.mark.parametrize("count", COUNTS)
-@given(st.data())
-def test_sign_is_one_minus_one_or_zero(count, data):
-    (x,) = data.draw(rows(count, 1))
-    out = np.empty_like(x)
-    signs(count)(x, out)
-    assert same(out, np.where(x > 0, 1.0, np.where(x < 0, -1.0, 0.0)))
 
 
 def test_gathered_vectors_start_at_the_offsets():
@@ -189,20 +163,6 @@ def test_any_outside_finds_a_lane_outside_the_bounds(count, data):
     assert (bounded(count)(x, bound) != 0) == (not np.all(np.abs(x) <= bound))
 
 
-@pytest.mark.parametrize("count", COUNTS)
-def test_any_outside_checks_every_lane(count):
-    for lane in range(VECTOR * count):
-        for value in (2.0000001, -2.0000001, np.nan, np.inf, -np.inf):
-            x = np.full(VECTOR * count, 2.0)
-            assert bounded(count)(x, 2.0) == 0
-            x[lane] = value
-            assert bounded(count)(x, 2.0) != 0
-
-
-def test_every_lane_is_outside_a_negative_bound():
-    assert bounded(1)(np.zeros(VECTOR), -1.0) != 0
-
-
 @pytest.mark.parametrize("move", [moved, moved_by_address], ids=["offset", "address"])
 @given(st.integers(0, 20), st.integers(0, 20))
 def test_loads_and_stores_at_any_offset_touch_nothing_else(move, x_at, out_at):
@@ -211,21 +171,3 @@ def test_loads_and_stores_at_any_offset_touch_nothing_else(move, x_at, out_at):
     expected = np.full(50, -1.0)
     expected[out_at : out_at + 24] = x[x_at : x_at + 24]
     assert np.array_equal(out, expected)
-
-
-@given(every_number, st.integers(0, 20))
-def test_broadcast_fills_every_lane(number, at):
-    out, expected = np.full(50, -1.0), np.full(50, -1.0)
-    filled(number, out, at)
-    expected[at : at + 24] = number
-    assert same(out, expected)
-
-
-@pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 1000])
-def test_padded_array_has_its_size_and_starts_at_a_cache_line(size):
-    rooms = [padded_size(size) for _ in range(20)]
-    for found in rooms:
-        assert found.shape == (size,)
-        assert found.dtype == np.float64
-        assert found.ctypes.data % 64 == 0 or size == 0
-        found[:] = 1.0

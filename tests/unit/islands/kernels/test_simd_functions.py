@@ -38,11 +38,3 @@ def test_finite_numbers(apply):
     assert np.abs(exponentials / np.exp(x) - 1.0).max() < 5e-16
     assert np.abs(tangents - np.tanh(x)).max() < 5e-16
     assert np.array_equal(limited, np.clip(x, -1.0, 1.0))
-
-
-def test_the_ends_of_the_range_are_finite(apply):
-    exponentials, tangents, _ = apply([-np.inf, -1e9, 1e9, np.inf])
-    assert np.isfinite(exponentials).all()
-    assert (exponentials[:2] < 1e-300).all()
-    assert (exponentials[2:] > 1e300).all()
-    assert tangents.tolist() == [-1.0, -1.0, 1.0, 1.0]

@@ -129,19 +129,6 @@ def test_padding_lanes_do_not_affect_the_results(damped, interval, poison, width
             assert np.array_equal(left, right, equal_nan=True)
 
 
-def test_one_step_ahead_ignores_samples_after_the_last_lane(damped, width):
-    data = record(segments=SEGMENTS)
-    cut = layout(data, damped.maximum_lag, 1)
-    signals = cut.signals.copy()
-    signals[:, data.samples :] = math.nan
-    for patient in (True, False):
-        expected = run_on(damped, cut, data.samples, patient=patient)
-        found = run_on(damped, cut._replace(signals=signals), data.samples, patient=patient)
-        assert expected[0] == found[0] == COMPLETE
-        for left, right in zip(expected[1:], found[1:], strict=True):
-            assert np.array_equal(left, right, equal_nan=True)
-
-
 @pytest.mark.parametrize("interval", [1, 7, CHUNK, CHUNK + 1, None])
 def test_squared_error_of_a_lane_is_summed_in_the_order_of_time(damped, interval):
     data = record()
@@ -154,22 +141,6 @@ def test_squared_error_of_a_lane_is_summed_in_the_order_of_time(damped, interval
         assert found == expected
 
 
-@pytest.mark.parametrize("interval", [1, 7, None])
-def test_omitting_predictions_changes_no_other_output(damped, interval):
-    _, squared_error, diverged, _ = run(damped, record(), interval)
-    _, alone, without, nothing = run(damped, record(), interval, wanted=False)
-    assert np.array_equal(squared_error, alone)
-    assert np.array_equal(diverged, without)
-    assert nothing.size == 0
-
-
-@pytest.mark.parametrize(("prediction", "step"), [(8.0, -1), (-8.0, -1), (np.nextafter(8.0, 9.0), 0)])
-def test_bound_itself_is_inside(prediction, step):
-    u = np.zeros(SAMPLES)
-    u[0] = prediction
-    assert run(echo(), record(u=u), None, bound=8.0)[2].tolist() == [step]
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_prediction_outside_the_bound_is_found_despite_a_small_error(sign, width):
     u, y = np.zeros(SAMPLES), np.zeros(SAMPLES)
@@ -179,30 +150,6 @@ def test_prediction_outside_the_bound_is_found_despite_a_small_error(sign, width
     assert run(echo(), record(u=u, y=y), None, bound=8.0)[2].tolist() == [5]
 
 
-@pytest.mark.parametrize("step", [0, 1, CHUNK - 1, CHUNK, 2 * CHUNK + 3, SAMPLES - 2])
-def test_single_sample_outside_the_bound_is_found_at_any_step(step):
-    u = np.zeros(SAMPLES)
-    u[step] = 9.0
-    _, _, diverged, predicted = run(echo(), record(u=u), None, bound=8.0)
-    assert diverged.tolist() == [step]
-    # The kernel returns all predictions, also those after the divergence.
-    assert np.array_equal(predicted[1:], u[:-1])
-
-
-def test_first_of_several_samples_outside_is_reported():
-    u = np.zeros(SAMPLES)
-    u[[20, 30, CHUNK + 5]] = 9.0
-    assert run(echo(), record(u=u), None, bound=8.0)[2].tolist() == [20]
-
-
-def test_every_lane_reports_its_step_of_divergence():
-    u = np.zeros(SAMPLES)
-    u[[5, 27, 28]] = 9.0
-    cut, _, diverged, _ = run(echo(), record(u=u), 10, bound=8.0)
-    found = {int(start): int(step) for start, step in zip(cut.start, diverged, strict=True) if step >= 0}
-    assert found == {1: 5, 21: 7}
-
-
 def test_impatient_run_stops_after_the_chunk_with_a_divergence():
     u = np.zeros(SAMPLES)
     u[CHUNK + 1] = u[2 * CHUNK + 1] = 9.0
@@ -210,13 +157,6 @@ def test_impatient_run_stops_after_the_chunk_with_a_divergence():
     assert diverged.tolist() == [CHUNK + 1]
     assert np.isfinite(predicted[1 : CHUNK + 1]).all()
     assert np.isnan(predicted[2 * CHUNK + 1 :]).all()
-
-
-@pytest.mark.parametrize("interval", [1, 7, None])
-def test_impatience_changes_nothing_without_a_divergence(damped, interval):
-    patient, hasty = (run(damped, record(), interval, patient=patient)[1:] for patient in (True, False))
-    for left, right in zip(patient, hasty, strict=True):
-        assert np.array_equal(left, right, equal_nan=True)
 
 
 # Status of a simulation.
@@ -271,27 +211,6 @@ def test_simulation_stops_after_the_chunk_that_exceeds_the_limit(width):
     assert run_on(echo(), cut, SAMPLES, allowed=10000.0)[0] == COMPLETE
 
 
-def test_error_of_earlier_blocks_counts_towards_the_limit():
-    u, y = np.zeros(1000), np.zeros(1000)
-    u[[3, 500]] = 10.0
-    cut = layout(record(u=u, y=y, segments=(1000,)), 1, 2)
-    assert len(cut.block_lanes) > 1
-    assert run_on(echo(), cut, 0, allowed=199.0)[0] == ABANDONED
-    assert run_on(echo(), cut, 0, allowed=200.0)[0] == COMPLETE
-
-
-def test_error_of_earlier_blocks_stops_a_later_block_early(monkeypatch):
-    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (8,))
-    u, y = np.zeros(1001), np.zeros(1001)
-    u[[3, 810]] = 10.0
-    cut = layout(record(u=u, y=y, segments=(1001,)), 1, 100)
-    assert cut.block_lanes.tolist() == [8, 2]
-    status, _, _, predicted = run_on(echo(), cut, 1001, allowed=199.0)
-    assert status == ABANDONED
-    assert np.isfinite(predicted[801 : 801 + CHUNK]).all()
-    assert np.isnan(predicted[801 + CHUNK : 901]).all()
-
-
 def test_nan_error_does_not_exceed_the_limit(damped, width):
     y = record().y.copy()
     y[10] = math.nan
@@ -308,13 +227,3 @@ def test_bound_without_a_finite_nonzero_square_is_respected(bound, prediction, w
     u, y = np.zeros(SAMPLES), np.zeros(SAMPLES)
     u[10] = prediction
     assert run(echo(), record(u=u, y=y), None, bound=bound)[2].tolist() == [10]
-
-
-def test_prediction_without_terms_is_zero(width):
-    data = record()
-    cut = layout(data, 0, 50)
-    squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
-    predicted = np.full(SAMPLES, np.nan)
-    status = simulate(link([]), np.empty(0), cut, 1e6, math.inf, True, squared_error, diverged, predicted)
-    assert status == COMPLETE
-    assert np.array_equal(predicted, np.zeros(SAMPLES))

@@ -105,15 +105,3 @@ def test_a_measured_limit_is_left_out_where_the_simulation_is_beyond_it():
     theta[-1] -= 10.0
     inside = accumulate(theta, places, codes, u, x, measured, (lower, upper))
     assert inside[-1, -1] > 50.0 * np.count_nonzero(measured == upper)
-
-
-def test_derivatives_that_decay_end_at_zero():
-    # The derivative with respect to the initial state is 0.9^k: subnormal from k = 6 700 on.
-    theta = np.array([0.9, 1.0, 1.0, 0.0, 0.0, 0.0])
-    fixed, rows = np.full(theta.size, -1), 8000
-    single, none = np.zeros((2, rows)), np.zeros(0, np.int64)
-    zeros = np.zeros(rows)
-    products = accumulate(theta, fixed, none, np.zeros((rows, 1)), np.zeros(1), zeros, derivatives=single)
-    assert single[0, :3000] == pytest.approx(0.9 ** np.arange(3000), rel=1e-9)
-    assert not single[0, 4000:].any()
-    assert products[0, 0] == pytest.approx(1.0 / (1.0 - 0.81))

@@ -44,9 +44,3 @@ def test_a_state_space_starts_at_rest_at_its_operating_point() -> None:
     assert u == 20.0 + 0.1
     assert block.first_states() == pytest.approx(states, abs=1e-12)
     assert y == pytest.approx(3.7 + 0.3 + 1.2 * states[0])
-
-
-def test_a_block_of_deviations_starts_at_its_offsets() -> None:
-    assert measured_block(OF_BLOCKS["deviations at once"]).start_values() == (0.3, -7.0, -7.0)
-    coupled = measured_block(OF_BLOCKS["coupled deviations"])
-    assert coupled.start_values() == (0.3, 0.3, 40.0, 40.0, 5.0)

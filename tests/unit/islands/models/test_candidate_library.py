@@ -7,8 +7,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.expressions.printing import plain
-from islands.expressions.tree import Apply
-from islands.models.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set
+from islands.models.candidate_library import LIBRARIES, candidates, full_set
 from islands.models.clusters import steady_state
 from islands.models.narx import canonical_order
 
@@ -46,36 +45,6 @@ def test_polynomial_library_contains_every_monomial_and_the_constant():
     assert sorted(texts("polynomial", 2, 1, inputs=2)) == sorted([*two, *mixed])
 
 
-def test_phi_polynomial_library_contains_products_with_increments():
-    increment, direction = "(u(k-1) - u(k-2))", "sign(u(k-1) - u(k-2))"
-    assert sorted(texts("phi-polynomial", 1, 2)) == sorted(
-        ["y(k-1)", "u(k-1) - u(k-2)", f"{direction}*{increment}"]
-    )
-    levels = ["y(k-1)", "u(k-1)"]
-    assert sorted(texts("phi-polynomial", 2, 2)) == sorted(
-        [
-            *("y(k-1)", "u(k-1) - u(k-2)", f"{direction}*{increment}"),
-            *(f"{level}*{increment}" for level in levels),
-            *(f"{level}*{direction}*{increment}" for level in levels),
-        ]
-    )
-
-
-def test_phi_polynomial_library_pairs_increments_with_directions():
-    steps = ["u(k-1) - u(k-2)", "u(k-2) - u(k-3)"]
-    pairs = [f"sign({direction})*({step})" for step in steps for direction in steps]
-    assert sorted(texts("phi-polynomial", 1, 3)) == sorted(["y(k-1)", *steps, *pairs])
-
-
-def test_phi_polynomial_increment_and_direction_share_the_input():
-    found = texts("phi-polynomial", 2, 2, inputs=2)
-    assert len(found) == 1 + 2 * 2 * (1 + 3)
-    assert "u2(k-1)*sign(u1(k-1) - u1(k-2))*(u1(k-1) - u1(k-2))" in found
-    assert "u1(k-1)*(u2(k-1) - u2(k-2))" in found
-    assert not [text for text in found if "sign(u1" in text and "*(u2" in text]
-    assert not [text for text in found if "sign(u2" in text and "*(u1" in text]
-
-
 @pytest.mark.parametrize(("degree", "lags", "inputs"), [(1, 2, 1), (5, 3, 1), (3, 4, 2), (2, 3, 3)])
 def test_phi_polynomial_terms_except_y_vanish_in_the_steady_state(degree, lags, inputs):
     first, *others = candidates("phi-polynomial", degree, lags, inputs)
@@ -90,23 +59,6 @@ def test_library_count_equals_the_number_of_candidates(name, degree, lags, input
     found = candidates(name, degree, lags, inputs)
     assert len(found) == len(set(found)) == LIBRARIES[name].count(degree, lags, inputs)
     assert list(found) == canonical_order(found)
-
-
-def test_polynomial_library_is_the_full_set():
-    assert len(candidates("polynomial", 3, 3, 1)) == full_set(3, 3, 3) == 84
-
-
-def test_phi_polynomial_candidates_only_use_the_paper_s_functions():
-    found = candidates("phi-polynomial", 3, 3, 1)
-    used = {node.primitive.name for item in found for node in _find_calls(item.expression)}
-    assert used == {"mul", "sub", "sign"}
-
-
-def _find_calls(expression):
-    if isinstance(expression, Apply):
-        yield expression
-        for argument in expression.arguments:
-            yield from _find_calls(argument)
 
 
 # Errors.
@@ -134,10 +86,3 @@ def test_too_large_library_is_refused_before_it_is_built():
         candidates("polynomial", 40, 40, 3)
     with pytest.raises(SettingsError, match=r"^[0-9]{30,} candidates are more"):
         candidates("phi-polynomial", 500, 1_000_000, 9)
-
-
-@pytest.mark.ci
-def test_candidate_limit_applies_to_the_library_not_the_full_set():
-    # The full set has 435 897 monomials of degree 5 in 16 + 16 lags; phi-polynomial has a hundredth of them.
-    assert full_set(5, 16, 16) == 435_897
-    assert len(candidates("phi-polynomial", 5, 16, 1)) == 1 + 15 * 16 * 15 == 3601 <= MAX_CANDIDATES

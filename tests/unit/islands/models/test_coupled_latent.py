@@ -11,10 +11,9 @@ from islands.export import EXPORTS, export
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.models.measured_signals import measured_block
-from islands.persistence.models import any_model_from_json, model_json, read_coupled
+from islands.persistence.models import model_json, read_coupled
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
-from islands.records.input_lead import advance_all_inputs
 from islands.records.preprocessing import preprocess
 from islands.simulation.predictors import free_run
 from support.coupled_systems import TWO_MASSES
@@ -65,10 +64,6 @@ def test_the_common_free_run_is_that_of_every_model():
         np.testing.assert_array_equal(common.y[:, place], free_run(model, record.records[place], 25).y)
 
 
-def test_a_file_has_the_same_model():
-    assert any_model_from_json(model_json(BOTH)) == BOTH
-
-
 def test_a_file_of_models_of_several_classes_is_refused():
     entries = [json.loads(model_json(each)) for each in (TWO_MASSES.models[0], BOTH.models[1])]
     with pytest.raises(ModelError, match="a NARX model is needed, this one is of the class latent"):
@@ -76,21 +71,6 @@ def test_a_file_of_models_of_several_classes_is_refused():
     for kind, model in ((CoupledModel, BOTH.models[0]), (CoupledLatentModel, TWO_MASSES.models[0])):
         with pytest.raises(ModelError, match=r"NARX model is needed|is no latent model"):
             kind((model, BOTH.models[1]))
-
-
-def test_the_models_have_the_same_inputs():
-    other = replace(BOTH.models[1], input_names=("u_V+1",))
-    with pytest.raises(ModelError, match="expected are the inputs that all outputs share, u_V"):
-        CoupledLatentModel((BOTH.models[0], other))
-
-
-def test_inputs_that_are_read_early_give_the_same_free_run():
-    early = make_coupled_latent_model(input_names=("u_V+1",))
-    record = make_record()
-    late, found = free_run(BOTH, record, 30).y, free_run(early, record.map(advance_all_inputs), 30).y
-    # One sample less estimates the initial states.
-    assert found[60:] == pytest.approx(late[60:], abs=1e-2)
-    assert early.block().leads == (0, 0, 0, 0, 0, 1)
 
 
 def test_offsets_are_subtracted_from_inputs_and_added_to_outputs():

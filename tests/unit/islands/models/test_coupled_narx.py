@@ -12,12 +12,6 @@ ONE, TWO = TWO_MASSES.models
 TERMS = {"y(k-1)": 0.5}
 
 
-def test_columns_of_a_coupled_model_are_those_of_its_equations() -> None:
-    assert (TWO_MASSES.input_names, TWO_MASSES.output_names) == (("u",), ("y1", "y2"))
-    assert (TWO_MASSES.dt, TWO_MASSES.maximum_lag, TWO_MASSES.size) == (0.1, 2, 8)
-    assert TWO_MASSES.with_parameters(TWO_MASSES.parameters) == TWO_MASSES
-
-
 def test_channels_are_the_outputs_and_then_the_inputs() -> None:
     three = CoupledModel(
         tuple(
@@ -46,9 +40,3 @@ def test_channels_are_the_outputs_and_then_the_inputs() -> None:
 def test_equations_that_do_not_belong_together_are_refused(models, message) -> None:
     with pytest.raises(ModelError, match=message):
         CoupledModel(models)
-
-
-def test_terms_have_the_names_of_the_columns() -> None:
-    """The table of terms had the position of the equation and y, u1 and u2."""
-    assert TWO_MASSES.equation().terms[:4] == ("y1: y1(k-1)", "y1: y1(k-2)", "y1: u(k-1)", "y1: y2(k-1)")
-    assert len(TWO_MASSES.equation().terms) == TWO_MASSES.size

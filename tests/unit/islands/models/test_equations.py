@@ -10,7 +10,6 @@ from hypothesis import given
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.printing import mathml
-from islands.expressions.tree import Apply, Lagged, Primitive
 from islands.models.equations import (
     equation,
     latex_equation,
@@ -22,8 +21,6 @@ from islands.models.equations import (
 )
 from islands.models.narx import make_model
 from support.strategies import models
-
-U = Lagged(1, 1)
 
 MODEL_12 = make_model(
     [
@@ -110,13 +107,6 @@ def test_statements_have_the_names_and_the_samples_of_the_record():
     assert named_statement("[u1(k-1)*u2(k-1)] <= 0", early) == "[u_V(k)*w(k-1)] <= 0"
 
 
-def test_latex_of_the_papers_model_12_has_the_requested_digits():
-    assert latex_equation(MODEL_12, digits=1).startswith(
-        r"y_{k} = 1 \, y_{k-1} - 0.0002 \, y_{k-1} u_{k-2} \left(u_{k-2} - u_{k-3}\right)"
-        r" - 0.01 \, y_{k-1} \operatorname{sign}(u_{k-2} - u_{k-3}) \left(u_{k-2} - u_{k-3}\right)"
-    )
-
-
 def test_equation_without_parameters_numbers_them():
     bare = make_model(
         [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("u1", "u2")
@@ -126,20 +116,6 @@ def test_equation_without_parameters_numbers_them():
     assert latex_equation(bare) == (
         r"y_{k} = \theta_{1} \, y_{k-1} + \theta_{2} \, \left(u_{1,k-1} + u_{2,k-1}\right) + \theta_{3}"
     )
-
-
-def test_named_equation_has_the_column_names_of_the_record():
-    terms = [("y(k-1)", 0.5), ("u1(k-2)*u2(k-1)", 2.0), ("max(u10(k-3), y(k-4))", 1.0)]
-    names = ("u2", "flow (l/s)", *(f"a{index}" for index in range(3, 10)), "heat")
-    model = make_model([(parse(text), value) for text, value in terms], names, "T_out")
-    assert sorted(named_equation(model).removeprefix("T_out(k) = ").split(" + ")) == [
-        "0.5*T_out(k-1)",
-        "2*u2(k-2)*flow(k-1)",
-        "max(T_out(k-4), heat(k-3))",
-    ]
-    assert {named_term(model, position) for position in range(3)} >= {"T_out(k-1)"}
-    single = make_model([(parse("u(k-1)"), 2.0), (parse("sqrt(u(k-2))"), 1.0)], ("u_V",), "y_um")
-    assert named_equation(single) == "y_um(k) = 2*u_V(k-1) + sqrt(abs(u_V(k-2)))"
 
 
 def test_signals_are_named_by_their_columns_without_units_in_brackets():
@@ -197,14 +173,6 @@ def test_printed_equations_give_the_values_of_the_model(term):
         line = re.sub(r"\(k-(\d)\)", r"[\1]", text.partition(" = ")[2]).replace("^", "**")
         found = eval(line, dict(_NUMPY), {output: levels, excitation: valves})
         np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
-@given(models(inputs=2))
-def test_equation_numbers_the_inputs_if_there_are_several(model):
-    assert "u(" not in equation(model)
-    text = latex_equation(model)
-    assert text.count("{") == text.count("}")
-    assert text.count(r"\left") == text.count(r"\right")
 
 
 # MathML: the visible text equals the plain text.
@@ -281,13 +249,6 @@ def visible_text(mathml_text):
 )
 def test_mathml_of_an_expression_shows_its_plain_text(text, visible):
     assert visible_text(mathml(parse(text))) == visible
-
-
-def test_mathml_escapes_function_names():
-    for name, written in (("a<b&c>", "a&lt;b&amp;c&gt;"), ("\u03c3", "&#963;"), ("{0}", "{0}")):
-        text = mathml(Apply(Primitive(name, 1, abs, "{0}"), (U,)))
-        assert f"<mi>{written}</mi>" in text
-        assert visible_text(text) == f"{name}(u(k-1))"
 
 
 @given(models(inputs=2))

@@ -7,9 +7,8 @@ import pytest
 
 from islands.errors import ModelError
 from islands.export import export
-from islands.models.latent import LatentModel, StateSpaceLayout
+from islands.models.latent import LatentModel
 from islands.models.unit_functions import FUNCTIONS
-from islands.persistence.models import model_from_json, model_json
 from islands.records.dataset import Dataset
 from islands.records.flat_extremes import SensorLimits
 from islands.simulation.predictors import free_run
@@ -49,14 +48,6 @@ def test_the_free_run_continues_from_the_states_of_the_warm_up():
     assert run.y[20:] == pytest.approx(record.y[20:], abs=1e-3)
     longer = free_run(make_model(), record, 200)
     assert longer.y[200:] == pytest.approx(record.y[200:], abs=1e-4)
-
-
-def test_programs_start_at_rest_at_the_operating_point():
-    model, module = make_model(operating_inputs=(0.5,)), {}
-    exec(export(model, "python"), module)
-    rest = 1.2 * model.rest[0] + 0.3
-    found = module["simulate"]([0.5] * 50)
-    assert found == pytest.approx([rest] * 50, abs=1e-9)
 
 
 @pytest.mark.parametrize("unit", [*FUNCTIONS, "tanh(square)", "s*abs", "bell*(s*root)"])
@@ -108,26 +99,6 @@ def test_an_impossible_structure_is_refused(change, message):
         replace(make_model(), **change)
 
 
-def test_names_are_in_the_order_of_the_kernel():
-    names = StateSpaceLayout(1, 2, 1).names
-    assert names == (
-        "a1_1",
-        "b1_1",
-        "b1_2",
-        "c1",
-        "d1",
-        "d2",
-        "e1_1",
-        "f1",
-        "w1_1",
-        "v1_1",
-        "v1_2",
-        "s1",
-        "o1",
-        "level",
-    )
-
-
 def test_modes_are_those_about_the_operating_point():
     lag = make_model({"a1_1": np.exp(-0.01 / 0.3), "b1": 1.0, "c1": 1.0}, (), 1)
     assert lag.describe_modes() == ("time constant 0.3 s",)
@@ -149,29 +120,3 @@ def test_standard_errors_follow_the_quantities():
         "0.162 +- 0.0045; static gain of u 0.564 +- 0.067"
     )
     assert model.equation().named.endswith("static gain of u_V 0.564 +- 0.067")
-
-
-def test_a_document_has_the_quantities_with_their_standard_errors():
-    model = make_model(quantity_errors=(0.01, 0.004, 0.06))
-    entries = model.document()["quantities"]
-    assert [each["standard_error"] for each in entries] == [0.01, 0.004, 0.06]
-    assert entries[2]["value"] == pytest.approx(0.564)
-    assert LatentModel.read(model.document(), "file") == model
-    earlier = {name: value for name, value in make_model().document().items() if name != "quantities"}
-    assert LatentModel.read(earlier, "file") == make_model()
-    # Another number of quantities, as on a machine with other rounding errors.
-    assert [each["standard_error"] for each in make_model(quantity_errors=(0.01,)).list_quantities()] == [
-        None
-    ] * 3
-
-
-def test_the_gain_of_an_integrator_is_null_in_a_document():
-    model = make_model({"a1_1": 1.0, "b1": 0.1, "c1": 1.0}, (), 1)
-    assert np.isnan(model.quantities[-1].value)
-    assert model.list_quantities()[-1]["value"] is None
-    assert model_from_json(model_json(model)) == model
-
-
-def test_standard_errors_are_those_of_one_estimate():
-    model = make_model(quantity_errors=(0.01, 0.004, 0.06))
-    assert model.with_parameters(model.parameters).quantity_errors is None

@@ -30,13 +30,6 @@ def test_the_characteristic_is_the_end_of_a_long_free_run(system):
         assert free_run(system, record).y[-1] == pytest.approx(rest, rel=1e-9)
 
 
-def test_two_inputs_have_one_equilibrium_per_pair():
-    system = islands.make_model(
-        [(islands.parse("y(k-1)"), 0.5), (islands.parse("u1(k-1)*u2(k-2)"), 1.0)], ("u1", "u2")
-    )
-    assert static_characteristic(system, [[1.0, 3.0], [2.0, 0.5]]) == pytest.approx([6.0, 2.0])
-
-
 @pytest.mark.parametrize(
     ("system", "message"),
     [
@@ -73,20 +66,8 @@ def test_the_error_of_the_linearisation_is_of_second_order(system):
     assert difference(1e-3) < 1e-4
 
 
-def test_an_input_that_acts_at_once_has_a_direct_coefficient():
-    system = islands.make_model([(islands.parse("y(k-1)"), 0.5), (islands.parse("u(k-1)"), 2.0)], ("u_V+1",))
-    assert differentiate_model(system, 1.0).inputs.tolist() == [[2.0, 0.0]]
-
-
 def test_a_kink_has_no_linearisation():
     with pytest.raises(islands.ModelError, match=r"the term y\(k-1\)\*sign\(.* has a kink"):
         differentiate_model(HYSTERESIS, 0.4, y=1.0)
     with pytest.raises(islands.ModelError, match=r"the model has 1 inputs \(u\), got"):
         differentiate_model(TANK, [0.4, 0.5])
-
-
-def test_stability_follows_from_the_poles():
-    assert differentiate_model(TANK, 0.5).is_stable
-    assert differentiate_model(model(**{"y(k-1)": 1.5, "u(k-1)": 1.0}), 0.0, y=0.0).poles == pytest.approx(
-        [1.5]
-    )

@@ -8,10 +8,10 @@ from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import MUL, PRIMITIVES
 from islands.expressions.printing import plain
-from islands.expressions.tree import Apply, Constant, Lagged
+from islands.expressions.tree import Apply, Lagged
 from islands.expressions.user_primitive import primitive
 from islands.models.clusters import steady_state
-from islands.models.regressor import CanonicalForms, canonical, regressor
+from islands.models.regressor import CanonicalForms, regressor
 from support.variation import random_gene
 
 
@@ -90,12 +90,6 @@ def test_expression_that_is_identically_zero_has_no_regressor(text):
     assert regressor(parse(text)) == (0.0, None)
 
 
-def test_square_of_a_sign_is_not_simplified_to_one():
-    _, square = regressor(parse("sign(u(k-1) - u(k-2))^2"))
-    assert square.expression != Constant(1.0)
-    assert square.lags == {(1, 1), (1, 2)}
-
-
 @pytest.mark.parametrize(
     ("text", "channel", "lag"), [("u(k)", 1, 0), ("y(k-1)*u2(k)", 2, 0), ("exp(y(k))", 0, 0)]
 )
@@ -103,24 +97,6 @@ def test_non_causal_regressor_is_refused(text, channel, lag):
     message = f"reads only past samples: channel {channel} has lag {lag}, take 1 or more"
     with pytest.raises(ModelError, match=message):
         regressor(parse(text))
-
-
-def test_causality_is_checked_after_back_shifts():
-    with pytest.raises(ModelError, match="channel 1 has lag -1"):
-        regressor(Lagged(1, -1))
-    assert regressor(parse("q2(u(k))"))[1].expression == Lagged(1, 2)
-
-
-def test_lags_of_a_regressor():
-    _, item = regressor(parse("y(k-2)*exp(u2(k-7) - y(k-2))"))
-    assert item.lags == {(0, 2), (2, 7)}
-    assert item.maximum_lag == 7
-    assert regressor(parse("3"))[1].maximum_lag == 0
-
-
-def test_content_of_a_regressor_is_that_of_its_expression():
-    _, item = regressor(parse("y(k-2)*u(k-1)"))
-    assert item.content == (1, "mul", 2, (0, 0, 2), (0, 1, 1))
 
 
 @pytest.mark.parametrize(
@@ -136,14 +112,6 @@ def test_error_in_constant_folding_names_the_user_primitive():
     pole = primitive("pole", lambda a: 1.0 / (a - 0.125))
     with pytest.raises(ModelError, match=r"'pole' fails at \[0\.125\] \(float division by zero\)"):
         regressor(parse("u(k-1) + pole(0.125)", {**PRIMITIVES, "pole": pole}))
-
-
-def test_term_with_a_vanishing_relative_weight_is_dropped():
-    assert canonical(parse("1e300*y(k-1) + 1e-300*u(k-1)")) == (1e300, Lagged(0, 1))
-
-
-def test_product_of_one_factor_is_the_factor():
-    assert canonical(Apply(MUL, (Lagged(1, 1),))) == (1.0, Lagged(1, 1))
 
 
 def test_weights_that_cancel_up_to_rounding_are_zero():

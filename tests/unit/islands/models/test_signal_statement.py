@@ -79,15 +79,6 @@ def coupled(steps):
     )
 
 
-def test_a_model_of_several_outputs_states_each_of_its_signals():
-    model = coupled((("detrend", "constant"),))
-    stated = "{} is the deviation from 3.25 cm, {} from 6.5 cm, {} from 4.5 V"
-    assert export(model, "plain").splitlines()[-1] == f"where {stated.format('a', 'b', 'pump')}"
-    symbols = stated.format("y1", "y2", "u")
-    assert rf"& \text{{where {symbols}}}" in export(model, "latex")
-    assert f"<mtext>where {symbols}</mtext>" in export(model, "mathml")
-
-
 def test_equations_of_other_signals_are_refused():
     model = coupled((("detrend", "constant"),))
     first, second = model.models

@@ -30,11 +30,6 @@ def test_the_linear_system_has_the_slopes_of_the_units():
     assert at.slopes == pytest.approx([3 * 0.7**2])
 
 
-def test_an_integrator_does_not_rest():
-    model = make_model({"a1_1": 1.0, "b1": 1.0, "c1": 1.0}, (), 1)
-    assert rest_of(model, 1.0, (0.0,)) is None
-
-
 def test_of_several_states_at_rest_the_start_decides():
     # x + 0.1 * (x - x^3): rest at -1, 0 and 1.
     model = make_model({"a1_1": 1.1, "c1": 1.0, "e1_1": -0.1, "w1_1": 1.0}, ("cube",), 1)

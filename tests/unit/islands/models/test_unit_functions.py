@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from islands.errors import ModelError
-from islands.models.unit_functions import FUNCTIONS, evaluate_curve, find_codes, make_odd_unit, parse_unit
+from islands.models.unit_functions import FUNCTIONS, evaluate_curve, make_odd_unit, parse_unit
 
 TREES = {
     "tanh": np.tanh,
@@ -21,11 +21,6 @@ def test_the_text_is_read_as_it_is_written(text):
     assert str(parse_unit(text)) == text
 
 
-def test_functions_have_the_codes_of_the_kernel():
-    assert find_codes(FUNCTIONS).tolist() == list(range(1, len(FUNCTIONS) + 1))
-    assert len(set(find_codes(TREES).tolist())) == len(TREES)
-
-
 @pytest.mark.ci
 @pytest.mark.parametrize("text", TREES)
 def test_a_tree_has_the_values_of_its_text(text):
@@ -34,11 +29,6 @@ def test_a_tree_has_the_values_of_its_text(text):
     written = parse_unit(text).write("s").replace("^", "**")
     names = {"tanh": np.tanh, "exp": np.exp, "abs": np.abs}
     assert eval(written, names, {"s": s}) == pytest.approx(TREES[text](s))
-
-
-def test_redundant_parentheses_are_left_out():
-    assert str(parse_unit("( s * abs )")) == "s*abs"
-    assert str(parse_unit("tanh(s)")) == "tanh"
 
 
 @pytest.mark.parametrize(

@@ -54,12 +54,6 @@ def test_terms_have_their_inclusion_probability_in_a_result(folder):
         assert tuple(term["inclusion"] for term in entry["terms"]) == model.inclusion
 
 
-def test_bands_of_earlier_versions_have_no_range():
-    document = bands_document(result().best.prediction_bands)
-    del document["range"]
-    assert bands_from_document(document, result().search_result.ensemble).data_range is None
-
-
 def test_no_ensemble_and_no_bands_are_null():
     assert ensemble_document(None) is None
     assert ensemble_from_document(None, result().best.model) is None

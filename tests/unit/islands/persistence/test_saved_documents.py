@@ -5,9 +5,7 @@ import json
 import pytest
 
 import islands
-from islands.persistence.models import write_model
 from islands.persistence.saved_documents import open_document, read_saved_model
-from islands.systems.published_models import get_published_model
 from support.identifications import record
 
 
@@ -27,13 +25,6 @@ def test_the_model_of_a_result_is_the_recommended_one(result):
         (result / "result.json").write_text(json.dumps(document))
         expected = islands.load(result / "models" / f"{rank:02d}.json").model
         assert read_saved_model(open_document(result)) == expected
-
-
-def test_the_model_of_a_file_is_that_model(tmp_path):
-    model = get_published_model("13").model
-    write_model(model, tmp_path / "model.json")
-    for path in (tmp_path, tmp_path / "model.json"):
-        assert read_saved_model(open_document(path)) == model
 
 
 def test_a_diagnosis_has_no_model(tmp_path):

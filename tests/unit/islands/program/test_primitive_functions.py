@@ -52,21 +52,6 @@ def test_user_defined_function_runs_through_its_address():
     assert expected(entry, first, second) == [2.0, -2.0, 0.0, -4.5]
 
 
-def test_user_defined_math_function_runs_through_its_address():
-    entry = primitive("arc", math.atan, parity=-1)
-    np.testing.assert_allclose(run(entry, PROBES)[:-1], expected(entry, PROBES), rtol=4e-16)
-
-
-def test_user_defined_function_may_return_integers():
-    entry = primitive("step", lambda a: 1 if a > 0 else 0)
-    assert run(entry, [2.0, -2.0])[:-1].tolist() == [1.0, 0.0]
-
-
-def test_division_by_zero_gives_nan_without_a_crash():
-    entry = primitive("pole", lambda a: (a - 0.125) / (a - 0.125))
-    assert np.isnan(run(entry, [0.125, 3.0])[0])
-
-
 @pytest.mark.ci
 def test_uncompilable_function_is_refused():
     entry = primitive("slow", lambda a: float(decimal.Decimal(a)))
@@ -82,12 +67,6 @@ def test_functions_are_compiled_once_and_identified_by_object():
     other = primitive("twice", lambda a: a + a + 1.0)
     assert row_address(other) != row_address(entry)
     assert run(other, [1.0])[0] == 3.0
-
-
-def test_row_function_of_a_built_in_primitive_is_loaded_from_the_cache():
-    row_address(PRIMITIVES["sqrt"])
-    again = primitive_functions._compile.__wrapped__(PRIMITIVES["sqrt"].scalar, 1, "sqrt")
-    assert again.cache_hits == 1
 
 
 def test_row_function_of_a_user_is_compiled_in_every_process():

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from islands.errors import RecordError, SettingsError
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Constant, Lagged
+from islands.expressions.tree import Lagged
 from islands.expressions.user_primitive import primitive
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
-from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 from islands.records.dataset import Dataset
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value
@@ -54,15 +54,6 @@ def test_regressor_matrix_has_the_value_of_each_term_on_every_row(record, terms)
             assert expected is None or nearly(number, expected)
 
 
-def test_rows_start_after_the_warm_up_of_every_segment():
-    found = regressor_matrix([of("u(k-2)"), of("y(k-1)"), Lagged(0, 0)], ramp((5, 4)), 3)
-    assert found.tolist() == [[100.0, 200.0, 600.0], [2.0, 3.0, 7.0], [3.0, 4.0, 8.0]]
-
-
-def test_segments_no_longer_than_the_warm_up_have_no_rows():
-    assert regressor_matrix([Lagged(0, 0)], ramp((3, 5, 2, 4)), 3).tolist() == [[6.0, 7.0, 13.0]]
-
-
 def test_row_reads_nothing_of_another_segment():
     record = noise(60, (20, 40))
     terms = [of("y(k-1)*u(k-3)"), of("exp(u(k-5))")]
@@ -87,21 +78,6 @@ def test_rows_do_not_read_the_present_or_the_future():
     before, after = (regressor_matrix(terms, each, 4) for each in (record, later))
     np.testing.assert_array_equal(before[:, :27], after[:, :27])
     assert before[0, 27] != after[0, 27]
-
-
-@pytest.mark.parametrize("samples", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 5])
-def test_stretches_of_rows_are_contiguous(samples):
-    record = noise(samples + 2)
-    found = regressor_matrix([of("y(k-1)*u(k-2)"), of("u(k-1) - u(k-2)"), of("3")], record, 2)
-    y, u = record.y, record.u[:, 0]
-    np.testing.assert_array_equal(found, [y[1:-1] * u[:-2], u[1:-1] - u[:-2], np.ones(samples)])
-
-
-def test_terms_may_have_many_factors_and_constants():
-    record = noise(30)
-    found = regressor_matrix([of("y(k-1)^3*u(k-1)^3"), of("abs(2*y(k-1) + 0.5)")], record, 1)
-    y, u = record.y[:-1], record.u[:-1, 0]
-    np.testing.assert_allclose(found, [(y * u) ** 3, 2.0 * np.abs(y + 0.25) / 2.0], rtol=1e-14)
 
 
 def test_user_defined_primitive_equals_its_python_function():
@@ -145,37 +121,6 @@ def test_gram_matrix_equals_the_inner_products_bit_for_bit(segments):
     np.testing.assert_array_equal(gram_matrix(terms, record, 3), products(terms, record, 3))
 
 
-@pytest.mark.ci
-@given(records(longest=400), st.lists(regressors(height=2), min_size=1, max_size=3))
-def test_gram_matrix_equals_the_inner_products_for_any_segments(record, terms):
-    warm_up = max(item.maximum_lag for item in terms)
-    assume(max(record.segments) > warm_up)
-    np.testing.assert_array_equal(gram_matrix(terms, record, warm_up), products(terms, record, warm_up))
-
-
-def test_estimation_rows_follow_the_warm_up_of_every_segment():
-    found = select_rows(ramp((3, 5, 2, 4)), 3)
-    assert found.count == 3
-    # A stretch has at most one row: two rows in two lanes, and one; a chunk per segment.
-    assert found.apart.tolist() == [1, 1]
-    assert found.lanes.tolist() == [[2, *[0] * 7], [1, *[0] * 7]]
-    assert found.row[:, 0].tolist() == [0, 2]
-    for begin, sample in zip(found.offset, (6, 13), strict=True):
-        assert begin % 32 == 0
-        y, u = found.signals[:, begin - 3 * 32 : begin + 32 : 32]
-        assert y.tolist() == [sample - 3, sample - 2, sample - 1, sample]
-        assert u.tolist() == [100.0 * k for k in y]
-    assert found.signals[0, found.offset[0] + 1] == 7.0
-
-
-def test_gram_matrix_of_a_ramp_equals_a_hand_calculation():
-    # Rows 1 .. 3: y(k) = 1, 2, 3 and u(k-1) = 0, 100, 200.
-    assert gram_matrix([of("u(k-1)"), Lagged(0, 0)], ramp((4,)), 1).tolist() == [
-        [50000.0, 800.0],
-        [800.0, 14.0],
-    ]
-
-
 @pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
 def test_missing_output_is_refused_with_its_sample(matrix):
     y = np.arange(10.0)
@@ -205,12 +150,3 @@ def test_warm_up_shorter_than_the_largest_lag_is_refused(matrix, warm_up):
 def test_missing_input_is_refused(matrix):
     with pytest.raises(RecordError, match=f"the terms read input {INPUTS}, the record has 1"):
         matrix([of(f"y(k-1)*u{INPUTS}(k-1)")], ramp((20,)), 1)
-
-
-def test_constant_needs_no_warm_up():
-    assert regressor_matrix([Constant(2.5)], ramp((2, 1)), 0).tolist() == [[2.5, 2.5, 2.5]]
-
-
-def test_empty_list_of_terms_gives_no_columns():
-    assert regressor_matrix([], ramp((4,)), 1).shape == (0, 3)
-    assert gram_matrix([], ramp((4,)), 1).shape == (0, 0)

@@ -1,7 +1,6 @@
 """The pool recognises equal expressions, so that each is computed once."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Apply, Constant, Lagged
+from islands.expressions.tree import Lagged
 from islands.expressions.user_primitive import primitive
 from islands.kernels import codegen
 from islands.kernels.codegen import CONSTANT, LAGGED
@@ -115,20 +114,6 @@ def test_program_does_not_depend_on_other_terms_of_the_pool(terms, others):
     assert (operand_index == -1).all()
 
 
-@pytest.mark.ci
-def test_pool_grows_and_keeps_its_terms():
-    pool = TermPool()
-    texts = [f"exp({factor}*u(k-{lag})) + y(k-1)" for factor in range(2, 30) for lag in range(1, 40)]
-    indices = pool.terms([made(text) for text in texts]).tolist()
-    assert indices == list(range(len(texts)))
-    assert len(pool) == len(texts) > 1024
-    assert len(used_nodes(pool)) > 4 * 256
-    values = node_values(pool, lambda channel, lag: 1.0 / lag if channel else 2.0)
-    for number, text in ((0, texts[0]), (500, texts[500]), (len(texts) - 1, texts[-1])):
-        expected = value(made(text).expression, lambda channel, lag: 1.0 / lag if channel else 2.0)
-        assert values[pool.nodes.factors[number, 0]] == expected
-
-
 def test_deep_expression_and_many_nodes_give_a_program():
     """The expression is deeper than the initial stack, and has more nodes than the initial array."""
     text = "u(k-1)"
@@ -139,14 +124,6 @@ def test_deep_expression_and_many_nodes_give_a_program():
     assert len(wide.code) == 199 + 199 + 198
 
 
-def test_expression_and_its_regressor_have_the_same_index():
-    pool, item = TermPool(), made("y(k-1)*exp(u(k-1))")
-    assert pool.term(item) == pool.term(item.expression) == 0
-    assert pool.term(Lagged(0, 0)) == 1
-    assert pool.term(Constant(2.5)) == 2
-    assert pool.terms([]).shape == (0,)
-
-
 def test_functions_with_one_name_in_two_pools_keep_their_addresses():
     one, other = primitive("own", lambda a: a + 1.0), primitive("own", lambda a: a + 2.0)
     found = [
@@ -154,31 +131,6 @@ def test_functions_with_one_name_in_two_pools_keep_their_addresses():
     ]
     assert found == [[row_address(one)], [row_address(other)]]
     assert found[0] != found[1]
-
-
-@given(several, several)
-def test_program_does_not_depend_on_earlier_programs(terms, others):
-    """Programs share a pool of recent terms, which has other indices than a new pool."""
-    link(others)
-    pool = TermPool()
-    indices = pool.terms(terms)
-    expected = codegen.generate_program(pool.nodes, indices, np.full(pool.nodes.operation.size, -1, np.int64))
-    for again in (link(terms), link(terms)):
-        for found, column in zip(again, expected, strict=True):
-            np.testing.assert_array_equal(found, column)
-
-
-def test_function_with_the_name_of_a_built_in_one_keeps_its_address():
-    item, own = made("tanh(u(k-1))"), replace(primitive("mine", lambda a: a + 1.0), name="tanh")
-    link([item])
-    assert link([Apply(own, (Lagged(1, 1),))]).addresses.tolist() == [row_address(own)]
-    assert link([item]).addresses.tolist() == [row_address(PRIMITIVES["tanh"])]
-
-
-def test_zeros_of_both_signs_keep_their_sign():
-    for zero in (0.0, -0.0, 0.0):
-        (found,) = link([Apply(PRIMITIVES["max"], (Lagged(1, 1), Constant(zero)))]).constants
-        assert math.copysign(1.0, found) == math.copysign(1.0, zero)
 
 
 def test_pool_of_recent_terms_is_bounded():

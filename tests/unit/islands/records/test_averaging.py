@@ -11,7 +11,6 @@ from islands.models.narx import make_model
 from islands.records.averaging import average_samples, check_average, count_means
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
-from islands.records.split import Split, average_split
 
 
 def ramp(samples=11, **changes):
@@ -42,25 +41,6 @@ def test_no_mean_contains_samples_of_two_segments():
 )
 def test_an_interval_has_as_many_means_as_fill_its_time(samples, count, means):
     assert count_means(samples, count) == means
-
-
-def test_means_of_one_sample_are_the_record():
-    record = ramp()
-    assert average_samples(record, 1) is record
-    split = Split(record[:6], record[6:])
-    assert average_split(split, 1) is split
-
-
-def test_a_mean_over_a_missing_output_is_missing():
-    y = np.arange(6.0)
-    y[4] = np.nan
-    assert np.isnan(average_samples(Dataset(np.zeros(6), y, 1.0), 2).y).tolist() == [False, False, True]
-
-
-def test_a_large_offset_keeps_the_digits_of_the_signal():
-    signal = np.arange(8.0) * 2.0**-20
-    means = average_samples(Dataset(signal, signal + 2.0**30, 1.0), 4)
-    assert (means.y - 2.0**30).tolist() == means.u[:, 0].tolist()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ from islands.records.channel_names import (
     SYMBOLS,
     conversion_factor,
     is_unit,
-    normalise_unit,
     parse_channel_name,
     parse_unit,
     simplify_unit,
@@ -73,25 +72,6 @@ def test_units_with_prefixes_convert_by_powers_of_ten():
     assert [text for text in ("V", "N.m", "m/s2", "degC", "est", "", "B", "set") if is_unit(text)] == [
         *("V", "N.m", "m/s2", "degC")
     ]
-
-
-ORDINARY_NAMES = (
-    *("oven_temperature", "fan_speed", "pos_ref", "y_meas", "heater_power", "valve_opening", "tank_level_1"),
-    *("level_min", "level_max", "T_min", "u_d", "y_hat", "u_in", "y_out", "motor_on", "run_no", "flow_set"),
-    *("omega", "torque (measured)", "signal [raw]", "u", "in/out", "x_axis", "ch_2", "sensor_a", "e_sum"),
-)
-
-
-@pytest.mark.parametrize("name", ORDINARY_NAMES)
-def test_an_ordinary_name_has_no_unit(name):
-    assert parse_unit(name) == ""
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"), [("t_min", "min"), ("dead_time_h", "h"), ("flow_l_min", "l/min"), ("v_km_h", "km/h")]
-)
-def test_long_times_are_units_of_times_and_of_rates(name, unit):
-    assert parse_unit(name) == unit
 
 
 @pytest.mark.parametrize(
@@ -173,8 +153,3 @@ def test_every_unit_is_one_of_pint():
 )
 def test_the_unit_of_a_parameter_has_no_factor_one(unit, simple):
     assert simplify_unit(unit) == simple
-
-
-@pytest.mark.parametrize("name", ["Temperature(oC)", "T [ºC]", "T (°C)", "T_degC"])
-def test_spellings_of_degrees_are_one_unit(name):
-    assert normalise_unit(parse_channel_name(name).unit) == "C"

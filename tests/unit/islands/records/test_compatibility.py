@@ -51,12 +51,6 @@ def test_an_input_that_the_reference_reads_early_is_advanced_in_every_segment():
         match_record(record("a_V+1", "b"), given, advance=False)
 
 
-def test_units_follow_their_inputs():
-    given = record("b", "a", input_units=("um", "V"))
-    matched = match_record(record("a", "b", input_units=("V", "um")), given)
-    assert matched.input_units == ("V", "um")
-
-
 @pytest.mark.parametrize(
     ("expected", "given", "message"),
     [
@@ -106,8 +100,3 @@ def test_different_sampling_times_are_refused_for_records_and_models(dt):
     for reference in (record("u"), model):
         with pytest.raises(RecordError, match=r"sampling time of 0\.1 s, .*resample the record"):
             match_record(reference, record("u", dt=dt))
-
-
-def test_model_without_a_sampling_time_matches_every_record():
-    model = make_model([(parse("u(k-1)"), 1.0)], ("u",), "y_um")
-    assert match_record(model, record("u", dt=7.0)).dt == 7.0

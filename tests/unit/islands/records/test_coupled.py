@@ -55,13 +55,6 @@ def test_a_sample_without_one_output_is_skipped_for_all() -> None:
         ).skip_missing()
 
 
-def test_all_outputs_are_split_at_the_same_sample() -> None:
-    whole = replace(ONE, segments=(40,), recordings=()), replace(TWO, segments=(40,), recordings=())
-    parts = split_coupled(CoupledRecord(whole), 0.25)
-    np.testing.assert_array_equal(np.vstack([parts.estimation.y, parts.validation.y]), Y.T)
-    assert (parts.estimation.samples, parts.validation.samples) == (30, 10)
-
-
 def test_validation_data_are_other_samples_of_the_same_outputs() -> None:
     record = CoupledRecord((ONE, TWO))
     with pytest.raises(SettingsError, match="samples that are used for estimation"):

@@ -15,13 +15,6 @@ def test_the_limits_of_a_clipped_signal_are_found(lower, upper):
     assert find_limits(np.clip(wave(), lower, upper)) == SensorLimits(lower, upper)
 
 
-def test_missing_samples_are_no_limit():
-    y = np.clip(wave(), None, 0.7)
-    y[100:200] = np.nan
-    assert find_limits(y) == SensorLimits(None, 0.7)
-    assert find_limits(np.full(50, np.nan)) == SensorLimits()
-
-
 def test_the_rest_before_a_recording_moves_is_no_limit():
     move = 1.0 + wave()[:400] + 0.3 * np.sin(0.5 * np.arange(400))
     rest = np.zeros(50)

@@ -26,20 +26,10 @@ def test_sine_has_one_loop_per_period(periods):
     assert len(loop_starts(sine(periods))) == periods
 
 
-def test_offset_of_the_input_does_not_affect_loops():
-    here = sine(9)
-    there = Dataset(here.u + 100.0, here.y, here.dt)
-    np.testing.assert_array_equal(loop_starts(here), loop_starts(there))
-
-
 def test_noise_on_a_slow_input_creates_no_loops():
     record = sine(9)
     noisy = record.u[:, 0] + 0.05 * np.random.default_rng(0).standard_normal(record.samples)
     assert len(loop_starts(Dataset(noisy, record.y, record.dt))) == 9
-
-
-def test_constant_input_has_no_loops():
-    assert len(loop_starts(Dataset(np.ones(50), np.arange(50.0), 1.0))) == 0
 
 
 def test_loops_are_counted_by_the_first_varying_input():
@@ -59,18 +49,7 @@ def test_a_lag_or_hysteresis_under_a_sine_is_a_loop():
     assert has_loops(Dataset(noisy, play, 0.01))
 
 
-def test_a_static_output_encloses_no_area():
-    record = sine(6)
-    assert not has_loops(record)
-    assert not has_loops(Dataset(record.u, record.u[:, 0] ** 2, 0.01))
-    assert not has_loops(Dataset(record.u, np.ones(record.samples), 0.01))
-
-
 @pytest.mark.parametrize("hold", [1, 3])
 def test_fast_changes_of_the_input_make_no_loop(hold):
     u = np.repeat(np.random.default_rng(1).uniform(-1, 1, 600), hold)
     assert not has_loops(respond(u))
-
-
-def test_one_half_loop_is_no_loop():
-    assert not has_loops(respond(np.sin(np.arange(100) / 40)))

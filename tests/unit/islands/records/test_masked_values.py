@@ -51,12 +51,3 @@ def test_a_simulation_with_masked_samples_is_refused_as_one_with_nan():
         islands.diagnose(record, islands.function_simulator(simulate))
     with pytest.raises(islands.RecordError, match="has gaps"):
         islands.diagnose(record, "column:run", columns={"run": HIDDEN})
-
-
-@pytest.mark.ci  # scikit-learn is imported in some seconds
-def test_the_estimator_of_scikit_learn_refuses_masked_values():
-    from islands.sklearn import IslandsRegressor
-
-    for u, y in ((HIDDEN[:, None], U), (U[:, None], HIDDEN)):
-        with pytest.raises(ValueError, match="NaN"):
-            IslandsRegressor().fit(u, y)

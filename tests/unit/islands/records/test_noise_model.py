@@ -6,9 +6,7 @@ import scipy
 
 from islands.records.noise_model import (
     NoiseModel,
-    estimate_effective_samples,
     fit_noise,
-    take_fractional_difference,
 )
 from lab.diagnosis.injection.noise import NOISES
 
@@ -23,11 +21,6 @@ def test_order_and_coefficients_of_an_autoregression_are_recovered(poles: tuple[
     assert noise.coefficients == pytest.approx(coefficients, abs=0.03)
     assert noise.variance == pytest.approx(1.0, rel=0.03)
     assert np.std(noise.whiten(residual)) == pytest.approx(1.0, rel=0.03)
-
-
-def test_whitening_does_not_change_white_noise() -> None:
-    white = np.random.default_rng(2).standard_normal(1000)
-    assert np.array_equal(fit_noise(white).whiten(white), white)
 
 
 #: Lengths of recordings whose residuals have different means, so that a boundary is a large step.
@@ -49,17 +42,6 @@ def test_whitening_of_a_recording_does_not_depend_on_the_others() -> None:
     assert whitened.tolist() == np.concatenate([noise.whiten(part) for part in parts]).tolist()
 
 
-def test_noise_does_not_depend_on_the_order_of_recordings() -> None:
-    parts = draw_recordings()
-    forward, backward = np.concatenate(parts), np.concatenate(parts[::-1])
-    one, other = fit_noise(forward, segments=LENGTHS), fit_noise(backward, segments=LENGTHS[::-1])
-    assert other.coefficients == pytest.approx(one.coefficients, rel=1e-9)
-    assert other.variance == pytest.approx(one.variance, rel=1e-9)
-    assert estimate_effective_samples(forward, LENGTHS) == pytest.approx(
-        estimate_effective_samples(backward, LENGTHS[::-1]), rel=1e-9
-    )
-
-
 def test_autoregression_is_the_least_squares_fit_within_the_recordings() -> None:
     parts = draw_recordings()
     equations = np.concatenate(
@@ -76,13 +58,6 @@ def test_innovations_are_recovered_from_coloured_noise(difference_order: float) 
     noise = NoiseModel(np.array([0.5, 0.2]), 1.0, 500.0, difference_order)
     innovations = np.random.default_rng(4).standard_normal(500)
     assert noise.whiten(noise.colour(innovations)) == pytest.approx(innovations, abs=1e-9)
-
-
-def test_difference_of_order_one_is_the_difference_of_neighbours() -> None:
-    signal = np.random.default_rng(5).standard_normal(50)
-    assert take_fractional_difference(signal, 1.0) == pytest.approx(np.diff(signal, prepend=0.0), abs=1e-12)
-    half = take_fractional_difference(signal, 0.5)
-    assert take_fractional_difference(half, 0.5) == pytest.approx(np.diff(signal, prepend=0.0), abs=1e-12)
 
 
 def test_long_memory_is_recognised_by_its_spectrum() -> None:

@@ -1,5 +1,3 @@
-import json
-
 import numpy as np
 import pytest
 
@@ -7,7 +5,6 @@ from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset, join
 from islands.records.input_lead import advance_inputs
 from islands.records.preprocessing import preprocess
-from islands.records.preprocessing_steps import Preprocessing
 from support.known_records import lag, measure, slow, white
 
 
@@ -15,17 +12,6 @@ from support.known_records import lag, measure, slow, white
 def record():
     u = 3.0 + slow(2000, 0)
     return Dataset(u, 5.0 + lag(u, 8.0), 0.1)
-
-
-def test_no_step_returns_the_record(record):
-    assert preprocess(record) is record
-
-
-def test_constant_detrend_subtracts_the_means(record):
-    done = preprocess(record, detrend="constant")
-    assert done.u.mean() == pytest.approx(0.0, abs=1e-12)
-    assert done.y.mean() == pytest.approx(0.0, abs=1e-12)
-    assert done.preprocessing.output_offset == pytest.approx(record.y.mean())
 
 
 def test_linear_detrend_removes_a_drift_of_the_output(record):
@@ -79,16 +65,6 @@ def test_missing_outputs_stay_missing(record):
     y[100:110] = np.nan
     done = preprocess(Dataset(record.u, y, record.dt), lowpass=1.0, detrend="constant")
     np.testing.assert_array_equal(np.isnan(done.y), np.isnan(y))
-
-
-def test_steps_are_json(record):
-    found = preprocess(record, lowpass=1.0, decimate=2, detrend="constant").preprocessing
-    assert Preprocessing.from_document(json.loads(json.dumps(found.as_document()))) == found
-
-
-def test_parts_keep_the_steps(record):
-    done = preprocess(record, detrend="constant")
-    assert done[:100].preprocessing == done.preprocessing
 
 
 @pytest.mark.parametrize(

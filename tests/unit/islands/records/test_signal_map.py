@@ -16,7 +16,7 @@ from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_inputs
 from islands.records.preprocessing import preprocess
-from islands.records.signal_map import map_signals, match_rate
+from islands.records.signal_map import match_rate
 from islands.simulation.input_response import step_response
 from islands.simulation.predictors import free_run
 
@@ -97,11 +97,6 @@ def test_a_prediction_has_a_value_for_every_sample(steps):
     every = steps.get("decimate", 1)
     np.testing.assert_allclose(predicted[::every], expected_output(prepared, model), rtol=1e-9)
     assert np.isfinite(predicted[2 * every :]).all()
-
-
-def test_the_record_of_a_search_is_not_copied():
-    prepared, model = fitted({"detrend": "constant"})
-    assert map_signals(model, prepared) == (prepared, 0.0)
 
 
 def test_offsets_belong_to_equilibria_and_step_responses():

@@ -43,10 +43,6 @@ def test_a_faster_signal_is_stated_with_both_rates():
     assert "and by up to 0.4999 V/s" in statements[0]
 
 
-def test_a_channel_that_was_not_tested_does_not_count():
-    assert compare_ranges(measure(1.0), measure(1.0, channels=1)) == []
-
-
 def test_a_recording_does_not_change_at_its_border():
     u = np.repeat([0.0, 5.0], 100)
     record = Dataset(u, u, 0.1, segments=(100, 100))

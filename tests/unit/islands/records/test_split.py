@@ -7,16 +7,11 @@ import pytest
 
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset, join
-from islands.records.split import Split, hold_out, share_samples, split, split_data
+from islands.records.split import hold_out, share_samples, split, split_data
 
 
 def record(samples: int = 100, inputs: int = 1, **changes: object) -> Dataset:
     return Dataset(u=np.ones((samples, inputs)), y=np.arange(float(samples)), **({"dt": 0.1} | changes))
-
-
-def test_default_validation_part_is_a_quarter_of_the_record():
-    parts = split(record())
-    assert (parts.estimation.samples, parts.validation.samples) == (75, 25)
 
 
 @pytest.mark.parametrize(("samples", "fraction"), [(100, 0.1), (101, 0.5), (7, 0.3), (2, 0.5)])
@@ -33,37 +28,10 @@ def test_validation_part_is_the_end_of_the_record_and_keeps_its_time():
     assert parts.estimation.start == 2.0
 
 
-def test_segment_across_the_split_boundary_is_cut():
-    parts = split(record(segments=(50, 40, 10)), 0.25)
-    assert parts.estimation.segments == (50, 25)
-    assert parts.validation.segments == (15, 10)
-
-
 @pytest.mark.parametrize("fraction", [0.0, 1.0, -0.1, 1.5, float("nan")])
 def test_fraction_outside_zero_and_one_is_refused(fraction):
     with pytest.raises(SettingsError, match=f"between 0 and 1, got {fraction}"):
         split(record(), fraction)
-
-
-@pytest.mark.parametrize("fraction", [0.001, 0.999])
-def test_fraction_that_leaves_a_part_empty_is_refused(fraction):
-    with pytest.raises(SettingsError, match=f"{fraction} of 100 samples leaves a part empty"):
-        split(record(), fraction)
-
-
-def test_validation_inputs_take_the_order_of_the_estimation_data():
-    columns = np.arange(6.0).reshape(3, 2)
-    estimation = Dataset(columns, np.zeros(3), 0.1, ("a", "b"))
-    parts = Split(estimation, Dataset(columns[:, ::-1], np.ones(3), 0.1, ("b", "a")))
-    assert parts.validation.u.tolist() == columns.tolist()
-    assert parts.validation.input_names == ("a", "b")
-
-
-def test_parts_that_do_not_match_are_refused():
-    with pytest.raises(
-        RecordError, match=r"estimation data has a sampling time of 0\.1 s, the validation data"
-    ):
-        Split(record(), record(dt=0.1005))
 
 
 # Data for a search.
@@ -87,16 +55,6 @@ def test_estimation_data_are_refused_as_validation_data():
             split_data(data, validation)
     with pytest.raises(SettingsError, match="used for estimation"):
         split_data(data[10:40], data)
-
-
-def test_other_data_are_accepted_as_validation_data():
-    data = drawn()
-    assert split_data(data[:30], data[30:]).validation.samples == 20
-    assert split_data(data, drawn(seed=1)).validation.samples == 50
-    # Two recordings that begin at rest have equal first samples.
-    u = np.concatenate([np.zeros(10), np.ones(10)])
-    early, late = Dataset(u, u, 0.1), Dataset(u, u + (u > 0), 0.1, start=-1.0)
-    assert not share_samples(early, late)
 
 
 def test_samples_of_one_file_are_shared_if_the_rows_and_the_column_are():

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
@@ -37,15 +35,6 @@ def test_a_record_is_read_back_exactly(tmp_path):
     assert found.segments == (50,)
 
 
-@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=30, max_size=40, unique=True))
-def test_every_number_is_read_back_exactly(tmp_path_factory, values):
-    file = tmp_path_factory.mktemp("writer") / "r.csv"
-    write_record(Dataset(np.array(values), np.array(values[::-1]), 1.0), file)
-    found = read_record(file, ["u"], "y", outliers="keep")
-    assert found.u[:, 0].tolist() == values
-    assert found.y.tolist() == values[::-1]
-
-
 @pytest.mark.parametrize(
     ("dt", "start"),
     [
@@ -67,34 +56,12 @@ def test_sampling_time_and_start_survive_at_any_ratio(dt, start, tmp_path):
     assert found.start == pytest.approx(start, rel=1e-12, abs=1e-6 * dt)
 
 
-def test_times_are_written_without_rounding_errors(tmp_path):
-    write_record(record(50, 0.1), tmp_path / "r.csv")
-    times = [line.split(",")[0] for line in (tmp_path / "r.csv").read_text().splitlines()]
-    assert times[:5] == ["t_s", "0.0", "0.1", "0.2", "0.3"]
-    assert max(len(cell) for cell in times) == 3
-
-
 def test_a_file_has_a_header_and_one_line_per_sample_on_any_platform(tmp_path):
     write_record(record(40), tmp_path / "r.csv")
     raw = (tmp_path / "r.csv").read_bytes()
     assert raw.startswith(b"t_s,u_V,T_K,y_um\n")
     assert raw.count(b"\n") == 41
     assert b"\r" not in raw
-
-
-def test_a_name_that_needs_quotes_is_quoted(tmp_path):
-    odd = record(input_names=('u, "left"', "µ_µm"))
-    write_record(odd, tmp_path / "r.csv")
-    found = read_record(tmp_path / "r.csv", ['u, "left"', "µ_µm"], "y_um")
-    assert np.array_equal(found.u, odd.u)
-
-
-def test_a_missing_output_stays_missing(tmp_path):
-    y = record().y.copy()
-    y[10:] = math.nan
-    holed = Dataset(record().u, y, 0.01, **NAMES)
-    write_record(holed, tmp_path / "r.csv")
-    assert np.array_equal(read(tmp_path / "r.csv").y, y, equal_nan=True)
 
 
 def test_several_recordings_do_not_fit_into_one_table(tmp_path):

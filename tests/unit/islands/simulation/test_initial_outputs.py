@@ -33,33 +33,12 @@ def test_free_run_of_an_integrator_has_the_error_of_the_noise():
     assert max(measured) > 1.8 * TANK_NOISE
 
 
-def test_only_the_outputs_before_the_first_prediction_change():
-    record = make_tank(5, 400)
-    started = estimate_initial_outputs(TANK, record, 3)
-    assert started is not record
-    assert np.flatnonzero(started.y != record.y).tolist() == [2]
-    assert abs(started.y[2] - record.y[2]) < 4.0 * TANK_NOISE
-
-
 def test_initial_outputs_are_estimated_for_each_segment():
     record = join((make_tank(5, 300), make_tank(6, 200)))
     started = estimate_initial_outputs(TANK, record)
     assert np.flatnonzero(started.y != record.y).tolist() == [0, 300]
     alone = [estimate_initial_outputs(TANK, make_tank(seed, count)) for seed, count in ((5, 300), (6, 200))]
     assert started.y == pytest.approx(np.concatenate([each.y for each in alone]), abs=1e-12)
-
-
-def test_samples_after_the_first_part_have_no_influence():
-    record = make_tank(5, 400)
-    later = np.array(record.y)
-    later[200:] += 0.002
-    started = [estimate_initial_outputs(TANK, each).y[0] for each in (record, replace(record, y=later))]
-    assert started[0] == pytest.approx(started[1], abs=1e-12)
-
-
-def test_record_without_noise_is_not_changed():
-    record = make_tank(0, 400, noise=0.0)
-    assert estimate_initial_outputs(TANK, record) is record
 
 
 def test_initial_outputs_of_a_model_that_forgets_them_are_the_measured_ones():

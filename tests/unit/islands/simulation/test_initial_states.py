@@ -8,10 +8,8 @@ import pytest
 from islands.export import export
 from islands.kernels.state_space import simulate_state_space
 from islands.records.dataset import Dataset, join
-from islands.records.input_lead import advance_inputs
 from islands.simulation.initial_states import (
     Segment,
-    estimate_initial_states,
     estimate_states,
     simulate_errors,
 )
@@ -28,14 +26,6 @@ def test_states_of_a_record_without_noise_are_found():
     model = make_model()
     found = estimate_states(model.theta, model.codes, Segment(record.u, record.y), model.rest)
     assert found == pytest.approx([0.5, -0.4], abs=1e-3)
-
-
-def test_a_state_that_the_output_does_not_show_rests():
-    model = make_model({"a1_1": 0.5, "a2_2": 0.9, "b1": 1.0, "c1": 1.0, "o2": 0.2}, ())
-    record = spring_record(100)
-    found = estimate_states(model.theta, model.codes, Segment(record.u, record.y), model.rest)
-    assert model.rest[1] == pytest.approx(2.0)
-    assert found[1] == pytest.approx(2.0)
 
 
 def test_every_segment_has_its_initial_states():
@@ -58,25 +48,6 @@ def test_a_model_of_two_inputs_is_simulated():
         y[k] = x
         x = 0.9 * x + u[k] @ [0.4, -0.2]
     assert free_run(model, Dataset(u, y, 0.01, names, "y")).y[20:] == pytest.approx(y[20:], abs=1e-3)
-
-
-def test_an_input_that_is_read_early_gives_the_same_states():
-    record, model = spring_record(200), make_model()
-    early = make_model(input_names=("u_V+1",))
-    found = [
-        estimate_initial_states(each, data, np.array([100]), 80)
-        for each, data in ((model, record), (early, advance_inputs(record, [0])))
-    ]
-    assert found[0] == pytest.approx(found[1], abs=1e-3)
-
-
-def test_outputs_after_the_warm_up_have_no_influence():
-    record, model = spring_record(200), make_model()
-    found = estimate_initial_states(model, record, np.array([50]), 50)
-    changed = spring_record(200)
-    changed.y.flags.writeable = True
-    changed.y[50:] = 7.0
-    assert (estimate_initial_states(model, changed, np.array([50]), 50) == found).all()
 
 
 def test_a_model_that_diverges_in_the_warm_up_diverges_at_the_first_prediction():

@@ -25,10 +25,6 @@ def test_the_response_is_the_free_run_of_a_record_that_rests_before_it():
     assert found.u[:, 0].tolist() == U.tolist()
 
 
-def test_the_output_rests_at_a_constant_input():
-    assert input_response(LAG, np.full(50, 1.5)).y == pytest.approx(3.0)
-
-
 def test_an_input_that_acts_at_once_acts_on_the_first_sample():
     # The last value has no successor, so the input is held.
     assert input_response(DIRECT, U, 0.0).y == pytest.approx(3.0 * U)
@@ -72,12 +68,6 @@ def test_a_first_order_response_is_exponential():
     # The response is simulated until it has settled.
     assert abs(found.y[-1] - 4.0) < 0.02
     assert repr(found) == f"<StepResponse of {len(found.time)} samples: u to y>"
-
-
-def test_an_input_that_acts_at_once_steps_the_output_at_time_zero():
-    found = step_response(DIRECT, 0.0, 1.0, samples=4)
-    assert found.y[found.time >= 0].tolist() == [3.0] * 4
-    assert found.y[found.time < 0].tolist() == [0.0] * 6
 
 
 def test_a_model_of_hysteresis_steps_from_a_given_output():

@@ -40,35 +40,12 @@ def test_every_sample_after_a_warm_up_belongs_to_one_interval(record, interval):
 
 
 @pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
-def test_lane_contains_its_samples_and_their_warm_up(record, interval):
-    cut = layout(record, WARM_UP, interval)
-    for offset, lanes, starts, lengths in blocks(cut):
-        for lane in range(lanes):
-            samples = np.arange(starts[lane] - WARM_UP, starts[lane] + lengths[lane])
-            rows = offset + np.arange(len(samples)) * cut.row_stride + lane
-            for channel, base in enumerate((0, 1000, 2000)):
-                assert np.array_equal(cut.signals[channel, rows], samples + base)
-
-
-@pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
 def test_blocks_fit_the_width_and_intervals_are_sorted_by_length(record, interval):
     cut = layout(record, WARM_UP, interval)
     assert cut.width in WIDTHS
     assert 1 <= cut.block_lanes.min() <= cut.block_lanes.max() <= cut.width
     for _, _, _, lengths in blocks(cut):
         assert (np.diff(lengths) <= 0).all()
-
-
-def test_last_interval_of_a_segment_may_be_shorter(record):
-    cut = layout(record, WARM_UP, 100)
-    assert sorted(zip(cut.start.tolist(), cut.length.tolist(), strict=True)) == [
-        (5, 100),
-        (105, 100),
-        (205, 25),
-        (244, 100),
-        (344, 15),
-        (364, 1),
-    ]
 
 
 def test_one_step_ahead_layout_does_not_gather_samples(record):
@@ -104,18 +81,6 @@ def test_gathered_row_only_contains_samples_of_the_record(monkeypatch, record, i
         assert np.array_equal(block[:, lanes:], np.repeat(block[:, :1], width - lanes, axis=1))
 
 
-def test_layout_stores_the_largest_measured_output(record):
-    assert layout(record, WARM_UP, None).largest == sum(SEGMENTS) - 1
-    y = np.full(9, np.nan)
-    assert layout(Dataset(np.zeros(9), y, 1.0), 0, None).largest == 0.0
-    y[[2, 5]] = -7.0, 3.0
-    assert layout(Dataset(np.zeros(9), y, 1.0), 0, None).largest == 7.0
-
-
-def test_layout_without_warm_up_covers_the_whole_record(record):
-    assert layout(record, 0, None).length.sum() == record.samples
-
-
 @pytest.mark.parametrize("interval", [0, -3])
 def test_interval_without_a_sample_is_refused(record, interval):
     with pytest.raises(SettingsError, match=f"^a shooting interval has at least 1 sample, got {interval}$"):
@@ -139,12 +104,3 @@ def test_missing_output_in_the_warm_up_of_an_interval_is_refused(record, sample,
     gap = Dataset(record.u, y, 0.1, segments=SEGMENTS)
     with pytest.raises(RecordError, match=f"^the output is missing at sample {sample}, where a simulation"):
         layout(gap, WARM_UP, interval)
-
-
-def test_missing_output_outside_the_warm_ups_is_accepted(record):
-    y = record.y.copy()
-    y[WARM_UP:230] = np.nan
-    gap = Dataset(record.u, y, 0.1, segments=SEGMENTS)
-    assert layout(gap, WARM_UP, None).length.sum() == layout(record, WARM_UP, None).length.sum()
-    with pytest.raises(RecordError, match=r"^the output is missing at sample 100, where"):
-        layout(gap, WARM_UP, 100)

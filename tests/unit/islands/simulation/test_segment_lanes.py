@@ -46,13 +46,6 @@ def test_the_errors_are_those_of_each_segment_alone(unit, lengths):
     assert lanes.counts.tolist() == [np.count_nonzero(~np.isnan(each.y)) for each in segments]
 
 
-def test_a_system_without_units_is_simulated():
-    segments, theta = make_segments((50, 20), np.random.default_rng(1)), make_theta(0)
-    codes, starts = np.array([], np.int64), np.zeros((2, STATES))
-    errors = SegmentLanes(segments).sum_squared_errors(theta, codes, starts)
-    assert errors[1] == pytest.approx(np.nansum(simulate_errors(theta, codes, segments[1], starts[1]) ** 2))
-
-
 def test_the_errors_of_a_divergence_are_missing():
     theta = make_theta(0)
     theta[0] = 1.5

@@ -13,19 +13,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError
 from islands.expressions.tree import Symbol
 from islands.records.dataset import Dataset
-from islands.simulators.built_in_estimates import FASTEST, SecondOrder, estimate_second_order
+from islands.simulators.built_in_estimates import SecondOrder, estimate_second_order
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator
 from islands.simulators.ode.system import OdeEffect
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
-from islands.simulators.specification.table import SIMULATORS, LocalExtendedSpec, PhysicalSpec
-from islands.systems.bouc_wen import BoucWenPiezo
-from islands.systems.bouc_wen import simulate as simulate_piezo
+from islands.simulators.specification.table import LocalExtendedSpec, PhysicalSpec
 from support.built_in_simulators import make_oscillator, make_piezo, make_tanks
 from support.simulated_records import made, recorded, simulate_oscillator, wave
 from support.strategies import part_of_the_examples
@@ -92,13 +90,6 @@ def test_tanks_have_the_levels_of_a_fine_integration() -> None:
     assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-4 * np.ptp(expected))
 
 
-def test_a_piezo_has_the_output_of_equation_11() -> None:
-    u = wave()
-    simulation = extend(make_piezo(), u)
-    expected = simulate_piezo(BoucWenPiezo(), u, 0.01)
-    assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-9)
-
-
 def test_a_part_of_the_overflow_enters_the_lower_tank() -> None:
     u = 3.0 + wave() / 25
     simulation = extend(make_tanks(**TANKS, levels=LEVELS), u, 0.5, steps=16)
@@ -107,24 +98,6 @@ def test_a_part_of_the_overflow_enters_the_lower_tank() -> None:
         expected = simulate_tanks(u, 0.5, 4.2, caught)
         assert simulation.simulate(simulation.nominal, clip) == pytest.approx(expected, abs=0.02)
         assert np.max(np.abs(expected - simulate_tanks(u, 0.5))) > 0.2
-
-
-def test_a_gain_of_the_piezo_does_not_change_its_hysteresis() -> None:
-    u = wave()
-    simulation = extend(make_piezo(), u)
-    change = simulation.simulate(simulation.nominal, {"ageing": 0.1}) - simulation.simulate(
-        simulation.nominal
-    )
-    assert change == pytest.approx(1.6 * u * 0.1 * np.arange(u.size) / u.size, abs=1e-9)
-
-
-def test_a_held_voltage_gives_the_same_hysteresis_as_a_ramp() -> None:
-    """Hysteresis does not depend on the rate, so that only the values at the samples matter."""
-    u, piezo = wave(), make_piezo()
-    simulation = extend(piezo, u)
-    held = ExtendedSimulator(ResampledSimulator(piezo, InterSample.ZOH, 4), (), simulation.context)
-    expected = simulation.simulate(simulation.nominal)
-    assert held.simulate(held.nominal) == pytest.approx(expected, abs=1e-4)
 
 
 def test_every_effect_on_a_piezo_matches_the_reference_solution() -> None:
@@ -223,13 +196,6 @@ def test_an_effect_that_does_not_exist_is_refused() -> None:
         make_ode_simulator(system, recorded(wave(), wave(), units=("N", "m")), {"x": 0.0, "v": 0.0})
 
 
-def test_parameters_that_can_be_given_are_those_of_the_equations() -> None:
-    for name in OLD_EFFECTS:
-        simulator = made()[name].simulator
-        names = {each.name for each in simulator.parameters if not each.initial}
-        assert names == SIMULATORS[name].parameters.keys()
-
-
 def test_extended_tanks_start_from_estimated_levels_on_other_records() -> None:
     """From an empty upper tank, whose outflow has no derivative there, its level would not be found."""
     u = 3.0 + wave() / 25
@@ -296,17 +262,6 @@ def test_given_parameters_are_kept_and_the_others_recovered(names: tuple[str, ..
     assert {name: kept[name] for name in names} == chosen
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize("names", ["m", "c", "k"])
-def test_wrong_given_parameters_are_kept(names: str) -> None:
-    truth, u = make_system(3.0, 0.08, 0.4, 0.5, -0.7), make_input()
-    wrong = {"m": 1.3 * truth.mass, "c": 0.6 * truth.damping, "k": 1.2 * truth.stiffness}
-    chosen = {name: wrong[name] for name in names}
-    found = estimate_second_order(u, simulate(truth, u), DT, chosen)
-    kept = {"m": found.mass, "c": found.damping, "k": found.stiffness}
-    assert {name: kept[name] for name in names} == chosen
-
-
 @pytest.mark.parametrize("name", ["c", "k"])
 def test_given_zero_does_not_determine_the_scale(name: str) -> None:
     """Estimate the mass without a damper and without a spring."""
@@ -317,31 +272,6 @@ def test_given_zero_does_not_determine_the_scale(name: str) -> None:
     assert (found.mass, found.damping, found.stiffness) == pytest.approx(
         (truth.mass, truth.damping, truth.stiffness), rel=1e-4
     )
-
-
-def test_estimate_is_not_faster_than_the_samples() -> None:
-    rng = np.random.default_rng(3)
-    u = np.cumsum(rng.standard_normal(800))
-    # A static response: any fast system explains it.
-    found = estimate_second_order(u, 0.5 * u + 0.01 * rng.standard_normal(800), 0.01, {})
-    assert found.stiffness == pytest.approx(2.0, rel=0.05)
-    assert found.damping / found.mass <= FASTEST / 0.01 * (1.0 + 1e-9)
-    assert (found.stiffness / found.mass) ** 0.5 <= FASTEST / 0.01 * (1.0 + 1e-9)
-
-
-def test_zero_mass_is_refused() -> None:
-    u = make_input()
-    with pytest.raises(SettingsError, match="a mass of zero"):
-        estimate_second_order(u, u, DT, {"m": 0.0})
-
-
-def test_initial_state_does_not_depend_on_the_level_of_the_input() -> None:
-    """The input starts at a nonzero value; there is no ramp before the first sample."""
-    truth, u = make_system(1.0, 0.2, 2.0, 0.0, 0.0), 30.0 + make_input()
-    found = estimate_second_order(u, simulate(truth, u), DT, {})
-    size = 30.0 / truth.stiffness
-    assert found.position == pytest.approx(0.0, abs=1e-6 * size)
-    assert found.rate == pytest.approx(0.0, abs=1e-5 * size)
 
 
 def test_estimate_from_a_noisy_record_is_within_one_per_cent() -> None:

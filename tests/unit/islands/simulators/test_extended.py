@@ -112,16 +112,6 @@ def test_a_map_of_a_held_input_is_that_of_its_samples(name: str) -> None:
     )
 
 
-def test_a_rate_limit_of_a_held_input_makes_ramps() -> None:
-    record, effects = record_of(np.repeat(wave(80), 5)), (CATALOGUE["rate-limit"],)
-    held = ResampledSimulator(OSCILLATOR, InterSample.ZOH, 16)
-    simulation = ExtendedSimulator(held, effects, make_context(record, held, record.samples))
-    values = set_values(simulation)
-    dense = record_of(np.repeat(record.u[:, 0], TIMES), DT / TIMES)
-    exact = simulate(ResampledSimulator(OSCILLATOR, InterSample.ZOH), dense, effects, values)[::TIMES]
-    assert simulation.simulate(values) == pytest.approx(exact, abs=1e-3 * np.ptp(exact))
-
-
 def test_a_static_map_before_another_map_acts_on_the_samples() -> None:
     """A delay needs samples, and the order of the maps is kept."""
     record = record_of(wave())

@@ -61,33 +61,6 @@ def test_smaller_steps_converge_to_the_exact_motion(intersample: InterSample, ex
         assert coarse / fine == pytest.approx(16.0, rel=0.3)
 
 
-def test_one_step_with_a_linear_input_is_the_wrapped_simulator() -> None:
-    u = wave()
-    assert np.array_equal(simulate(ResampledSimulator(oscillator()), u), simulate(oscillator(), u))
-
-
-def test_declarations_are_those_of_the_wrapped_simulator() -> None:
-    inner, resampled = oscillator(), ResampledSimulator(oscillator(), InterSample.ZOH, 4)
-    for name in (
-        "name",
-        "parameters",
-        "sites",
-        "supported_effects",
-        "built_in_effects",
-        "is_continuous_time",
-    ):
-        assert getattr(resampled, name) == getattr(inner, name)
-    assert [each.name for each in resampled.state_effects] == [each.name for each in inner.state_effects]
-
-
-def test_the_cache_of_inputs_does_not_change_the_output() -> None:
-    inputs = [wave(), wave() ** 2 / 20, np.flip(wave()).copy()]
-    cached = ResampledSimulator(oscillator(), InterSample.BAND_LIMITED, 4)
-    for u in (*inputs, *inputs):
-        fresh = ResampledSimulator(oscillator(), InterSample.BAND_LIMITED, 4)
-        assert np.array_equal(simulate(cached, u), simulate(fresh, u))
-
-
 @given(signals, st.sampled_from([1, 2, 3, 8]))
 def test_every_resampled_input_contains_all_samples(x: Array, oversampling: int) -> None:
     for intersample in InterSample:
@@ -96,17 +69,6 @@ def test_every_resampled_input_contains_all_samples(x: Array, oversampling: int)
         assert between.shape == (2, oversampling * x.size)
         assert u[::oversampling] == pytest.approx(x, abs=1e-4 * np.max(np.abs(x)) + 1e-12)
         assert np.isfinite(between).all()
-
-
-@given(signals, st.sampled_from([1, 2, 3, 8]))
-def test_a_zero_order_hold_is_constant_and_a_first_order_hold_is_linear(x: Array, oversampling: int) -> None:
-    u, between = resample_input(x, InterSample.ZOH, oversampling)
-    assert np.array_equal(u, np.repeat(x, oversampling))
-    # Discontinuities are after the end of a step, never inside a step.
-    assert np.array_equal(between, np.stack([u, u]))
-    u, between = resample_input(x, InterSample.FOH, oversampling)
-    assert between[1, :-1] == pytest.approx(u[1:], abs=1e-12)
-    assert between[0, :-oversampling] == pytest.approx((u + between[1])[:-oversampling] / 2, abs=1e-12)
 
 
 @pytest.mark.parametrize("oversampling", [1, 2, 4])

@@ -8,13 +8,12 @@ import pytest
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, evaluate_fit
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.calibration.target import Target
-from islands.effects.catalogue import CORE_SHAPE
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.persistence.models import model_from_json
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.narx import SLOPE, NarxSimulator
+from islands.simulators.narx import NarxSimulator
 from lab.diagnosis.cases import CASES
 from lab.diagnosis.injection.measurement import FaultyRecord, inject
 
@@ -46,21 +45,6 @@ def get_starting_values(extended: ExtendedSimulator, faulty: FaultyRecord) -> np
 def model(**terms: str) -> Model:
     split = (term.split(" * ", 1) for term in terms.values())
     return make_model([(parse(text), float(parameter)) for parameter, text in split])
-
-
-def test_missing_terms_with_zero_coefficients_have_no_response(extended: ExtendedSimulator) -> None:
-    alone = extended.with_effects(())
-    with_slope = extended.simulate(extended.nominal)
-    assert with_slope == pytest.approx(alone.simulate(alone.nominal), abs=1e-9)
-
-
-def test_missing_terms_have_unique_names_and_are_not_in_the_model(extended: ExtendedSimulator) -> None:
-    assert isinstance(extended.simulator, NarxSimulator)
-    names = [parameter.name for parameter in extended.parameters]
-    assert len(set(names)) == len(names)
-    own = {item.text for item in extended.simulator.model.regressors}
-    assert not own & {name.removeprefix(f"{CORE_SHAPE} ").replace("u(", "u1(") for name in names}
-    assert names[-1] == SLOPE
 
 
 def test_calibrated_missing_terms_reduce_the_error_to_the_noise(

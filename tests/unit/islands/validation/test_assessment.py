@@ -13,8 +13,6 @@ from islands.records.split import Split
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from islands.validation.assessment import MODES, PARTS, assess, average_errors
 from islands.validation.metrics import metrics
-from islands.validation.physics import check_physics
-from islands.validation.residual_tests import residual_tests
 
 SHOOTING = 7
 
@@ -67,23 +65,6 @@ def test_metrics_of_every_part_and_mode_are_those_of_its_simulation(warm_up):
     assert len(set(errors)) == 3
 
 
-def test_physics_checks_use_the_estimation_data():
-    split = Split(record(200), record(90, seed=1, size=5.0))
-    found = assess(LINEAR, split, SHOOTING)
-    assert found.physics == check_physics(LINEAR, split.estimation)
-    assert found.physics != check_physics(LINEAR, split.validation)
-
-
-def test_information_criteria_use_the_one_step_ahead_estimation_residual():
-    data = PARTS_OF_DATA.estimation
-    residual = data.y[5:] - 0.7 * data.y[4:-1] - 0.5 * data.u[4:-1, 0] - 0.2 * data.u[3:-2, 0]
-    squares = float(np.sum(residual**2))
-    found = assess(LINEAR, PARTS_OF_DATA, SHOOTING, warm_up=5).information
-    assert found.aic == pytest.approx(195 * math.log(squares / 195) + 2 * 3, rel=1e-12)
-    assert found.bic == pytest.approx(195 * math.log(squares / 195) + 3 * math.log(195), rel=1e-12)
-    assert found.fpe == pytest.approx(squares / 195 * 198 / 192, rel=1e-12)
-
-
 @pytest.mark.parametrize(("constraints", "free"), [("none", 6), ("hysteresis", 4)])
 def test_information_criteria_count_only_free_parameters(constraints, free):
     # Two clusters, {y(k-1), y(k-2)} and {u(k-1), u(k-2)}, impose one constraint each.
@@ -102,15 +83,6 @@ def test_information_criteria_count_only_free_parameters(constraints, free):
     assert found.aic == pytest.approx(198 * math.log(squares / 198) + 2 * free, rel=1e-12)
     assert found.bic == pytest.approx(198 * math.log(squares / 198) + free * math.log(198), rel=1e-12)
     assert found.fpe == pytest.approx(squares / 198 * (198 + free) / (198 - free), rel=1e-12)
-
-
-def test_residual_tests_use_the_one_step_ahead_validation_residual():
-    data = PARTS_OF_DATA.validation
-    found = assess(LINEAR, PARTS_OF_DATA, SHOOTING).residual_tests
-    expected = residual_tests(data.y - one_step_ahead(LINEAR, data).y, data.u, max_lag=25)
-    assert found.ljung_box == expected.ljung_box
-    assert found.whiteness_p == expected.whiteness_p
-    assert [test.values.tolist() for test in found.tests] == [test.values.tolist() for test in expected.tests]
 
 
 # Divergence.
@@ -190,14 +162,6 @@ def test_errors_of_the_recordings_add_up_to_those_of_the_part():
     assert found.recordings["estimation"] == {}
 
 
-def test_recording_shorter_than_the_warm_up_is_ignored():
-    long = record(80, 1)
-    both = assess(LINEAR, Split(record(200), join((record(2, 7), long))), SHOOTING)
-    single = assess(LINEAR, Split(record(200), long), SHOOTING)
-    assert both.metrics["validation"]["free_run"].rmse == single.metrics["validation"]["free_run"].rmse
-    assert both.residual_tests.ljung_box == single.residual_tests.ljung_box
-
-
 @pytest.mark.parametrize(("residuals", "lag"), [(3, 1), (4, 1), (7, 2), (20, 9), (52, 25), (80, 25)])
 def test_short_validation_part_is_tested_at_fewer_lags(residuals, lag):
     found = assess(LINEAR, Split(record(200), record(residuals + 2)), SHOOTING)
@@ -219,23 +183,7 @@ def test_validation_part_without_a_prediction_is_refused():
         assess(LINEAR, Split(record(200), record(2)), SHOOTING)
 
 
-def test_constant_validation_output_has_an_rmse_but_no_mape_or_r2():
-    constant = Dataset(record(90).u, np.full(90, 0.25), 0.1)
-    found = assess(LINEAR, Split(record(200), constant), SHOOTING).metrics["validation"]["free_run"]
-    assert found.rmse > 0.0
-    assert math.isnan(found.mape)
-    assert math.isnan(found.r2)
-
-
 # Errors of every sample.
-
-
-def test_squared_errors_are_fractions_of_the_output_range():
-    data = record(90)
-    found = assess(LINEAR, Split(record(200), data), SHOOTING, warm_up=5).squared_errors
-    error = (data.y - free_run(LINEAR, data, 5).y) / np.ptp(data.y)
-    assert np.isnan(found[:5]).all()
-    assert found[5:] == pytest.approx(error[5:] ** 2)
 
 
 def test_a_diverged_free_run_has_no_errors():

@@ -1,7 +1,5 @@
 """Range of the data: bands keep their width inside of it, and widen outside."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -17,22 +15,11 @@ def record(u):
     return Dataset(np.array(u, float), np.zeros(len(u)), 0.1)
 
 
-def test_the_error_is_that_of_the_data_inside_of_the_range():
-    found = RANGE.increase(record([0.0, 2.0, 4.0]), np.array([-1.0, 0.0, 1.0]))
-    assert found.tolist() == [0.0, 0.0, 0.0]
-
-
 @pytest.mark.parametrize(("u", "run"), [(0.0, 1.2), (0.0, -1.2), (4.4, 0.0), (-0.4, 0.0)])
 def test_the_error_grows_as_a_chebyshev_polynomial_outside(u, run):
     """A tenth of a range beyond a limit is 1.2 half-ranges from the centre."""
     expected = np.cosh(4.0 * np.arccosh(1.2)) ** 2 - 1.0
     assert RANGE.increase(record([u]), np.array([run])) == pytest.approx([expected])
-
-
-def test_noise_does_not_grow():
-    found = replace(RANGE, predictable=0.25).increase(record([4.4]), np.zeros(1))
-    assert found == pytest.approx(0.25 * RANGE.increase(record([4.4]), np.zeros(1)))
-    assert replace(RANGE, predictable=0.0).increase(record([9.0]), np.zeros(1)) == [0.0]
 
 
 def test_an_excess_decays_over_the_memory_of_its_segment():

@@ -17,8 +17,7 @@ from islands.records.split import split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import free_run
 from islands.validation import ensemble as ensemble_module
-from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
-from islands.validation.prediction_bands import calibrate_bands
+from islands.validation.ensemble import ValidatedModel, make_ensemble
 
 TRUE = ("y(k-1)", "u(k-1)", "y(k-1)*u(k-1)")
 STRUCTURES = (TRUE, TRUE[:2], (*TRUE, "u(k-2)"), (*TRUE, "y(k-2)", "u(k-1)*u(k-1)"))
@@ -63,14 +62,6 @@ def test_a_term_that_the_law_lacks_has_a_small_inclusion_probability(noise):
     assert found.inclusion(term("u(k-9)").text) == 0.0
 
 
-def test_weights_sum_to_one_and_are_sorted():
-    found = ensemble(parts(0.02))
-    weights = [each.weight for each in found.structures]
-    assert sum(weights) == pytest.approx(1.0)
-    assert weights == sorted(weights, reverse=True)
-    assert found.weights.sum() == pytest.approx(1.0)
-
-
 def test_the_order_of_the_candidates_and_bad_candidates_have_no_effect():
     data = parts(0.02)
     worse = replace(candidate(TRUE, data), error=1e3)
@@ -80,23 +71,9 @@ def test_the_order_of_the_candidates_and_bad_candidates_have_no_effect():
     assert members(reordered) == members(make_ensemble(entries, data, "none", 2, 0))
 
 
-def test_a_seed_determines_the_ensemble():
-    data = parts(0.02)
-    assert members(ensemble(data)) == members(ensemble(data))
-    assert members(ensemble(data)) != members(ensemble(data, seed=1))
-
-
 def test_there_is_no_ensemble_without_a_bounded_free_run():
     data = parts()
     assert make_ensemble([replace(candidate(TRUE, data), error=np.inf)], data, "none", 2, 0) is None
-
-
-def test_the_band_of_an_exact_law_has_the_width_of_rounding():
-    data, new = parts(), parts(seed=1)
-    found, model = ensemble(data, [TRUE]), candidate(TRUE, data).model
-    band = calibrate_bands([model], found, data, 2)[0].predict(model, new.validation)
-    assert np.nanmax(band.upper - band.lower) < 1e-13
-    assert band.y[2:] == pytest.approx(new.validation.y[2:], abs=1e-13)
 
 
 def test_implausible_members_are_left_out():
@@ -129,14 +106,6 @@ def test_members_equal_the_measured_output_before_they_start():
     assert (runs[:, 2] != data.validation.y[2]).all()
 
 
-def test_the_spread_contains_nine_tenths_of_the_weight():
-    found = Ensemble(tuple(replace(each, weight=1.0) for each in ensemble(parts(0.02)).structures[:1]))
-    count = len(found.weights)
-    runs = np.linspace(-1.0, 1.0, count)[:, None] * np.ones(3)
-    inside = np.abs(runs[:, 0]) <= 1.645 * found.spread(runs, np.zeros(3))[0]
-    assert inside.mean() == pytest.approx(0.9, abs=2.0 / count)
-
-
 def test_the_spread_is_infinite_if_a_tenth_of_the_members_has_diverged():
     found = ensemble(parts(0.02), [TRUE])
     runs = np.zeros((len(found.weights), 2))
@@ -144,17 +113,6 @@ def test_the_spread_is_infinite_if_a_tenth_of_the_members_has_diverged():
     runs[: len(runs) // 4, 1] = np.nan
     assert found.spread(runs, np.zeros(2)).tolist() == [0.0, np.inf]
     assert np.isnan(found.spread(runs, np.array([np.nan, 0.0]))[0])
-
-
-def test_effective_samples_of_an_autoregression():
-    """The variance of the mean of an autoregression with pole p grows by (1 + p) / (1 - p)."""
-    white = np.random.default_rng(0).standard_normal(20_000)
-    coloured = np.zeros(len(white))
-    for k in range(1, len(white)):
-        coloured[k] = 0.8 * coloured[k - 1] + white[k]
-    assert effective_samples(white) == pytest.approx(20_000, rel=0.1)
-    assert effective_samples(coloured) == pytest.approx(20_000 / 9.0, rel=0.2)
-    assert effective_samples(np.zeros(7)) == 7.0
 
 
 def test_errors_on_a_constant_output_of_zero_are_weighed() -> None:
@@ -195,23 +153,6 @@ def test_a_longer_form_of_a_law_counts_as_the_law(noise):
     assert found.structures[0].weight < 0.9
     assert [found.inclusion(term(text).text) for text in LAW] == [1.0, 1.0]
     assert found.inclusion(term("y(k-2)").text) == 0.0
-
-
-def test_a_structure_with_a_further_term_is_another_law():
-    data = split(first_order(0.02, 1), 0.3)
-    longer = (*LAW, "u(k-2)")
-    law = candidate(LAW, data)
-    rival = replace(candidate(longer, data), error=0.99 * law.error)
-    found = make_ensemble([law, rival], data, "none", 2, 0)
-    assert [each.law for each in found.structures] == [None, None]
-    assert found.inclusion(term("u(k-2)").text) == pytest.approx(found.structures[1].weight)
-
-
-def test_a_rival_with_another_free_run_keeps_its_terms():
-    data = parts(0.1, 200)
-    found = ensemble(data, [TRUE, ("y(k-2)", "u(k-1)", "u(k-2)", "u(k-1)*u(k-2)")])
-    assert [each.law for each in found.structures] == [None, None]
-    assert found.inclusion(term("y(k-1)").text) == pytest.approx(found.structures[0].weight)
 
 
 def test_noise_of_initial_outputs_does_not_exclude_the_law_of_a_slow_process():

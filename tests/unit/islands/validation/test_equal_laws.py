@@ -22,8 +22,6 @@ LAW = ("y(k-1)", "u(k-1)", "sign(y(k-1))")
 #: Forms of the sign of y(k-1), if the input is never 0.
 SIGNS = ("sign(y(k-1))*sign(y(k-1)^2)", "sign(y(k-1)^3)", "sign(y(k-1)*u(k-1)^2)")
 
-#: Terms that the law lacks.
-SUPERFLUOUS = ("u(k-3)", "sign(y(k-4))", "y(k-2)*u(k-3)", "u(k-2)*u(k-4)", "sign(u(k-2))")
 
 SEEDS = pytest.mark.parametrize("seed", range(4))
 
@@ -59,14 +57,6 @@ def test_a_term_that_is_another_form_of_one_is_the_same_law(form, seed):
 
 
 @SEEDS
-def test_terms_that_describe_the_noise_make_several_laws(seed):
-    # The free runs differ by much less than the residual.
-    structures = [(*LAW, text) for text in SUPERFLUOUS]
-    assert laws(structures, motor(seed)) == [None] * len(structures)
-    assert laws([LAW, *structures], motor(seed)) == [None] * (1 + len(structures))
-
-
-@SEEDS
 def test_a_term_that_another_one_replaces_in_part_is_another_law(seed):
     for text in ("sign(y(k-2))", "tanh(y(k-1))"):
         assert laws([LAW, (*LAW[:2], text)], motor(seed, noise=0.005)) == [None, None]
@@ -92,17 +82,7 @@ def test_every_form_of_a_term_counts_as_the_recommended_one(seed):
     assert [found.inclusion(form.replace("u(", "u1(")) for form in SIGNS] == [0.0] * 3
 
 
-@SEEDS
-def test_a_structure_counts_for_its_own_terms(seed):
-    """A structure with sign(y(k-1)) and another term counted as the law with another form of it."""
-    superfluous = (*LAW, SUPERFLUOUS[0])
-    found, weights = inclusion([LAW, (*LAW[:2], SIGNS[0]), superfluous], motor(seed))
-    assert found.inclusion("sign(y(k-1))") == pytest.approx(1.0)
-    assert weights[2] > 0.01
-    assert found.inclusion("u1(k-3)") == pytest.approx(weights[2])
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_no_true_term_of_the_motor_of_the_documentation_is_doubtful():
     """sign(y(k-1)) had a probability of 0.36, since sign(y(k-1)) sign(y(k-1)^2) was a rival."""
     found = identify(EXAMPLE_RECORDS["motor"].make())

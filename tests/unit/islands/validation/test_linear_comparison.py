@@ -49,9 +49,3 @@ def test_a_result_states_the_ratio_to_a_linear_model(curved):
     assert sentences(document)["Error"].endswith(stated)
     (row,) = (line.split() for line in str(curved).splitlines() if line.startswith("lin."))
     assert row[1] == str(linear["size"])
-
-
-def test_a_linear_model_is_not_compared():
-    document = result_document(islands.fit(record(0.0), **SETTINGS).search_result)
-    assert document["linear"] is None
-    assert "Linear model" not in sentences(document)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from islands.errors import IslandsError, SettingsError
-from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
+from islands.validation.metrics import information_criteria, metrics
 
 Y = np.array([0.0, 1.0, 4.0, 3.0])
 YHAT = np.array([0.0, 2.0, 4.0, 1.0])
@@ -20,22 +20,6 @@ def test_metrics_match_a_hand_calculation():
     assert found.r2 == pytest.approx(1 - 5 / 10)
     assert found.rmse == pytest.approx(math.sqrt(5 / 4))
     assert found.fit_percent == pytest.approx(100 * (1 - math.sqrt(5 / 10)))
-
-
-def test_perfect_prediction_has_no_error():
-    assert metrics(Y, Y) == Metrics(mape=0.0, r2=1.0, rmse=0.0, fit_percent=100.0)
-
-
-def test_prediction_of_the_mean_has_zero_r2_and_fit():
-    found = metrics(Y, np.full(4, Y.mean()))
-    assert found.r2 == pytest.approx(0.0, abs=1e-15)
-    assert found.fit_percent == pytest.approx(0.0, abs=1e-13)
-
-
-def test_prediction_worse_than_the_mean_has_negative_r2_and_fit():
-    found = metrics(Y, -Y)
-    assert found.r2 == pytest.approx(1 - 4 * 26 / 10)
-    assert found.fit_percent < 0
 
 
 def test_metrics_except_rmse_do_not_depend_on_unit_and_offset():
@@ -71,22 +55,6 @@ def test_constant_output_only_has_an_rmse():
     assert math.isnan(found.fit_percent)
 
 
-def test_given_range_only_scales_mape():
-    found = metrics(Y, YHAT, output_range=8.0)
-    assert found.mape == pytest.approx(metrics(Y, YHAT).mape / 2)
-    assert dataclasses.replace(found, mape=0.0) == dataclasses.replace(metrics(Y, YHAT), mape=0.0)
-
-
-def test_given_range_defines_mape_of_a_constant_output():
-    assert metrics(np.full(3, 2.0), np.full(3, 2.5), output_range=10.0).mape == pytest.approx(5.0)
-
-
-def test_given_range_of_zero_makes_mape_nan():
-    found = metrics(Y, YHAT, output_range=0.0)
-    assert math.isnan(found.mape)
-    assert found.r2 == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize("far", [1e200, math.inf])
 def test_overflowing_prediction_has_an_infinite_error_without_a_warning(far):
     found = metrics(Y, np.array([0.0, 2.0, far, -far]))
@@ -114,33 +82,6 @@ def test_information_criteria_match_a_hand_calculation():
     assert found.aic == pytest.approx(100 * math.log(0.5) + 8)
     assert found.bic == pytest.approx(100 * math.log(0.5) + 4 * math.log(100))
     assert found.fpe == pytest.approx(0.5 * 104 / 96)
-
-
-def test_aic_is_nearly_the_log_of_fpe_in_a_long_record():
-    found = information_criteria(5e4, 100_000, 10)
-    assert found.aic == pytest.approx(100_000 * math.log(found.fpe), abs=1e-3)
-
-
-def test_bic_penalises_a_parameter_more_than_aic():
-    # A parameter that reduces rss by a factor exp(-5 / N) gains 5: more than 2 and less than log 1000.
-    small, large = information_criteria(10.0, 1000, 3), information_criteria(10.0 * math.exp(-5e-3), 1000, 4)
-    assert large.aic < small.aic
-    assert large.bic > small.bic
-
-
-def test_zero_residual_has_the_lowest_information_criteria():
-    assert information_criteria(0.0, 10, 2) == InformationCriteria(-math.inf, -math.inf, 0.0)
-
-
-def test_smallest_positive_residual_is_not_treated_as_zero():
-    assert information_criteria(5e-324, 10, 2).aic == pytest.approx(
-        10 * (math.log(5e-324) - math.log(10)) + 4
-    )
-
-
-def test_nan_residual_gives_nan_information_criteria():
-    found = information_criteria(math.nan, 10, 2)
-    assert all(math.isnan(value) for value in dataclasses.astuple(found))
 
 
 @pytest.mark.parametrize("samples", [0, 4, 5])

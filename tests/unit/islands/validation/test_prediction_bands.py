@@ -37,16 +37,6 @@ def test_a_band_contains_its_free_run():
         assert (band.y < band.upper)[known].all()
 
 
-def test_a_band_of_a_higher_level_is_wider():
-    data = record(seed=1)
-    widths = [
-        np.nanmean(band.upper - band.lower)
-        for band in (result().best.bands(data, level) for level in (0.5, 0.64, 0.8, 0.9, 0.93, 0.99))
-    ]
-    assert widths == sorted(widths)
-    assert len(set(widths)) == len(widths)
-
-
 def test_the_coverage_of_new_records_is_near_the_level():
     inside = []
     for seed in range(1, 6):
@@ -56,24 +46,12 @@ def test_the_coverage_of_new_records_is_near_the_level():
     assert np.mean(inside) == pytest.approx(0.9, abs=0.04)
 
 
-def test_a_band_follows_the_unit_of_the_output():
-    band = result().best.bands(record(seed=1))
-    scaled = result(scale=1e3).best.bands(record(seed=1, scale=1e3))
-    assert scaled.upper == pytest.approx(1e3 * band.upper, rel=1e-5, nan_ok=True)
-
-
 def test_a_band_widens_outside_the_data():
     """Parameters are less certain where the input exceeds that of the estimation data."""
     data = record(seed=1)
     wide = result().best.bands(replace(data, u=1.6 * data.u))
     band = result().best.bands(data)
     assert np.nanmax(wide.upper - wide.lower) > 1.2 * np.nanmax(band.upper - band.lower)
-
-
-def test_white_residuals_are_independent_samples():
-    bands = result().best.prediction_bands
-    samples = result().best.validation.samples - 2
-    assert 0.7 * samples < bands.independent_samples <= samples
 
 
 def drive(samples, seed, amplitude):
@@ -112,10 +90,3 @@ def test_a_model_without_bands_says_why():
     without = replace(best, _search_result=replace(best.search_result, ensemble=None))
     with pytest.raises(ModelError, match="no ensemble"):
         _ = without.inclusion
-
-
-def test_every_term_has_an_inclusion_probability():
-    for model in result().models:
-        assert len(model.inclusion) == model.model.size
-        assert all(0.0 <= each <= 1.0 for each in model.inclusion)
-    assert result().best.inclusion[0] > 0.9

@@ -60,13 +60,6 @@ def test_a_curve_does_not_depend_on_the_scale_of_states_and_argument():
     assert two.y == pytest.approx(np.interp(two.x, one.x, one.y), abs=1e-3)
 
 
-def test_a_negligible_effect_on_the_states_does_not_change_the_abscissa():
-    parameters = {**dict(list(WIENER.items())[:3]), "e1_1": 1e-7, **dict(list(WIENER.items())[3:])}
-    curve = trace(make_model(parameters, ("square",), 1))
-    assert curve.abscissa is Abscissa.CONSTANT_INPUT
-    assert trace(make_model(parameters | {"e1_1": 0.05}, ("square",), 1)).abscissa is not curve.abscissa
-
-
 def test_without_a_static_gain_a_curve_is_the_effect_on_a_state():
     integrator = make_model({**SPRING, "a1_1": 1.0, "a1_2": 0.0, "a2_1": 0.0}, order=2)
     curve = trace(integrator)
@@ -96,13 +89,3 @@ def test_the_band_has_the_spread_of_the_members_with_the_structure():
     curve = trace(model, ensemble=make_ensemble(model, draws))
     spread = np.sqrt(np.mean((gains - 1.0) ** 2))
     assert curve.half_width == pytest.approx(1.96 * spread * np.abs(curve.y))
-
-
-@pytest.mark.parametrize(
-    ("units", "count"), [(("cube",), 60), (("tanh",), 5)], ids=["of another unit", "too few"]
-)
-def test_other_and_few_members_give_no_band(units, count):
-    model = make_model(HAMMERSTEIN, ("tanh",), 1)
-    draws = np.array(model.parameters) * np.linspace(0.9, 1.1, count)[:, None]
-    ensemble = make_ensemble(make_model(HAMMERSTEIN, units, 1), draws)
-    assert trace(model, ensemble=ensemble).half_width is None

@@ -2,7 +2,6 @@
 
 import asyncio
 import inspect
-import json
 from dataclasses import fields
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,8 +15,7 @@ from islands.evolution.settings import Settings
 from islands_api.client import AsyncClient, Client, ServiceError, calls, diagnosis_calls, upload_calls
 from islands_api.client.calls import RequestSpec
 from islands_api.dataset_schemas import DatasetView
-from islands_api.schemas import JobPage, JobRequest, JobView
-from islands_api.web.responses import job_document
+from islands_api.schemas import JobRequest, JobView
 from islands_service.domain.job import JobState
 from support.service import Service, csv, queued
 
@@ -57,16 +55,6 @@ def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> 
     assert (listed.id, listed.columns, listed.samples) == (dataset.id, 3, 200)
 
 
-def test_upload_sends_all_given_values() -> None:
-    for inputs in ("u_V", ["u_V"], ("u_V",)):  # a single name is one input, not one input per letter
-        assert upload_calls.upload("r.csv", inputs, "y_um", 0.0).data == {
-            "inputs": ["u_V"],
-            "output": "y_um",
-            "dt": 0.0,
-        }
-    assert upload_calls.upload("r.csv").data == {}
-
-
 @pytest.mark.parametrize("path", ["nowhere.csv", "."])
 def test_unreadable_record_raises_the_error_of_its_file(client: Any, path: str) -> None:
     with pytest.raises(OSError, match=r"nowhere\.csv|Is a directory"):
@@ -84,29 +72,6 @@ def test_data_set_can_be_deleted_when_no_job_needs_it(client: Any, me: Any) -> N
 
 
 # Jobs.
-
-
-def test_job_contains_all_submitted_values(client: Any, me: Any) -> None:
-    given = {"preset": "narx", "seed": 7, "dt": 0.5, "rows": None, "name": "tank, 2 islands", "priority": 3}
-    job = client.submit(
-        me.dataset, "u_V", "y_um", **{**given, "dt": None}, validation=0.4, islands=2, shifts=(1, 2)
-    )
-    assert isinstance(job, JobView)
-    assert (job.state, job.version, job.attempt) == (JobState.QUEUED, 1, 0)
-    assert (job.name, job.priority) == ("tank, 2 islands", 3)
-    assert job.spec == {
-        "dataset": me.dataset,
-        "inputs": ["u_V"],
-        "output": "y_um",
-        "preset": "narx",
-        "seed": 7,
-        "validation": 0.4,
-        "settings": {"islands": 2, "shifts": [1, 2]},
-    }
-    read = client.job(job)
-    assert read == client.job(job.id) == job.model_copy(update={"progress": read.progress})
-    assert client.jobs().items == (read,)
-    assert isinstance(client.jobs(), JobPage)
 
 
 @pytest.mark.parametrize(
@@ -180,14 +145,6 @@ def test_invalid_simulation_is_rejected_before_sending(text: str, why: str) -> N
         diagnosis_calls.diagnose("0-csv", "u_V", "y_um", text)
 
 
-def test_model_file_is_sent_with_the_submission(tmp_path: Path) -> None:
-    path = tmp_path / "model.json"
-    path.write_text('{"terms": []}')
-    body = diagnosis_calls.diagnose("0-csv", "u_V", "y_um", f"model:{path}", channels="T_K").json
-    assert body["channels"] == ["T_K"]
-    assert body["simulation"] == {"kind": "model", "model": {"terms": []}, "name": "model model.json"}
-
-
 def test_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     assert client.cancel(job).state == JobState.CANCELLED
@@ -247,40 +204,10 @@ def test_malformed_id_is_one_segment_of_the_path(client: Any, identity: str) -> 
         assert caught.value.status in (404, 405, 422)
 
 
-@pytest.mark.parametrize(
-    ("status", "headers", "body", "message"),
-    [
-        (500, {}, b"<html>oh</html>", "HTTP 500 Internal Server Error: <html>oh</html>"),
-        (400, {}, b'["a", "list"]', 'HTTP 400 Bad Request: ["a", "list"]'),
-        (404, {}, b"{}", "HTTP 404"),
-        (301, {"Location": "https://elsewhere/"}, b"", "301 Moved Permanently: look at https://elsewhere/"),
-        (200, {}, b"<html>hello</html>", "is not an islands service, or is one of another version"),
-        (200, {}, b'{"items": 5}', "is not an islands service, or is one of another version"),
-    ],
-)
-def test_answer_of_another_server_raises_an_error(
-    connect: Any, scripted: Any, status: int, headers: dict[str, str], body: bytes, message: str
-) -> None:
-    server = scripted((status, headers, body))
-    client = connect(server.url, retry=0.0)
-    for call in (client.jobs, lambda: client.result("0")) if status != 200 else (client.jobs,):
-        with pytest.raises(ServiceError) as caught:
-            call()
-        assert message in str(caught.value)
-        assert (caught.value.status, caught.value.type) == (status, "about:blank")
-
-
 @pytest.mark.parametrize("body", [b"<html>", b"[[1]]", b"5"])
 def test_result_that_is_not_an_object_raises_an_error(connect: Any, scripted: Any, body: bytes) -> None:
     with pytest.raises(ServiceError, match="is not an islands service"):
         connect(scripted((200, {}, body)).url).result("0")
-
-
-def test_fields_of_a_newer_service_are_kept(connect: Any, scripted: Any, service: Service, me: Any) -> None:
-    document = {**job_document(queued(service.store, me.owner), 3600), "mood": "good"}
-    job = connect(scripted((200, {}, json.dumps(document).encode())).url).job("0")
-    assert job.mood == "good"
-    assert set(JobView.model_fields) == set(document) - {"mood"}
 
 
 # Concurrency and repetition.
@@ -293,13 +220,6 @@ def test_concurrent_calls_share_one_client(service: Service, me: Any) -> None:
             return await asyncio.gather(*(client.call(one) for _ in range(16)))
 
     assert len({job.id for job in asyncio.run(submit_all())}) == 1
-
-
-def test_closed_client_raises_an_error(service: Service, me: Any) -> None:
-    with Client(service.url, me.secret) as client:
-        client.jobs()
-    with pytest.raises(RuntimeError, match="closed"):
-        client.jobs()
 
 
 def test_calls_declare_whether_they_are_repeatable() -> None:

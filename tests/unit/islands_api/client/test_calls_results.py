@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from islands.export import EXPORTS
 from islands_api.client import ServiceError
 from islands_api.schemas import ModelView
 from islands_service.coordinator.identification_job import run_identification_job
@@ -70,23 +69,6 @@ def test_models_are_typed_and_best_first(reader: Any, job: str) -> None:
     assert models[0].size == len(models[0].terms)
 
 
-def test_result_contains_the_stored_models(reader: Any, service: Service, job: str) -> None:
-    result = reader.result(job)
-    stored = [dict(model.document) for model in service.store.results.models(job)]
-    assert result["models"] == stored
-    views = [model.model_dump(mode="json") for model in reader.models(job)]
-    # The document of a NARX model does not state its class.
-    assert views == [{"kind": "narx", **document} for document in stored]
-    assert result["settings"]["islands"] == 2
-
-
-@pytest.mark.parametrize("form", EXPORTS)
-def test_each_model_can_be_exported_in_each_form(reader: Any, job: str, form: str) -> None:
-    for model in reader.models(job):
-        assert reader.export(job, model.rank, form).strip()
-    assert reader.export(job) == reader.export(job, 1, "python")
-
-
 def test_figures_are_listed_and_fetched(reader: Any, service: Service, job: str, tmp_path: Path) -> None:
     names = reader.figures(job)
     of_search = ("record", "front", "convergence", "islands")
@@ -99,22 +81,6 @@ def test_figures_are_listed_and_fetched(reader: Any, service: Service, job: str,
     blobs = Blobs(service.settings.blobs)
     service.store.results.keep(job, {"front.svg": blobs.write(b"<svg>front</svg>")})
     assert reader.figure(job, "front", None) == b"<svg>front</svg>"
-
-
-@pytest.mark.parametrize(
-    ("call", "status"),
-    [
-        (lambda client, job: client.export(job, 99), 404),
-        (lambda client, job: client.export(job, 1, "cobol"), 422),
-        (lambda client, job: client.figure(job, "portrait"), 404),
-        (lambda client, job: client.figure(job, "../../loop"), 404),
-        (lambda client, _: client.result("unknown"), 404),
-    ],
-)
-def test_missing_item_of_a_result_raises_a_problem(reader: Any, job: str, call: Any, status: int) -> None:
-    with pytest.raises(ServiceError) as caught:
-        call(reader, job)
-    assert caught.value.status == status
 
 
 def test_queued_job_has_no_result(client: Any, me: Any) -> None:

@@ -10,7 +10,6 @@ import pytest
 
 from islands_api.client import ServiceError, ServiceUnreachableError, calls, transport
 from islands_service.domain.job import JobState
-from islands_service.store.database import CommitUnknownError
 from support.service import Service
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -42,19 +41,6 @@ def test_lost_answer_to_a_submission_creates_no_second_job(
     assert [found.id for found in service.store.jobs.page(me.owner).jobs] == [job.id]
 
 
-@pytest.mark.ci
-def test_lost_answer_to_an_upload_creates_no_second_data_set(
-    connect: Any, me: Any, wire: Any, tmp_path: Any
-) -> None:
-    path = tmp_path / "record.csv"
-    path.write_bytes(b"u_V,y_um\n" + b"".join(b"%d.5,%d.25\n" % (k, k % 7) for k in range(99)))
-    wire.cuts = [0]
-    client = connect(wire.url, me.secret)
-    dataset = client.upload(path)
-    assert wire.connections == 2
-    assert [found.id for found in client.datasets().items] == [dataset.id, me.dataset]
-
-
 def test_lost_answer_to_a_cancellation_is_not_an_error(client: Any, connect: Any, me: Any, wire: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     wire.cuts = [0]
@@ -79,42 +65,7 @@ def test_non_idempotent_call_is_not_repeated(client: Any, connect: Any, me: Any,
         client.job(job)
 
 
-def test_call_with_unknown_outcome_is_not_repeated(
-    client: Any, connect: Any, me: Any, service: Service, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    job, attempts = client.cancel(client.submit(me.dataset, **SPEC)), []
-
-    def resume(*_: Any) -> None:
-        attempts.append(1)
-        raise CommitUnknownError("the database went away")
-
-    monkeypatch.setattr(service.store.jobs, "resume", resume)
-    with pytest.raises(ServiceError, match="whether") as caught:
-        client.resume(job)
-    assert (caught.value.status, caught.value.type) == (504, "/problems/store-in-doubt")
-    assert len(attempts) == 1
-
-
-def test_call_without_a_connection_is_repeated(
-    client: Any, connect: Any, me: Any, wire: Any, later: Any
-) -> None:
-    job = client.cancel(client.submit(me.dataset, **SPEC))
-    wire.tear()
-    later(0.2, wire.mend)
-    assert connect(wire.url, me.secret).resume(job).state == JobState.QUEUED
-
-
 # Outages.
-
-
-def test_call_succeeds_after_a_short_outage(connect: Any, me: Any, wire: Any, later: Any) -> None:
-    client = connect(wire.url, me.secret, retry=25.0)
-    client.jobs()
-    wire.tear()
-    later(0.3, wire.mend)
-    began = time.monotonic()
-    assert client.submit(me.dataset, **SPEC).state == JobState.QUEUED
-    assert time.monotonic() - began > 0.2
 
 
 def test_long_outage_raises_an_error_in_time(connect: Any, me: Any, wire: Any) -> None:
@@ -164,16 +115,6 @@ def test_delay_beyond_the_retry_time_fails_immediately(connect: Any, scripted: A
         connect(server.url).jobs()
     assert (caught.value.status, caught.value.type) == (429, "/problems/quota-exceeded")
     assert len(server.requests) == 1
-
-
-def test_gateway_error_repeats_idempotent_calls_only(connect: Any, scripted: Any) -> None:
-    for status in (502, 504):
-        server = scripted((status, {}, b"gateway"), (202, {}, b"{}"))
-        with pytest.raises(ServiceError, match="gateway"):
-            connect(server.url).resume("0")
-        assert len(server.requests) == 1
-        server = scripted((status, {}, b"gateway"), EMPTY)
-        assert connect(server.url).jobs().items == ()
 
 
 @pytest.mark.parametrize("status", [400, 404, 409, 422, 500, 507])

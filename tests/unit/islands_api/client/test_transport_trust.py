@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 import trustme
 
-from islands.errors import SettingsError
 from islands_api.client import ServiceError, ServiceUnreachableError
 from islands_api.web.app import create_app
 from islands_service.settings import ServiceSettings
@@ -72,15 +71,6 @@ def test_missing_or_unknown_key_is_rejected(
         list(connect(guarded.url, key).events("0"))
 
 
-@pytest.mark.parametrize(
-    "key", ["", "  ", f"{SECRET}\nX-Other: 1", f"{SECRET} {SECRET}", f"{SECRET}ü", f"\0{SECRET}"]
-)
-def test_malformed_key_is_rejected_without_showing_the_key(connect: Any, key: str) -> None:
-    with pytest.raises(SettingsError, match="give it as 'islands keys create' printed it") as caught:
-        connect("http://127.0.0.1:9", key)
-    assert SECRET not in format_error(caught.value)
-
-
 def test_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted: Any) -> None:
     server = scripted((500, {}, b"oh"))
     clients = [
@@ -98,12 +88,6 @@ def test_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted: A
     assert {headers["Authorization"] for *_, headers in server.requests} == {f"Bearer {SECRET}"}
     assert all(headers["User-Agent"].startswith("islands/") for *_, headers in server.requests)
     assert SECRET not in str(guarded.logs)
-
-
-def test_client_without_a_key_sends_no_authorization(connect: Any, scripted: Any) -> None:
-    server = scripted((200, {}, b'{"items": []}'))
-    connect(server.url).jobs()
-    assert "Authorization" not in server.requests[0][2]
 
 
 # Certificates.

@@ -12,13 +12,6 @@ def test_the_value_that_was_not_used_for_the_longest_time_is_removed() -> None:
     assert [values.get(key) for key in "abc"] == [1, None, 3]
 
 
-def test_a_value_is_replaced() -> None:
-    values: RecentValues[str, int] = RecentValues(2)
-    values.store("a", 1)
-    values.store("a", 2)
-    assert values.get("a") == 2
-
-
 def test_values_weigh_at_most_the_limit() -> None:
     values: RecentValues[str, str] = RecentValues(5, len)
     for key, value in (("a", "12"), ("b", "123"), ("a", "1"), ("c", "1")):

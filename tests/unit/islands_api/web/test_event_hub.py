@@ -51,16 +51,6 @@ def open_stream(hub, store, job, after=0, alive=5.0):
     return hub.events(job.id, store.jobs.versions([job.id])[job.id], after, alive)
 
 
-def test_a_late_subscriber_gets_all_events(store):
-    async def scenario():
-        job = submitted(store)
-        store.leases.finish(claimed(store), FOUND)
-        async with running_hub(store) as hub:
-            return await collect(open_stream(hub, store, job), [])
-
-    assert asyncio.run(scenario()) == [1, 2, 3]
-
-
 @pytest.mark.parametrize("after", range(12))
 def test_a_returning_subscriber_gets_all_later_events(store, after):
     async def scenario():
@@ -142,22 +132,6 @@ def test_a_job_deleted_during_a_poll_does_not_stop_the_hub(store, monkeypatch):
     assert logs == []
 
 
-def test_a_leaving_subscriber_does_not_affect_the_others(store):
-    async def scenario():
-        first, second = submitted(store), submitted(store)
-        async with running_hub(store) as hub:
-            staying = asyncio.create_task(collect(open_stream(hub, store, second), []))
-            leaving = asyncio.create_task(collect(open_stream(hub, store, first), []))
-            await asyncio.sleep(0.05)
-            store.jobs.cancel(first.owner, first.id)
-            await asyncio.wait_for(leaving, 25.0)
-            await asyncio.sleep(0.05)
-            store.jobs.cancel(second.owner, second.id)
-            return await asyncio.wait_for(staying, 25.0)
-
-    assert asyncio.run(scenario()) == [1, 2]
-
-
 def test_a_defect_during_a_poll_does_not_stop_the_hub(store, monkeypatch):
     async def scenario():
         job = submitted(store)
@@ -203,28 +177,3 @@ def test_a_stream_survives_a_database_outage_which_is_logged_once(store, monkeyp
     with structlog.testing.capture_logs() as logs:
         assert asyncio.run(scenario()) == [1, 2]
     assert [entry["log_level"] for entry in logs] == ["warning", "info"]
-
-
-def test_closing_ends_all_streams(store):
-    async def scenario():
-        job = submitted(store)
-        async with running_hub(store) as hub:
-            watchers = [asyncio.create_task(collect(open_stream(hub, store, job), [])) for _ in range(5)]
-            await asyncio.sleep(0.05)
-            hub.close()
-            return await asyncio.wait_for(asyncio.gather(*watchers), 25.0)
-
-    assert all(seen[0] == 1 for seen in asyncio.run(scenario()))
-
-
-def test_the_hub_has_no_feeds_without_subscribers(store):
-    async def scenario():
-        job = submitted(store)
-        async with running_hub(store) as hub:
-            await collect(open_stream(hub, store, job), [], most=1)
-            async for _ in open_stream(hub, store, job):
-                break
-            await asyncio.sleep(0.05)
-            return hub._feeds
-
-    assert asyncio.run(scenario()) == {}

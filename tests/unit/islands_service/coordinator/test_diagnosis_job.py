@@ -13,7 +13,6 @@ import structlog
 from islands.diagnosis.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.facade.explain_residual import FORMULA
-from islands.report.text.diagnosis_statements import describe_diagnosis, describe_headline
 from islands_service.coordinator import diagnosis_job
 from islands_service.coordinator.checkpoints import DiagnosisState
 from islands_service.coordinator.diagnosis_job import DiagnosisProgress
@@ -160,21 +159,6 @@ def phases(store: Store, job: Job) -> list[str]:
 
 
 @pytest.mark.ci
-def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs, submit: Submit) -> None:
-    job = submit()
-    outcome = run_job(claim(store), store, blobs)
-    document, summary = outcome.document or {}, outcome.summary or {}
-    assert summary["words"].splitlines() == describe_diagnosis(document)
-    assert summary["headline"].splitlines() == describe_headline(document)
-    assert "equation" not in summary  # a column has none
-    assert summary["effects"] == ["offset"]
-    assert document["simulation"] == "column theirs_um"
-    assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
-    assert document["verdict"] == "named"
-    assert phases(store, job)[-1] == "writing the report"
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("phase", "verdict", "left_out"),
     [
@@ -211,19 +195,6 @@ def test_cancelled_job_keeps_what_its_diagnosis_has_found(
     store.leases.finish(lease, run_job(lease, store, blobs))
     resumed = store.results.document(job.id) or {}
     assert (resumed["verdict"], resumed["left_out"]) == ("named", [])
-
-
-@pytest.mark.ci
-def test_job_that_is_cancelled_before_its_first_result_has_none(
-    store: Store, blobs: Blobs, submit: Submit
-) -> None:
-    submit()
-
-    def cancel() -> None:
-        raise JobCancelled("cancelled")
-
-    with pytest.raises(JobCancelled):
-        run_job(claim(store), store, blobs, cancel)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ import structlog
 
 from islands_service.coordinator import heartbeat as heartbeats
 from islands_service.coordinator.heartbeat import (
-    CoordinatorStopping,
     Heartbeat,
     JobCancelled,
     RunTimeLimitError,
@@ -131,26 +130,6 @@ def test_heartbeat_keeps_the_lease_beyond_its_duration(
     assert store.leases.claim("another", SECONDS) is not None
 
 
-def test_heartbeat_thread_ends_with_the_block_after_an_error(store: Store, lease: Lease) -> None:
-    with pytest.raises(ZeroDivisionError), Heartbeat(store, lease, SECONDS, StopRequest()) as heartbeat:
-        1 / 0  # noqa: B018
-    assert not heartbeat._thread.is_alive()
-
-
-def test_cancel_request_is_noticed_at_the_next_renewal(
-    store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(heartbeats, "CANCEL_POLL", 60.0)  # no checks between renewals
-    watched = Watched(store)
-    with Heartbeat(watched, lease, SECONDS, StopRequest()) as heartbeat:  # type: ignore[arg-type]
-        heartbeat.check()
-        store.jobs.cancel(ALICE, lease.job.id)
-        before = len(watched.renewals)
-        eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
-    requested = [renewal.cancel_requested for renewal in watched.renewals]
-    assert requested.index(True) <= before + 1  # one renewal may have been in progress
-
-
 def test_lost_lease_is_reported_and_nothing_is_written(store: Store, lease: Lease) -> None:
     take_over(store)
     before = store.jobs.get(ALICE, lease.job.id)
@@ -158,15 +137,6 @@ def test_lost_lease_is_reported_and_nothing_is_written(store: Store, lease: Leas
         eventually(lambda: raised_by_check(heartbeat) is LeaseLostError, seconds=20.0)
         heartbeat._thread.join(SECONDS)  # ten more renewals, if it continued
     assert store.jobs.get(ALICE, lease.job.id) == before
-
-
-def test_stop_request_is_reported_at_once(store: Store, lease: Lease) -> None:
-    stopping = StopRequest()
-    with Heartbeat(store, lease, SECONDS, stopping) as heartbeat:
-        heartbeat.check()
-        stopping.request()
-        with pytest.raises(CoordinatorStopping):
-            heartbeat.check()
 
 
 def test_lost_lease_precedes_cancellation_and_that_precedes_a_stop(store: Store, lease: Lease) -> None:
@@ -267,18 +237,6 @@ def test_job_of_a_lost_lease_is_abandoned(
     with Heartbeat(store, lease, SECONDS, StopRequest(), abandoned.set):
         assert abandoned.wait(20.0)
     assert store.jobs.get(ALICE, lease.job.id).state == JobState.RUNNING
-
-
-def test_cancelled_job_that_stops_in_time_stores_its_outcome(
-    store: Store, lease: Lease, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(heartbeats, "CANCEL_GRACE", 60.0)
-    with Heartbeat(store, lease, SECONDS, StopRequest(), lambda: pytest.fail("abandoned")) as heartbeat:
-        store.jobs.cancel(ALICE, lease.job.id)
-        eventually(lambda: raised_by_check(heartbeat) is JobCancelled, seconds=20.0)
-        time.sleep(0.2)
-        store.leases.finish(lease, JobOutcome(JobState.CANCELLED, summary={"mine": True}))
-    assert store.jobs.get(ALICE, lease.job.id).summary == {"mine": True}
 
 
 class Away:
@@ -393,33 +351,6 @@ def test_request_to_stop_the_search_is_kept_and_ends_no_check(store: Store, leas
     # A coordinator that takes the job over knows the request from the start.
     with Heartbeat(store, take_over(store), SECONDS, StopRequest()) as heartbeat:
         assert heartbeat.is_search_stopped()
-
-
-BROKEN = """
-import sys, time
-from islands_service.liveness import StopRequest
-from islands_service.coordinator import heartbeat
-from islands_service.store import Store
-with Store(sys.argv[1]) as store:
-    lease = store.leases.claim("broken", 60.0)
-    with heartbeat.Heartbeat(store, lease, 0.3, StopRequest()):
-        def fail(*_):
-            raise MemoryError
-        store.leases.renew = store.leases.read_requests = fail
-        time.sleep(10.0)
-        print("went on", flush=True)
-"""
-
-
-@pytest.mark.ci
-def test_heartbeat_that_fails_unexpectedly_ends_the_process(store: Store) -> None:
-    """Otherwise the job would run on without a lease and without a guard."""
-    submitted(store)
-    with child(BROKEN, store.database.url) as broken:
-        said, _ = broken.communicate(timeout=30)
-    assert "MemoryError" in said
-    assert "went on" not in said
-    assert broken.returncode == 1
 
 
 def test_restart_ends_the_computation_and_keeps_the_process_and_its_lifeline(tmp_path):

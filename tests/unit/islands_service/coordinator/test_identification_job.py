@@ -4,8 +4,7 @@ import gzip
 import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
-from math import inf
+from dataclasses import asdict
 from typing import Any
 
 import pytest
@@ -73,26 +72,6 @@ def test_job_finds_the_models_of_a_single_process(
     words = ended.summary["words"].splitlines()
     assert len(words) > 5
     assert describe(result_document(drawn)) == words
-
-
-@pytest.mark.ci
-def test_last_attempt_ends_with_the_models_of_the_search(
-    store: Store, blobs: Blobs, job: Job, undisturbed: Found
-) -> None:
-    lease = claim(store)
-    outcome = run_job(replace(lease, is_last=True), store, blobs)
-    assert outcome.state == JobState.SUCCEEDED
-    found = get_models(outcome)
-    assert [each["equation"] for each in found] == [each["equation"] for each in undisturbed[0]]
-    assert [each["metrics"] for each in found] == [each["metrics"] for each in undisturbed[0]]
-    store.leases.finish(lease, outcome)
-    ended = store.jobs.get(ALICE, job.id)
-    assert ended.summary is not None
-    words = ended.summary["words"].splitlines()
-    assert words[-1].startswith("Not computed: ")
-    assert words[-1].endswith("the attempts before the last one ended without a result.")
-    drawn = read_search_result(ended, store, blobs, None)
-    assert set(drawn.search.not_computed) >= {"linear model for comparison", "prediction bands"}
 
 
 @pytest.mark.ci
@@ -169,7 +148,7 @@ def test_cancelled_job_keeps_the_models_of_its_last_generation(
     assert get_models(run_job(claim(store), store, blobs)) == undisturbed[0]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_job_that_is_cancelled_at_any_check_ends_at_the_next_one(
     store: Store, blobs: Blobs, job: Job
 ) -> None:
@@ -200,23 +179,6 @@ def test_job_that_is_cancelled_at_any_check_ends_at_the_next_one(
     assert kept[1] == 0
     assert kept[-1] > 1
     assert sorted(kept, key=bool) == kept  # once there are models, none are lost
-
-
-@pytest.mark.ci
-def test_job_that_continues_keeps_the_choice_of_the_preset_auto(
-    store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    store.jobs.cancel(ALICE, job.id)
-    changed = store.jobs.submit(Submission(ALICE, {**job.spec, "preset": "auto"}))[0]
-    with pytest.raises(CoordinatorStopping):
-        run_job(lease := claim(store), store, blobs, Interruption(store, changed, 2))
-    store.leases.release(lease)
-    monkeypatch.delattr(work, "choose_preset")
-    outcome = run_job(claim(store), store, blobs)
-    assert outcome.document is not None
-    assert outcome.document["settings"]["choice"]["kind"] == "hysteresis"
-    assert get_models(outcome) == undisturbed[0]
 
 
 @pytest.mark.ci
@@ -268,26 +230,6 @@ def test_stopped_search_gives_the_models_of_one_that_ends_there(
     lease = claim(store, "another")
     assert lease.job.id == short.id
     assert get_models(run_job(lease, store, blobs)) == get_models(outcome)
-
-
-@pytest.mark.ci
-def test_request_to_stop_is_not_lost_with_the_coordinator(
-    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    lease = claim(store)
-    with pytest.raises(CoordinatorStopping):
-        run_job(lease, store, blobs, Interruption(store, job, 3))
-    store.jobs.stop(ALICE, job.id)
-    # The process is killed, and its last checkpoint is older than what the owner has seen.
-    lease = claim(store)
-    assert lease.job.attempt == 2
-    run = make_run(lease, store, blobs, is_search_stopped=lambda: lease.job.stop_requested)
-    outcome = run_identification_job(run)
-    assert outcome.state == JobState.SUCCEEDED
-    assert outcome.document is not None
-    assert outcome.document["search"]["left_out"] == ["search from generation 3 to 30"]
-    assert outcome.models
 
 
 @pytest.mark.ci
@@ -374,17 +316,3 @@ def test_job_with_a_lost_lease_stops_at_its_next_report(store: Store, blobs: Blo
         run_job(old, store, blobs)
     assert store.jobs.get(ALICE, job.id).version == new.job.version
     assert store.jobs.get(ALICE, job.id).checkpoint is None
-
-
-@pytest.mark.ci
-def test_unavailable_store_does_not_cause_repeated_checkpoints(
-    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    monkeypatch.setattr(work, "FREE_RUN_EVERY", inf)  # one free run, however long the search takes
-    before = set(dict(blobs.all()))
-    flaky = Flaky(store, lambda number: number < 20)
-    outcome = run_job(claim(store), flaky, blobs, every=3600.0)
-    assert flaky.reports >= 20
-    written = set(dict(blobs.all())) - before - set(outcome.artefacts.values())
-    assert len(written - {store.results.artefact(job.id, SEARCH_FREE_RUN)}) == 1

@@ -41,25 +41,13 @@ def reached(is_stopped: bool, start: Archipelago, stop: bool = False, least: int
     return [epoch.archipelago.generation for epoch in engine.run(PROBLEM, start, lambda: stop)]
 
 
-def test_without_a_request_all_epochs_are_computed() -> None:
-    assert reached(False, empty_archipelago(1, 1)) == [0, 1, 2, 3, 4]
-
-
 def test_stopped_search_evaluates_its_first_population_and_ends() -> None:
     assert reached(True, empty_archipelago(1, 1)) == [0]
-
-
-def test_stopped_search_that_continues_has_no_further_epoch() -> None:
-    assert reached(True, archipelago(2)) == []
 
 
 @pytest.mark.parametrize(("least", "last"), [(1, 2), (3, 3), (9, 4)])
 def test_search_that_continues_reaches_the_generation_that_its_owner_has_seen(least: int, last: int) -> None:
     assert reached(True, archipelago(2), least=least) == [*range(3, last + 1)]
-
-
-def test_stop_of_all_steps_also_precedes_the_first_population() -> None:
-    assert reached(False, empty_archipelago(1, 1), stop=True) == []
 
 
 def test_closing_the_epochs_closes_those_of_the_engine() -> None:

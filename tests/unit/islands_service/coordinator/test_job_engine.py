@@ -15,7 +15,6 @@ from islands_service.coordinator.job_failures import make_problem_document
 from islands_service.domain.job import DISCREPANCY, MONITORING, Lease
 from islands_service.domain.search_limits import ACTOR_BYTES, COORDINATOR_BYTES, JobMemoryError
 from islands_service.runtime import cluster
-from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from support.searches import SMALL, record
 from support.service import held, spec
@@ -45,18 +44,6 @@ def run(engine: Any, problem: Problem = PROBLEM) -> list[str]:
 
 def test_short_search_runs_without_a_cluster_and_gives_the_same_islands(store: Store) -> None:
     assert run(make_engine(store, SECONDS)) == run(SerialEngine())
-
-
-def test_search_that_continues_has_the_engine_of_its_start(store: Store) -> None:
-    (*_, last), engine = SerialEngine().run(PROBLEM, empty_archipelago(2, 3), lambda: False), None
-    engine = make_engine(store, 0.999 * SECONDS)
-    with pytest.raises(ConnectionRequestedError):
-        list(engine.run(PROBLEM, last.archipelago, lambda: False))
-
-
-def test_estimate_counts_all_individuals_and_samples() -> None:
-    assert pytest.approx(2 * 24 * 11 * (1e-4 + 400 * 1.5e-9)) == SECONDS
-    assert ServiceSettings().short_search == 5.0
 
 
 def test_search_needs_the_memory_of_the_cluster(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:

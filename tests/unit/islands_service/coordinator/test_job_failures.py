@@ -4,10 +4,9 @@ import errno
 import json
 from collections.abc import Callable
 from threading import Thread
-from typing import Any
 
 import pytest
-from sqlalchemy import select, update
+from sqlalchemy import update
 
 from islands.errors import IslandsError, RecordError, SettingsError
 from islands_service.coordinator import main_loop as coordinator_module
@@ -108,25 +107,6 @@ def test_repeated_transient_errors_fail_the_job_with_their_reason(
     assert "(MemoryError)" in ended.problem["detail"]
 
 
-def test_attempts_after_transient_errors_wait_twice_as_long_each_time(store: Store, job: Job) -> None:
-    waits = []
-    for attempt in range(1, 4):
-        lease = store.leases.claim("me", 60.0)
-        assert lease is not None
-        assert lease.job.attempt == attempt
-        store.leases.postpone(lease, "the disk is away", 100.0)
-        assert store.leases.claim("me", 60.0) is None
-
-        def read_wait(connection: Any) -> float:
-            row = connection.execute(select(jobs.c.not_before, jobs.c.updated)).one()
-            connection.execute(update(jobs).values(not_before=0.0))
-            return float(row.not_before - row.updated)
-
-        waits.append(store.database.write(read_wait))
-    assert waits == pytest.approx([100.0, 200.0, 400.0], abs=1.0)
-    assert store.jobs.get(ALICE, job.id).progress == {"phase": "waiting", "note": "the disk is away"}
-
-
 def accepted_by(store: Store, version: str) -> None:
     """Change the version of islands that accepted all jobs."""
     store.database.write(lambda connection: connection.execute(update(jobs).values(islands_version=version)))
@@ -158,20 +138,6 @@ def test_job_of_a_newer_version_waits_for_a_coordinator_of_it(
     lease = store.leases.claim("new", 60.0, "999.1")
     assert lease is not None
     assert lease.job.id == job.id
-
-
-def test_coordinators_of_two_old_versions_decline_a_job_once_each(store: Store, job: Job) -> None:
-    for version in ("1.1", "1.2", "1x3"):
-        lease = store.leases.claim("me", 60.0, version)
-        assert lease is not None
-        store.leases.decline(lease, "no", version)
-    assert store.leases.claim("me", 60.0, "1.1") is None
-    assert store.leases.claim("me", 60.0, "1.2") is None
-    # Neither a part of a version nor a wildcard.
-    for version in ("1.11", "1_3"):
-        lease = store.leases.claim("me", 60.0, version)
-        assert lease is not None
-        store.leases.release(lease)
 
 
 def test_job_of_this_version_fails_and_a_job_without_a_version_too(

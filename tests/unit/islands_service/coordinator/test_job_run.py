@@ -24,11 +24,6 @@ def progress_of(store, lease):
     return store.jobs.get(ALICE, lease.job.id).progress
 
 
-def test_search_that_waits_for_cpus_has_this_phase(store, lease):
-    JobNotes(lease, store).add(WAITING)
-    assert progress_of(store, lease) == {"phase": "waiting for capacity", "note": WAITING}
-
-
 def test_phase_before_the_first_report_is_stored_at_once(store, lease):
     JobNotes(lease, store).add(LOST)
     store.leases.release(lease)

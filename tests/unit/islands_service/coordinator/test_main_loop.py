@@ -39,19 +39,6 @@ from support.coordinators import (
 from support.processes import eventually
 from support.stores import ALICE, child
 
-Found = tuple[list[Any], list[Any]]
-
-
-@pytest.mark.ci
-def test_coordinator_runs_one_job_after_the_other(
-    store: Store, job: Job, coordinator: Callable[..., Thread], undisturbed: Found
-) -> None:
-    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
-    coordinator()
-    for each in (job, second):
-        assert wait_until_finished(store, each).state == JobState.SUCCEEDED
-        assert [model.document for model in store.results.models(each.id)] == undisturbed[0]
-
 
 def test_stopping_coordinator_releases_its_job_without_an_attempt(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
@@ -218,25 +205,6 @@ def test_replaced_checkpoints_are_swept_while_the_job_runs(
     assert set(left[1:]) <= set(dict(blobs.all()))
 
 
-def test_blob_referenced_during_a_sweep_is_kept(
-    store: Store, blobs: Blobs, settings: ServiceSettings, job: Job, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A coordinator may be suspended between two steps of a sweep for longer than the age limit."""
-    monkeypatch.setattr(sweeper_module, "ORPHAN_AGE", 0.1)
-    named_blobs = store.retention.named_blobs
-    written: list[str] = []
-
-    def slow_named_blobs() -> frozenset[str]:
-        named = named_blobs()
-        written.append(blobs.write(b"named meanwhile"))
-        time.sleep(0.3)
-        return named
-
-    monkeypatch.setattr(store.retention, "named_blobs", slow_named_blobs)
-    sweeper_module.Sweeper(settings, store, blobs, -1.0).sweep_if_due()
-    assert blobs.read(written[0]) == b"named meanwhile"
-
-
 def test_wait_for_ray_counts_as_an_attempt_if_it_ends(
     store: Store, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
@@ -300,7 +268,7 @@ sys.exit(program.main())
 """
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_coordinator_continues_in_a_new_process_after_jobs(
     store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

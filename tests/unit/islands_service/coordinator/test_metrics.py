@@ -1,19 +1,16 @@
 """Metrics of a coordinator: attempts, outcomes and durable writes of real jobs."""
 
-import time
 from math import inf
 from threading import Thread
 from typing import Any
 
 import pytest
-from prometheus_client import generate_latest
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.coordinator.heartbeat import Heartbeat
 from islands_service.coordinator.job_run import JobNotes, JobRun
-from islands_service.coordinator.metrics import CoordinatorMetrics
 from islands_service.domain.job import IDENTIFICATION, Job, JobOutcome, JobState
 from islands_service.liveness import StopRequest
 from islands_service.runtime import actor_pool, cluster, ray_engine
@@ -59,17 +56,6 @@ def test_metrics_count_attempts_outcomes_and_writes(
     assert read("islands_coordinator_busy") == 0.0
     assert read("islands_blob_write_seconds_count") == 2.0
     assert (read("islands_store_commit_seconds_count") or 0.0) >= 4.0  # two claims, a return and an outcome
-
-
-def test_counts_that_prometheus_has_not_read_yet_are_kept() -> None:
-    metrics = CoordinatorMetrics()
-    assert metrics.are_read_since(time.monotonic())  # no port
-    metrics.is_served = True
-    begin = time.monotonic()
-    assert not metrics.are_read_since(begin)
-    assert b"islands_coordinator_busy 0.0" in generate_latest(metrics.registry)
-    assert metrics.are_read_since(begin)
-    assert not metrics.are_read_since(time.monotonic())
 
 
 def test_islands_with_and_without_a_separate_cpu_are_metrics(

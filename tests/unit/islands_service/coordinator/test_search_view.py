@@ -75,16 +75,6 @@ def test_state_spaces_are_described_by_their_states_and_units(monkeypatch: pytes
     ]
 
 
-def test_front_is_computed_again_when_an_error_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("islands_service.coordinator.search_view._SHARE", 1e9)
-    front = SearchFront()
-    assert front.update(searched([individual(1, 1.0)])) == []
-    front.begin(PROBLEM)
-    first = front.update(searched([individual(1, 1.0)]))
-    assert front.update(searched([individual(1, 1.0)])) is first
-    assert front.update(searched([individual(1, 0.25)]))[0]["error"] == 0.5
-
-
 def test_free_run_is_that_of_the_smallest_model_near_the_least_error() -> None:
     rng = np.random.default_rng(1)
     signals = {"u": rng.normal(size=(900, 1)), "y": rng.normal(size=900)}

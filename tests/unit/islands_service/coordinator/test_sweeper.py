@@ -71,13 +71,6 @@ def test_jump_that_is_not_repaired_is_the_time_after_a_pause(store, sweep, advan
     assert listed(store) == []
 
 
-def test_expired_job_is_deleted_without_a_jump(store, sweep):
-    job_in(store, JobState.SUCCEEDED)
-    turn_clock(store, 2 * DAY)  # it is as old as its times say
-    sweep()
-    assert listed(store) == []
-
-
 @pytest.mark.parametrize("error", [StoreUnavailableError("away"), OSError(errno.EROFS, "read-only")])
 def test_failed_sweep_does_not_end_the_coordinator(sweep, monkeypatch, error):
     """It would fail after every restart of the coordinator, which could run no job."""

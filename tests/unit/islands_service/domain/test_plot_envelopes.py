@@ -25,13 +25,6 @@ def test_a_residual_is_the_measured_less_the_simulated_output(path: Path) -> Non
     assert values == {"simulated": [0.0, None, 2.0, 4.0], "extended": [1.0, None, 1.0, 2.0]}
 
 
-def test_a_part_counts_from_the_first_sample(path: Path) -> None:
-    found = describe_outputs(path, 2, 99, 1)
-    assert (found["start"], found["stop"], found["rows"]) == (2, 4, [2])
-    measured = found["outputs"][0]
-    assert measured == {"name": "measured", "minimum": [3.0], "maximum": [5.0]}
-
-
 @pytest.mark.parametrize(("start", "stop"), [(4, None), (3, 2)])
 def test_samples_that_do_not_exist_are_refused(path: Path, start: int, stop: int | None) -> None:
     with pytest.raises(SettingsError, match=r"has samples 0 to 3, and .* is not a part of it"):

@@ -55,19 +55,6 @@ def validated(*datasets, **changes):
     return validate_job(order, "me", store, ServiceSettings())
 
 
-def test_islands_are_those_of_the_resolved_settings():
-    for preset in ("auto", "hysteresis"):
-        assert validated(dataset(), preset=preset, settings={"islands": 7}).islands == 7
-        assert validated(dataset(), preset=preset, settings={"islands": None}).islands == 1
-
-
-def test_clean_record_needs_no_inspection():
-    assert pending_inspections(dataset()) == ()
-    assert pending_inspections(dataset(), inputs=["u_V+1"]) == ()
-    assert pending_inspections(dataset(v_V="broken"), settings={"islands": 3}, seed=4) == ()
-    assert pending_inspections(dataset(), dataset(OTHER), validation={"dataset": OTHER}) == ()
-
-
 @pytest.mark.parametrize(
     ("record", "changes"),
     [

@@ -78,11 +78,3 @@ def test_a_killed_client_leaves_no_process(tmp_path):
         client.kill()
         client.wait()
     eventually(lambda: not alive(children), seconds=10.0)
-
-
-def test_closing_ends_the_server(programs):
-    server = programs("pass")
-    server.ensure_running()
-    pid = server._process.pid
-    server.close()
-    assert not alive([pid])

@@ -3,7 +3,6 @@
 import io
 import json
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,10 +109,3 @@ def test_a_process_that_fails_is_a_clear_error(tmp_path, monkeypatch, programs, 
     monkeypatch.setattr(confined_answer, "FORK_SERVER", programs(program))
     with pytest.raises(RecordError, match=words):
         read_confined(path, RecordRequest(["u"], "y", None, None, {}), MEMORY, 1.0)
-
-
-@pytest.mark.ci
-def test_a_killed_process_is_reported_as_a_lack_of_memory(tmp_path, monkeypatch, programs):
-    monkeypatch.setattr(confined_answer, "FORK_SERVER", programs("import os; os.kill(os.getpid(), 9)"))
-    with pytest.raises(MemoryError, match="was killed"):
-        read_confined(Path(tmp_path), RecordRequest(["u"], "y", None, None, {}), MEMORY, 5.0)

@@ -4,13 +4,11 @@ The tests play the actors, in any order. An epoch is a number computed from the 
 that any confusion would change the last number.
 """
 
-import random
 from collections import deque
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.evolution.archipelago import Archipelago, empty_archipelago
@@ -28,11 +26,8 @@ from islands_service.runtime.epoch_scheduler import (
 from support.epoch_runs import (
     SEED,
     PlayedRun,
-    make_epoch,
-    make_scheduler,
     orders,
     play,
-    posed,
     run_in_lockstep,
     searches,
 )
@@ -57,38 +52,6 @@ def test_losses_do_not_change_the_values_of_a_search(search, choose, losses):
     problem_, ends, ahead = search
     done = play(PlayedRun(problem_, ends, ahead), choose, losses)
     assert done == list(run_in_lockstep(problem_, ends))
-
-
-@given(searches(), orders, st.integers(0, 25))
-@example((posed("ring", 1, ((0, 1),), 2), [-1, 0, 1, 2], 2), random.Random(57), 5)
-def test_order_of_completion_does_not_change_the_values(search, choose, losses):
-    problem_, ends, ahead = search
-    done = play(PlayedRun(problem_, ends, ahead), choose, losses, at_once=False)
-    assert done == list(run_in_lockstep(problem_, ends))
-
-
-@given(searches(), orders, st.integers(0, 25))
-def test_every_task_is_submitted_after_its_dependencies(search, choose, losses):
-    """A dependency may be incomplete, but there is a reference to it that can be passed on."""
-    problem_, ends, ahead = search
-    run = PlayedRun(problem_, ends, ahead)
-    play(run, choose, losses)
-    sent = set()
-    for task in run.sent:
-        for needed in (task.island, *run.sources[task.island]):
-            assert task.begin == ends[0] or (needed, task.begin) in sent
-        sent.add((task.island, task.end))
-    assert len(sent) == problem_.settings.islands * (len(ends) - 1)
-
-
-@given(searches())
-def test_all_tasks_within_the_limit_are_ready_at_once(search):
-    """No result is needed first: neither of the island itself nor of its sources."""
-    problem_, ends, ahead = search
-    islands, stages = range(problem_.settings.islands), list(pairwise(ends))[:ahead]
-    assert PlayedRun(problem_, ends, ahead).send() == [
-        EpochTask(each, *stage) for stage in stages for each in islands
-    ]
 
 
 @given(searches(), orders, st.data())
@@ -175,21 +138,6 @@ def test_ready_tasks_of_earlier_epochs_come_first(search, choose):
         run.report(task)
 
 
-def test_epochs_completed_out_of_order_are_yielded_in_order():
-    scheduler = make_scheduler(islands=2, ahead=2)
-    one, other, later, other_later = scheduler.ready_tasks()
-    for task in (later, other_later, other):
-        scheduler.complete(task, make_epoch(task))
-        assert list(scheduler.completed_epochs()) == []
-    scheduler.complete(one, make_epoch(one))
-    assert list(scheduler.completed_epochs()) == [
-        (make_epoch(one), make_epoch(other)),
-        (make_epoch(later), make_epoch(other_later)),
-    ]
-    assert scheduler.completed_generation == 4
-    assert list(scheduler.completed_epochs()) == []
-
-
 class Clock:
     """Checks every tenth of a second of a clock that a test moves."""
 
@@ -227,17 +175,6 @@ def test_deadline_is_a_multiple_of_the_slowest_recent_epoch(deadlines, clock):
     assert deadlines.seconds_allowed(THIRD) == FACTOR * 1.0 + ALLOWANCE
 
 
-def test_detection_leaves_an_epoch_and_three_seconds_for_the_replay():
-    """A frozen actor costs at most three epochs and five seconds."""
-    assert FACTOR <= 2.0
-    assert ALLOWANCE <= 2.0
-
-
-def test_epochs_of_different_lengths_are_compared_by_generation(deadlines):
-    deadlines.record(EpochTask(0, 0, 1), 1.0)
-    assert deadlines.seconds_allowed(EpochTask(0, 10, 30)) == FACTOR * 20.0 + ALLOWANCE
-
-
 def test_unmeasured_epoch_has_a_time_that_grows_with_the_population(deadlines):
     large = EpochDeadlines(islands=2, population=100_000)
     assert UNMEASURED_ALLOWANCE < deadlines.seconds_allowed(FIRST) < large.seconds_allowed(FIRST)
@@ -268,13 +205,6 @@ def test_only_the_silent_one_of_two_actors_is_frozen(deadlines, clock):
     assert clock.frozen_after({"a": THIRD}, most=3.0) == (None, [])
     _, frozen = clock.frozen_after({"a": THIRD, "b": EpochTask(1, 5, 10)})
     assert frozen == ["a"]
-
-
-def test_suspended_process_does_not_count_its_own_pause(deadlines, clock):
-    deadlines.record(SECOND, 1.0)
-    assert clock.frozen_after({ACTOR: THIRD}, most=1.0) == (None, [])
-    clock.now += 3600.0
-    assert clock.frozen_after({ACTOR: THIRD}, most=1.0) == (None, [])
 
 
 def test_overloaded_machine_does_not_cause_endless_replacements(deadlines, clock):

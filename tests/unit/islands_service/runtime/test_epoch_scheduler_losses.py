@@ -42,20 +42,6 @@ def test_lost_task_and_later_ones_of_its_island_are_ready_again():
     assert list(scheduler.ready_tasks()) == [EpochTask(1, -1, 0), EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
 
 
-def test_loss_of_a_task_with_a_known_result_blocks_nothing():
-    """The first task is lost, the second one is completed; then the repeated second one is lost."""
-    scheduler = make_scheduler(text="isolated", islands=1, ahead=2)
-    first, second = scheduler.ready_tasks()
-    scheduler.complete(second, make_epoch(second))
-    scheduler.reschedule(first)
-    again = list(scheduler.ready_tasks())
-    scheduler.complete(first, make_epoch(first))
-    assert list(scheduler.completed_epochs()) == [(make_epoch(first),), (make_epoch(second),)]
-    for task in again[1:]:
-        scheduler.reschedule(task)
-    assert EpochTask(0, 4, 8) in list(scheduler.ready_tasks())
-
-
 def completed_twice():
     """Return a scheduler whose pending second task is already complete, and that task."""
     scheduler = make_scheduler(text="isolated", islands=1)
@@ -66,12 +52,6 @@ def completed_twice():
     scheduler.complete(first, make_epoch(first))
     assert len(list(scheduler.completed_epochs())) == 2
     return scheduler, second
-
-
-def test_loss_of_a_complete_task_reschedules_the_later_ones():
-    scheduler, second = completed_twice()
-    scheduler.reschedule(second)
-    assert list(scheduler.ready_tasks()) == [EpochTask(0, 4, 8), EpochTask(0, 8, 10)]
 
 
 def test_second_result_of_a_complete_task_is_ignored():

@@ -5,15 +5,12 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.archipelago import Archipelago, StepInfo, empty_archipelago
+from islands.evolution.archipelago import Archipelago, StepInfo
 from islands.evolution.engine import IslandEpoch
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Apply, Lagged
 from islands_service.runtime import packed_epoch
 from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_individuals, unpack_island
-from support.own_primitive import DEAD_ZONE
 from support.searches import SMALL, exactly, islands_of, record
 
 
@@ -44,15 +41,6 @@ def test_packed_epoch_contains_emigrants_steps_and_caches(islands):
     assert found.steps == epoch.steps
     assert (found.actor, found.caches) == ("me", {"pairs": (1, 2)})
     assert pickle.loads(pickle.dumps(found)) == found
-
-
-def test_unpacked_trees_contain_the_primitives_of_the_table():
-    # A copy of a function in each pickle would be compiled again.
-    gene = Apply(DEAD_ZONE, (Lagged(1),))
-    emigrants = (Individual((gene,), (make_regressor(gene),)),)
-    packed = pack_epoch(IslandEpoch(empty_archipelago(1, 0).islands[0], emigrants, ())).emigrants
-    ((found,),) = (each.genes for each in unpack_individuals(packed, {"dead_zone": DEAD_ZONE}))
-    assert found.primitive is DEAD_ZONE
 
 
 def test_packed_islands_behave_like_the_tuple_of_islands(islands, packed):

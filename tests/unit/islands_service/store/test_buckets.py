@@ -94,17 +94,6 @@ def test_large_objects_are_transferred_in_parts(endpoint, tmp_path, monkeypatch)
     assert stored["ETag"].endswith('-3"')  # the number of parts
 
 
-def test_an_upload_whose_connection_is_cut_is_repeated(proxy, tmp_path):
-    data = os.urandom(2_000_000)
-    blobs = CachedBlobs(tmp_path / "one", ObjectStore(URL), 10**9)
-    outcomes = Counter()
-    blobs.observe_object = lambda name, outcome, _: outcomes.update([(name, outcome)])
-    proxy.cut_after = [300_000] * 2  # the HTTP library repeats a request once
-    blob = blobs.write(data)
-    assert outcomes == {("put", "unavailable"): 1, ("put", "done"): 1}
-    assert CachedBlobs(tmp_path / "other", ObjectStore(URL), 10**9).read(blob) == data
-
-
 def test_a_partial_upload_is_never_read_as_the_blob(proxy, tmp_path):
     """The upload was cut at every attempt: no name was returned, and a later upload is complete."""
     data = os.urandom(2_000_000)
@@ -143,29 +132,6 @@ def test_a_store_that_is_absent_at_the_start_and_returns(proxy, tmp_path):
     proxy.refuse = False
     blobs.check_writable()
     assert blobs.read(blobs.write(b"record")) == b"record"
-
-
-def test_attempts_end_after_a_while(proxy, file, monkeypatch):
-    monkeypatch.setattr(buckets, "RETRY_SECONDS", -1.0)
-    proxy.refuse = True
-    seen = []
-    objects = ObjectStore(URL)
-    objects.observe = lambda *call: seen.append(call[:2])
-    with pytest.raises(ObjectStoreError):
-        objects.put("a", file)
-    assert seen == [("put", "unavailable")]
-
-
-def test_a_missing_bucket_is_refused_with_its_setting(endpoint, file, tmp_path):
-    objects = ObjectStore("s3://absent/prefix")
-    for operation in (
-        objects.check,
-        lambda: objects.put("a", file),
-        lambda: objects.get("a", tmp_path / "b"),
-        lambda: list(objects.all()),
-    ):
-        with pytest.raises(ObjectStoreRefusedError, match="no bucket for s3://absent/prefix: create it"):
-            operation()
 
 
 def test_wrong_credentials_are_refused_without_another_attempt(endpoint, file):

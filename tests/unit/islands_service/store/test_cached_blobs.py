@@ -70,19 +70,6 @@ def test_a_damaged_object_is_not_read(machine, objects, tmp_path):
     assert not [path for path in (tmp_path / "other").rglob("*") if path.is_file()]
 
 
-def test_a_download_that_was_cut_is_repeated(machine, objects, monkeypatch):
-    blob = machine().write(b"record")
-    get = objects.get
-
-    def cut_once(name, path):
-        get(name, path)
-        if objects.calls.count("get") == 1:
-            path.write_bytes(b"rec")
-
-    monkeypatch.setattr(objects, "get", cut_once)
-    assert machine("other").read(blob) == b"record"
-
-
 def test_a_missing_object_raises_an_error_that_names_the_store(machine):
     with pytest.raises(BlobNotFoundError, match="s3://memory: restore it from a backup, or copy"):
         machine().read("0" * 64)
@@ -100,14 +87,6 @@ def test_the_cache_drops_what_was_not_used_for_longest(machine, objects):
     assert written[0] in cached(blobs)
     assert written[1] not in cached(blobs)
     assert [blobs.read(blob) for blob in written] == [bytes([index]) * 200 for index in range(7)]
-
-
-def test_a_held_blob_outlives_its_removal_from_the_cache(machine):
-    blobs = machine()
-    blob = blobs.write(b"record")
-    with blobs.hold(blob) as path:
-        blobs.path(blob).unlink()
-        assert path.read_bytes() == b"record"
 
 
 def test_files_of_processes_that_were_killed_are_removed(machine, tmp_path):
@@ -141,13 +120,6 @@ def test_a_blob_that_is_named_while_it_is_swept_stays_readable(machine, objects)
     objects.age()
     machine("sweeper").sweep({blob}, time() - 3600.0)
     assert objects.objects.keys() == {key(blob)}
-
-
-def test_a_sweep_leaves_objects_that_are_no_blobs(machine, objects):
-    objects.objects["islands-store"], objects.times["islands-store"] = b"1", 0.0
-    objects.objects["other/file"], objects.times["other/file"] = b"1", 0.0
-    machine().sweep(frozenset(), time())
-    assert len(objects.objects) == 2
 
 
 def test_discarding_needs_no_answer_of_the_store(machine, objects):

@@ -5,7 +5,6 @@ import sqlite3
 import threading
 import time
 from contextlib import closing
-from functools import partial
 from uuid import uuid4
 
 import pytest
@@ -89,18 +88,6 @@ def test_collision_is_retried_a_limited_number_of_times(postgresql):
     assert 2 <= len(tries) <= 10
 
 
-def test_transient_collision_is_hidden_by_a_retry(postgresql):
-    tries = []
-
-    def collides_once(connection):
-        tries.append(1)
-        if len(tries) == 1:
-            connection.execute(text(RAISE.format("40001")))
-        return len(tries)
-
-    assert postgresql.write(collides_once) == 2
-
-
 def ending(connection):
     """Make the server end the connection, as an administrator or a crash does."""
     return connection.exec_driver_sql("SELECT pg_terminate_backend(pg_backend_pid())")
@@ -136,22 +123,6 @@ def test_locked_file_raises_an_error_after_the_timeout(sqlite, tmp_path, monkeyp
         other.execute("COMMIT")
         hasty.write(executing("SELECT 1"))
     hasty.close()
-
-
-def test_locked_new_file_raises_an_error_after_the_timeout(tmp_path, monkeypatch):
-    """SQLite itself does not wait when the file is switched to write-ahead logging."""
-    monkeypatch.setattr(dialect, "BUSY_TIMEOUT", 0.4)
-    database = Database(f"sqlite:///{tmp_path / 'islands.db'}")
-    with closing(sqlite3.connect(tmp_path / "islands.db", isolation_level=None)) as other:
-        other.execute("BEGIN EXCLUSIVE")
-        other.execute("CREATE TABLE taken (a)")
-        began = time.monotonic()
-        with pytest.raises(StoreUnavailableError, match="locked"):
-            database.write(executing("SELECT 1"))
-        assert 0.3 < time.monotonic() - began < 25
-        other.execute("COMMIT")
-    database.write(executing("SELECT * FROM taken"))
-    database.close()
 
 
 def test_a_file_that_is_no_database_is_not_written(tmp_path):
@@ -190,16 +161,6 @@ def test_server_that_never_answers_raises_an_error_after_a_timeout(monkeypatch):
             database.write(executing("SELECT 1"))
         assert time.monotonic() - began < 25
         database.close()
-
-
-def test_concurrent_opening_of_a_new_file_succeeds(tmp_path):
-    """The API and the coordinator do so at the first start; only one may enable write-ahead logging."""
-    for turn in range(10):
-        made = [Database(f"sqlite:///{tmp_path / f'{turn}.db'}") for _ in range(8)]
-        answers = at_once([partial(each.write, executing("SELECT 1")) for each in made])
-        assert not [answer for answer in answers if isinstance(answer, Exception)]
-        for each in made:
-            each.close()
 
 
 def test_writer_that_cannot_start_blocks_no_later_write(sqlite, monkeypatch):

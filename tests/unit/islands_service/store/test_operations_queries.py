@@ -139,11 +139,3 @@ def test_claim_ranks_owners_in_the_index_and_reads_the_jobs_of_one_in_order(full
     assert "ix_jobs_queue" in first
     assert "TEMP B-TREE" not in first
     assert "Sort" not in first
-
-
-def test_quota_is_counted_in_the_index_alone(sqlite):
-    assert any("COVERING INDEX ix_jobs_queue" in plan for plan in plans(sqlite, ASKED["quota"][0]))
-
-
-def test_page_needs_one_statement(sqlite):
-    assert len(plans(sqlite, lambda store: store.jobs.page(ALICE, limit=200))) == 1

@@ -6,10 +6,6 @@ import json
 import numpy as np
 import pytest
 
-import islands
-from islands.records.coupled import CoupledRecord
-from islands.simulation.predictors import free_run
-from islands.validation.metrics import metrics
 from support.command_line import fail, succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.parsed_files import list_parsed
@@ -57,49 +53,6 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
     assert "write a file with --out" in fail("show", folder, "--format", "fmu")
     assert "free runs only" in fail("simulate", folder, record, "--mode", "one-step")
     assert "as many --output" in fail("simulate", folder, record, "--output", "y1")
-
-
-@pytest.mark.ci
-def test_an_identified_model_has_its_errors_on_test_data(record, tmp_path) -> None:
-    folder = tmp_path / "result"
-    small = (
-        *("--generations", 1, "--set", "population=10", "--islands", 1, "--max-terms", 4),
-        *("--set", "max_height=2"),
-    )
-    printed = succeed("identify", record, *COLUMNS, *small, "--test", 0.2, "--out", folder)
-    found = json.loads((folder / "test.json").read_text())
-    assert [entry["name"] for entry in found["outputs"]] == ["y1", "y2"]
-    assert f"y1: MAPE {found['outputs'][0]['mape']:.4f} %" in printed
-    data = CoupledRecord(tuple(islands.read_record(record, "u", name) for name in ("y1", "y2")))
-    test = data.map(lambda each: islands.split(each, 0.2).validation)
-    y = islands.load(folder).simulate(test).y
-    assert found["outputs"][1]["rmse"] == pytest.approx(metrics(test.records[1].y, y[:, 1]).rmse)
-
-
-@pytest.mark.ci
-def test_preprocessed_outputs_are_simulated_as_measured(record, tmp_path) -> None:
-    folder, out = tmp_path / "result", tmp_path / "simulated.csv"
-    with undrawn_figures():
-        succeed(
-            "fit",
-            record,
-            *COLUMNS,
-            *SMALL,
-            *("--set", "detrend=constant", "--set", "lowpass=1", "--out", folder),
-        )
-    printed = " ".join(succeed("simulate", folder, record, "--out", out).split())
-    assert "y1 is the deviation from" in printed
-    assert "behind a zero-phase low-pass filter of 1 Hz" in printed
-    model = islands.load(folder).model
-    assert all(each.preprocessing.output_offset for each in model.models)
-    assert model.preprocessing.input_offsets[0] != 0.0
-    data = CoupledRecord(tuple(islands.read_record(record, "u", name) for name in ("y1", "y2")))
-    simulated = np.genfromtxt(out, delimiter=",", skip_header=1)[:, 1:]
-    warm_up = json.loads((folder / "result.json").read_text())["warm_up"]
-    expected = free_run(model, data, warm_up).y[warm_up:]
-    np.testing.assert_allclose(simulated[-len(expected) :], expected, rtol=1e-9)
-    # The offsets belong to the outputs as measured.
-    assert np.abs(expected.mean(axis=0) - data.y[warm_up:].mean(axis=0)).max() < 0.05 * np.ptp(data.y)
 
 
 @pytest.mark.ci

@@ -118,9 +118,3 @@ def test_stored_floats_are_exact() -> None:
     assert [np.array(each, dtype=np.float64).tobytes() for each in stored] == [
         each.tobytes() for each in values
     ]
-
-
-def test_other_functions_are_not_recorded() -> None:
-    journal = FitJournal()
-    assert list(journal.record(map)(abs, [-1, 2])) == [1, 2]
-    assert journal.to_document() == []

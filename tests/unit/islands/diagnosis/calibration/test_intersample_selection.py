@@ -28,8 +28,7 @@ from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.ode.simulator import OdeSimulator, make_ode_simulator
 from islands.simulators.ode.system_document import make_system
-from islands.simulators.recorded_output import RecordedOutput
-from support.built_in_simulators import make_oscillator, make_piezo
+from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded
 
 Array = NDArray[np.float64]
@@ -109,21 +108,6 @@ def test_a_behaviour_that_matches_a_record_without_noise_is_selected() -> None:
     assert target.is_matched(calibrate(simulation, target, fit.values).output)
 
 
-@pytest.mark.parametrize("intersample", [InterSample.ZOH, InterSample.BAND_LIMITED])
-def test_wrong_intersample_behaviour_leaves_more_than_the_noise(intersample: InterSample) -> None:
-    u, fine_u = make_inputs(intersample)
-    fit, target = calibrate_to(
-        recorded(
-            u,
-            add_noise(simulate_finely(fine_u, linear=intersample != InterSample.ZOH), 0.003),
-            DT,
-            ("N", "m"),
-        ),
-        oscillator(),
-    )
-    assert fit.mean_square > 4 * (0.003 * target.y.std()) ** 2
-
-
 def test_steps_are_halved_until_the_output_converges() -> None:
     """At six samples per period, one step per sample is far too coarse."""
     stiff = (0.5, 2.0, 5500.0)
@@ -151,31 +135,6 @@ def test_lead_of_an_output_is_as_small_as_the_record_permits(delay: int) -> None
     lead = float(fit.values[fit.simulation.get_slice(DELAY)][0])
     assert lead == pytest.approx((delay / FINE - 0.5) * DT, abs=0.1 * DT)
     assert get_intersample(select_intersample(fit, target)) != InterSample.ZOH
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_slow_record_does_not_change_the_discretisation(seed: int) -> None:
-    """If the input hardly changes between samples, no behaviour fits better by more than chance."""
-    t = DT / FINE * np.arange(SAMPLES * FINE)
-    u = np.sin(2 * np.pi * 0.6 * t) + 0.5 * np.sin(2 * np.pi * 1.1 * t)
-    core = oscillator(k=50.0)
-    fit, target = calibrate_to(
-        recorded(u[::FINE], add_noise(simulate_finely(u, k=50.0), seed=seed), DT, ("N", "m")), core
-    )
-    assert select_intersample(fit, target) is core
-
-
-def test_simulator_without_integration_is_returned_unchanged() -> None:
-    u, _ = make_inputs(InterSample.ZOH)
-    core = RecordedOutput("theirs", u)
-    fit, target = calibrate_to(recorded(u, add_noise(u)), core)
-    assert select_intersample(fit, target) is core
-
-
-def test_discretisation_is_behaviour_and_step() -> None:
-    core = make_piezo()
-    assert get_discretisation(core) == (InterSample.FOH, 1)
-    assert get_discretisation(ResampledSimulator(core, InterSample.ZOH, 4)) == (InterSample.ZOH, 4)
 
 
 def test_a_simulation_that_smaller_steps_do_not_improve_keeps_its_step() -> None:

@@ -5,7 +5,6 @@ import pytest
 
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate, estimate_deviations
 from islands.diagnosis.calibration.preparation import make_target
-from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
@@ -50,9 +49,3 @@ def test_gain_that_another_one_makes_up_for_is_held() -> None:
 def test_interval_of_a_value_that_is_almost_undetermined_is_as_narrow(leak: float) -> None:
     u, (_, of_effect) = estimate((make_gain(),), leak)
     assert of_effect == pytest.approx(NOISE / np.linalg.norm(2.0 * u), rel=0.2)
-
-
-def test_determined_values_are_estimated_together() -> None:
-    u, (of_gain, of_offset) = estimate((CATALOGUE["offset"],))
-    assert of_gain == pytest.approx(NOISE / np.linalg.norm(u), rel=0.2)
-    assert of_offset == pytest.approx(NOISE / np.sqrt(u.size), rel=0.2)

@@ -1,8 +1,5 @@
 """`CalibrationProblem`: derivatives in the call of a point or after it, and damped steps."""
 
-from collections import Counter
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -12,10 +9,9 @@ from islands.diagnosis.calibration.problem import CalibrationProblem, simulate_t
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.ode.shooting import ShotSimulation
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
-from support.simulated_records import made, recorded, wave
+from support.simulated_records import recorded, wave
 
 pytestmark = pytest.mark.ci
 
@@ -71,47 +67,6 @@ def test_simulations_in_groups_give_the_same_fit(
     monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
     grouped = calibrate(simulation, target, simulation.nominal)
     assert grouped.values.tobytes() == one_by_one.values.tobytes()
-
-
-def test_the_point_of_the_last_step_has_no_derivatives(
-    oscillator: tuple[ExtendedSimulator, Target], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    simulation, target = oscillator
-    simulate, sizes = ExtendedSimulator.simulate_batch, list[int]()
-
-    def count(simulation: ExtendedSimulator, points: Any, near: Any = None) -> Any:
-        sizes.append(len(points))
-        return simulate(simulation, points, near)
-
-    monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
-    monkeypatch.setattr(ExtendedSimulator, "simulate_batch", count)
-    calibrate(simulation, target, 1.01 * simulation.nominal, max_iterations=1)
-    assert sizes == [1 + simulation.nominal.size, 1]
-
-
-def test_short_record_has_one_fit_of_states_for_a_point_and_its_derivatives(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A fit of the states of shooting intervals simulates thirteen times."""
-    case, fits = made()["rigid-axis"], Counter[bool]()
-    record = case.record[:300]
-    simulator = make_simulator(case.spec, record)
-    target = Target(record.y, np.arange(300) < 225, None, {}, fitted=225)
-    fit_states, found = ShotSimulation.fit_states, {}
-    for is_batch in (True, False):
-
-        def count(shots: ShotSimulation, *given: Any, is_batch: bool = is_batch) -> Any:
-            fits[is_batch] += 1
-            return fit_states(shots, *given)
-
-        monkeypatch.setattr(ShotSimulation, "fit_states", count)
-        if not is_batch:
-            monkeypatch.setattr(ExtendedSimulator, "is_batch", False)
-        simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 225))
-        found[is_batch] = calibrate(simulation, target, 1.1 * simulation.nominal)
-    assert found[True].values.tobytes() == found[False].values.tobytes()
-    assert found[True].output.tobytes() == found[False].output.tobytes()
-    assert fits[True] < 0.7 * fits[False]
 
 
 def test_fits_from_several_starts_do_not_depend_on_each_other(

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import islands
-from islands.diagnosis.calibration.resolution import is_unresolved, measure_resolution
+from islands.diagnosis.calibration.resolution import is_unresolved
 from islands.diagnosis.inference.resolved_effects import may_be_zero
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
@@ -24,23 +24,6 @@ def respond(u: np.ndarray) -> np.ndarray:
 
 def round_to(y: np.ndarray, step: float) -> np.ndarray:
     return step * np.round(y / step)
-
-
-def test_resolution_is_the_step_of_a_lattice() -> None:
-    y = respond(excite(0))
-    assert measure_resolution(round_to(y, 0.02)) == pytest.approx(0.02)
-    assert measure_resolution(np.append(round_to(y + 7.0, 0.02), np.nan)) == pytest.approx(0.02)
-
-
-@pytest.mark.parametrize("offset", [0.0, 5.0])
-def test_resolution_without_a_lattice_is_a_millionth_of_the_range(offset: float) -> None:
-    y = respond(excite(0)) + offset
-    assert measure_resolution(y) == pytest.approx(1e-6 * np.ptp(y))
-
-
-def test_two_levels_are_no_lattice() -> None:
-    y = np.sign(excite(0))
-    assert measure_resolution(y) == pytest.approx(2e-6)
 
 
 def test_rounding_and_truncation_errors_are_on_both_sides_of_the_limit() -> None:
@@ -66,14 +49,6 @@ def test_rounded_output_of_the_simulation_has_no_cause(seed: int, step: float) -
     assert {each.name for each in found.noise} <= {"quantisation"}
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_single_precision_is_no_discrepancy(seed: int) -> None:
-    u = excite(seed)
-    y = respond(u)
-    found = diagnose(Dataset(u, y, 0.01), RecordedOutput("theirs", y.astype(np.float32).astype(float)))
-    assert (found.verdict, found.effects) == (Verdict.NOTHING, ())
-
-
 @pytest.mark.ci
 def test_second_effect_below_the_resolution_is_not_named() -> None:
     u = excite(1)
@@ -85,16 +60,7 @@ def test_second_effect_below_the_resolution_is_not_named() -> None:
     assert [each.name for each in found.effects] == ["offset"]
 
 
-@pytest.mark.ci
-def test_effect_that_the_resolution_shows_is_named() -> None:
-    u = excite(1)
-    y = respond(u)
-    measured = round_to(y + 0.1, 0.02)
-    found = diagnose(Dataset(u, measured, 0.01), RecordedOutput("theirs", y))
-    assert (found.verdict, found.claimed_names) == (Verdict.NAMED, ("offset",))
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", ["zoh", "foh"])
 @pytest.mark.parametrize("seed", range(3))
 def test_exact_oscillator_has_neither_effects_nor_terms(method: str, seed: int) -> None:

@@ -52,16 +52,6 @@ def test_width_of_a_record_with_little_noise_is_found(width: float) -> None:
     assert narrowed == pytest.approx(width)
 
 
-def test_width_that_noise_hides_remains() -> None:
-    found, target = fit(0.005, 1.0)
-    assert narrow_friction(found, target) is found.simulation.context
-
-
-def test_simulation_without_dry_friction_keeps_its_context() -> None:
-    found, target = fit(0.005, 1e-5, has_friction=False)
-    assert narrow_friction(found, target) is found.simulation.context
-
-
 def fit_jump(size: float) -> tuple[CalibrationResult, Target, Dataset]:
     """Calibrate an oscillator with a jump to a record with a sharp one, of a size relative to its noise."""
     rng = np.random.default_rng(3)

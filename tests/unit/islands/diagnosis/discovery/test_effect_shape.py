@@ -27,7 +27,7 @@ def diagnose_fault(name: str, seed: int) -> Diagnosis:
     return diagnose(faulty.record, case.make(faulty), case.tolerance, seed, catalogue=EFFECTS)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_curve_of_a_cubic_spring_is_within_the_band_of_the_free_curve() -> None:
     shape = diagnose_fault("cubic-stiffness", 2).shape
     assert shape is not None

@@ -13,7 +13,6 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.discovery.jumping_inputs import find_stick_slip, fit_jumping_inputs
 from islands.diagnosis.discovery.state_equations import get_linear
 from islands.diagnosis.inference.hypothesis import Hypothesis
-from islands.diagnosis.inference.resolved_effects import remove_unresolved
 from islands.diagnosis.inference.screening import compute_cost, screen_effects, transfer_parameters
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.run import DiagnosisRun
@@ -88,7 +87,7 @@ def fit(record: Dataset, simulation: str | OdeSpec = "linear:2") -> tuple[Calibr
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.nightly) for each in (1, 2))])
 @pytest.mark.parametrize("name", MOVES)
 def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int) -> None:
     base, target = fit(make_record(name, seed))
@@ -97,19 +96,7 @@ def test_jumps_of_an_actuator_are_found_behind_a_slow_plant(name: str, seed: int
     assert exact == ([] if name == "none" else [name])
 
 
-@pytest.mark.ci
-@pytest.mark.parametrize(("size", "part", "count"), [(0.05, 0.6, 50.0), (0.02, 0.9, 100.0)])
-def test_small_steps_of_an_actuator_are_found(size: float, part: float, count: float) -> None:
-    record = make_smooth_record(size, np.inf)
-    base, target = fit(record)
-    (found,) = fit_jumping_inputs(base, target, DiagnosisRun([QUANTISED_INPUT]))
-    assert 2.0 * np.abs(record.u).max() / size > count
-    step = found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)][0]
-    assert step == pytest.approx(size, rel=2e-3)
-    assert found.fit.mean_square**0.5 < 1.1 * 0.002 < part * base.mean_square**0.5
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("direct", [0.0, 1.0])
 def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> None:
     """A plant that responds at once has the steps at each sample, and another one their average."""
@@ -131,7 +118,7 @@ def test_steps_that_an_input_passes_within_a_sample_are_found(direct: float) -> 
     assert found.fit.mean_square < 0.7 * base.mean_square
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_slips_between_samples_need_differential_equations() -> None:
     """Its difference equation reads the slips at the samples only."""
     fine, times = 20, np.arange(24_000) / 1000.0
@@ -151,22 +138,6 @@ def test_slips_between_samples_need_differential_equations() -> None:
 
 
 @pytest.mark.nightly
-def test_steps_are_found_behind_another_effect() -> None:
-    """The steps of the plant alone are not those of the actuator, whose limit it lacks."""
-    base, target = fit(make_smooth_record(0.2, 0.8))
-    saturation = CATALOGUE["input-saturation"]
-    limited = screen_effects(base, target, DiagnosisRun([saturation]))[0].fit
-    (found,) = fit_jumping_inputs(limited, target, DiagnosisRun([QUANTISED_INPUT]))
-    assert found.fit.simulation.effects == (saturation, QUANTISED_INPUT)
-    assert found.fit.mean_square**0.5 < 1.5 * 0.002 < 0.2 * limited.mean_square**0.5
-    step = found.fit.values[found.fit.simulation.get_slice(QUANTISED_INPUT)][0]
-    assert step == pytest.approx(0.2, rel=1e-2)
-    assert fit_jumping_inputs(found.fit, target, DiagnosisRun([QUANTISED_INPUT])) == []
-    hypothesis = Hypothesis(found.fit, found.fit.score, found.fit.simulation.effects)
-    assert remove_unresolved(hypothesis, target) is hypothesis
-
-
-@pytest.mark.ci
 def test_steps_are_found_behind_a_play_though_the_catalogue_has_them_before_it() -> None:
     """The search divides what the play leaves of the input."""
     record, play = make_smooth_record(0.2, np.inf), CATALOGUE["backlash"]
@@ -201,11 +172,6 @@ def test_steps_and_a_play_of_half_a_step_are_stick_slip(seed: int) -> None:
     assert found.fit.values[found.fit.simulation.get_slice(STICTION)] == pytest.approx([0.2], rel=1e-3)
     assert found.fit.mean_square**0.5 == pytest.approx(0.01, rel=0.1)
     assert find_stick_slip(hypothesis, target, DiagnosisRun(pair)) is None
-
-
-def test_search_is_limited_to_the_effects_of_a_diagnosis() -> None:
-    base, target = fit(make_record("stiction", 0))
-    assert fit_jumping_inputs(base, target, DiagnosisRun(())) == []
 
 
 @pytest.mark.ci

@@ -10,12 +10,10 @@ import scipy
 import islands
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
-from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Signal
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json
 from islands.simulators.interface import Simulator
-from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.table import LocalExtendedSpec
 
@@ -58,9 +56,8 @@ def find(law: str) -> tuple[Dataset, Diagnosis]:
     return record, diagnose(record, make_column(record))
 
 
-@pytest.mark.parametrize(
-    "law", [pytest.param(law, marks=pytest.mark.ci if law == "u**5" else pytest.mark.nightly) for law in LAWS]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("law", LAWS)
 def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
     _, found = find(law)
     assert found.verdict == "discovered"
@@ -72,22 +69,6 @@ def test_missing_term_of_a_recorded_output_is_found(law: str) -> None:
     assert found.gain.after.rmse == pytest.approx(0.1, rel=0.1)
 
 
-@pytest.mark.ci
-def test_missing_term_is_found_next_to_calibrated_parameters() -> None:
-    record = make_record(LAWS["rate(u)*u**2"])
-    own = [CATALOGUE[name] for name in ("offset", "linear-drift", "cubic-stiffness", "delay", "sensor-lag")]
-    found = diagnose(record, PythonFunctionSimulator(follow, "follow", {"gain": 1.9}), catalogue=own)
-    assert found.verdict == "discovered"
-    assert found.discovery is not None
-    assert "rate(u)*u**2" in found.discovery.equations
-    values = {
-        each.name: value
-        for each, value in zip(found.best.simulation.parameters, found.best.values, strict=True)
-    }
-    assert values["a1"] == pytest.approx(2e-5, rel=0.05)
-    assert values["gain"] == pytest.approx(2.0, rel=0.01)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_right_simulation_gets_no_terms(seed: int) -> None:
     record = make_record(None, seed)
@@ -96,15 +77,7 @@ def test_right_simulation_gets_no_terms(seed: int) -> None:
     assert found.discovery is None
 
 
-@pytest.mark.ci
-def test_effect_of_the_catalogue_keeps_its_name() -> None:
-    record = make_record(lambda u, _rate, _y: 2e-4 * u**3)
-    found = diagnose(record, make_column(record))
-    assert found.verdict == "named"
-    assert [each.name for each in found.effects] == ["cubic-stiffness"]
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:
     record, found = find("u**5")
     spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))

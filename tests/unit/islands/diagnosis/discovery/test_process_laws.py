@@ -1,17 +1,14 @@
 """Laws inside of a linear simulation: terms and limits of its states are found, and stated in words."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-import scipy
 
 import islands
 from islands.diagnosis.discovery.candidate_terms import list_candidate_terms, write_rate_size
 from islands.diagnosis.discovery.process_laws import describe_law
-from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import EFFECTS
@@ -19,10 +16,9 @@ from islands.effects.interface.effect import Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json
-from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
-from islands.simulators.specification.table import LinearSpec, LocalExtendedSpec
+from islands.simulators.specification.table import LocalExtendedSpec
 
 DT, STEPS, SAMPLES = 0.1, 10, 1200
 
@@ -149,16 +145,6 @@ def test_a_law_of_the_process_is_no_model_error(name: str) -> None:
 
 @pytest.mark.ci
 @pytest.mark.nightly
-def test_limits_of_a_state_that_are_not_opposite_are_found() -> None:
-    _, found = find("range")
-    (cause,) = found.causes
-    assert cause.name == "state-range"
-    limits = [cause.parameters[f"state-range:x1 {which}"].value for which in ("lower", "upper")]
-    assert limits == pytest.approx([-1.0, 2.0], rel=0.02)
-
-
-@pytest.mark.ci
-@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "cause", "value"),
     [("friction", "coulomb-friction", 2.0 / 12.0), ("spring", "cubic-stiffness", 0.125)],
@@ -168,17 +154,6 @@ def test_force_in_an_oscillator_is_found_by_a_linear_simulation(name: str, cause
     assert [each.name for each in found.causes] == [cause]
     (force,) = found.causes[0].parameters.values()
     assert force.value == pytest.approx(value, rel=0.05)
-
-
-@pytest.mark.ci
-@pytest.mark.nightly
-def test_elastic_stop_of_an_oscillator_is_found_by_a_linear_simulation() -> None:
-    _, found = find("elastic stop")
-    (cause,) = found.causes
-    assert cause.term == "a1*(sign(x)*max(abs(x) - s1, 0)) in dv/dt"
-    assert cause.parameters["a1"].value == pytest.approx(-100.0, rel=0.1)
-    assert cause.parameters["s1"].value == pytest.approx(1.5, rel=0.02)
-    assert cause.summary == "An elastic stop acts where x is beyond +-s1"
 
 
 @pytest.mark.ci
@@ -195,28 +170,6 @@ def test_extension_holds_for_another_record(name: str) -> None:
     other = make_record(name, seed=1)
     error = islands.simulate(spec, other).y - other.y
     assert np.sqrt(np.mean(error**2)) == pytest.approx(0.01, rel=0.15)
-
-
-@pytest.mark.ci
-def test_coloured_noise_of_a_process_is_no_law() -> None:
-    rng, record = np.random.default_rng(2), make_record("limit")
-    process = make_simulator(
-        LinearSpec(kind="linear", order=1, numerator=(0.0, 0.1), denominator=(0.9,)), record
-    )
-    context = make_context(record, process, SAMPLES)
-    clean = ExtendedSimulator(process, (), context)
-    noise = scipy.signal.lfilter([1.0], [1.0, -0.9], 0.02 * rng.standard_normal(SAMPLES))
-    noisy = replace(record, y=clean.simulate(clean.nominal) + noise)
-    found = diagnose(noisy, make_simulator("linear:1", noisy))
-    assert found.verdict == "noise"
-    assert not found.causes
-
-
-@pytest.mark.ci
-def test_extension_of_a_process_is_right_in_a_second_diagnosis() -> None:
-    record, found = find("uneven")
-    spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))
-    assert islands.diagnose(record, spec).verdict == "nothing"
 
 
 PROCESS = {
@@ -259,14 +212,6 @@ def test_the_gain_of_a_state_at_the_output_is_no_candidate() -> None:
     ]
     assert "x" not in of_output
     assert {"v", "u", "x**3"} <= set(of_output)
-
-
-def test_another_rate_in_one_direction_is_a_candidate_far_from_zero() -> None:
-    document = {**PROCESS, "equations": "dx/dt = (u + level - x)/T", "parameters": {"T": 2.0, "level": 300.0}}
-    system = OdeSpec.model_validate(document).make_system()
-    sizes = dict.fromkeys(("x", "dx/dt", "u", "rate(u)"), 2.0)
-    kept = drop_redundant_terms(list_candidate_terms(system, sizes, 10.0, {}), system)
-    assert "abs((u + level - x)/T)" in {each.text for each in kept}
 
 
 def test_laws_are_stated_in_words_and_other_terms_are_not() -> None:

@@ -53,15 +53,6 @@ def test_plant_behind_a_sensor_of_the_absolute_value_is_found(name: str) -> None
     assert (found.simulate(other).y - other.y).std() < 0.007
 
 
-@pytest.mark.ci
-@pytest.mark.nightly
-def test_rectifier_has_half_the_value_of_an_absolute_value() -> None:
-    record = make_record("linear:2", 0, "rectified")
-    found = diagnose(record, make_simulator("linear:2", record), catalogue=[UNSIGNED_SENSOR])
-    (cause,) = found.causes
-    assert cause.parameters["k"].value == pytest.approx(0.5, abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("sense", "level", "is_possible"),
     [("unsigned", 0.1, True), ("signed", 0.1, False), ("signed", 9.0, False)],

@@ -117,23 +117,6 @@ def test_every_exchange_keeps_the_channels_that_the_simulation_reads() -> None:
     assert all(read <= set(each.record.input_names[1:]) for each in corrections)
 
 
-def test_exchanges_of_unread_channels_move_the_names_with_the_values() -> None:
-    signals = dict(zip((*RECORD.input_names, RECORD.output_name), (*RECORD.u.T, RECORD.y), strict=True))
-    corrections = list(correct_swapped_channels(RECORD, frozenset()))
-    assert len(corrections) == 7  # every pair with the input or the output
-    for made in (each.record for each in corrections):
-        for name, signal in zip((*made.input_names, made.output_name), (*made.u.T, made.y), strict=True):
-            assert np.array_equal(signal, signals[name])
-
-
-def test_constant_channel_remains_if_the_simulation_reads_it() -> None:
-    room = np.full(SAMPLES, 20.0)
-    still = replace(RECORD, u=np.column_stack([POWER, room, WATER, OTHER]), y=simulate_tank(room) + NOISE)
-    found = run(still)
-    assert found.verdict == Verdict.NOTHING
-    assert found.record_findings == ()
-
-
 @pytest.mark.ci
 def test_correction_on_which_the_simulation_fails_is_rejected() -> None:
     def heat(u: np.ndarray, dt: float, gain: float = 1.0) -> np.ndarray:

@@ -14,18 +14,6 @@ from lab.diagnosis.trial import Trial, run_trial
 EVEN = np.full(BLOCKS, 10.0)
 
 
-def test_equal_alternatives_share_the_confidence() -> None:
-    causes = [ScoredAlternative(50.0, EVEN)] * 4
-    assert compute_confidence(causes[0], causes[1:]) == pytest.approx(0.25)
-
-
-def test_confidence_grows_with_the_lead() -> None:
-    other = ScoredAlternative(50.0, EVEN + 1.0)
-    leads = [compute_confidence(ScoredAlternative(50.0 + lead, EVEN), [other]) for lead in (0.0, 5.0, 30.0)]
-    assert leads == sorted(leads)
-    assert leads[-1] > 0.999
-
-
 def test_blocks_that_contradict_each_other_lower_the_confidence() -> None:
     contradictory = EVEN + 30.0 * np.where(np.arange(BLOCKS) % 2, 1.0, -0.9)
     named = ScoredAlternative(80.0, EVEN)

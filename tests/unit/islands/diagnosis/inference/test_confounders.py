@@ -90,10 +90,6 @@ def test_stick_slip_below_the_noise_gives_no_evidence(fine_u: Array, seed: int) 
         assert abs(fit_play(fine_u, x, 0.5, seed).score_gain) < 4.0
 
 
-def test_delay_has_no_confounder(fine_u: Array) -> None:
-    assert fit_and_find(fine_u[::10], fine_u[7::10], "delay") is None
-
-
 def test_confounder_with_which_the_simulation_diverges_is_none(fine_u: Array) -> None:
     def diverge_at_jumps(u: Array, _dt: float) -> Array:
         return u if np.abs(np.diff(u)).max() < 0.2 else np.full_like(u, np.nan)

@@ -50,15 +50,6 @@ def test_effects_that_oppose_each_other_are_a_pair(opposed: tuple[CalibrationRes
     assert best.gain > 2.0 * (base.score - single.fit.score)
 
 
-def test_pairs_differ_and_have_two_effects_each(opposed: tuple[CalibrationResult, Target]) -> None:
-    base, target = opposed
-    pairs = rank_pairs(base, target, EFFECTS, 100, 100)
-    assert len({frozenset(get_names(each)) for each in pairs}) == len(pairs) == 10
-    gains = [each.gain for each in pairs]
-    assert gains == sorted(gains, reverse=True)
-    assert rank_pairs(base, target, EFFECTS[:1], 100, 100) == rank_pairs(base, target, [], 100, 100) == []
-
-
 def test_effects_with_the_same_response_are_no_pair(opposed: tuple[CalibrationResult, Target]) -> None:
     base, target = opposed
     twin = replace(CATALOGUE["linear-drift"], name="twin")

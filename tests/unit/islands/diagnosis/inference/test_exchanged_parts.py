@@ -1,14 +1,10 @@
 """An extension that is fitted to the hold-out recordings: gain on the others, and values of both."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
-from islands.diagnosis.calibration.target import Target
-from islands.diagnosis.inference import exchanged_parts
 from islands.diagnosis.inference.exchanged_parts import ExchangedParts, exchange_parts
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
@@ -58,22 +54,3 @@ def test_another_coefficient_in_the_validation_data_is_a_contradiction() -> None
     assert not value.agrees
     assert value.estimation == pytest.approx(2.0 * value.validation, rel=0.1)
     assert found.gain.after.rmse > 3.0 * SIGMA
-
-
-def test_a_simulation_that_diverges_on_the_estimation_data_has_no_gain(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def diverge(fit: CalibrationResult, target: Target, first: int, last: int) -> CalibrationResult:
-        assert (first, last) == (0, target.fitted)
-        return replace(fit, output=np.full(fit.output.size, np.nan))
-
-    monkeypatch.setattr(exchanged_parts, "fit_initial_states", diverge)
-    found = exchange(record(3000.0, 3000.0))
-    assert found is not None
-    assert found.gain is None
-    assert found.values
-
-
-def test_the_end_of_a_recording_is_no_other_input() -> None:
-    one, _ = oscillator_recordings(1, LENGTHS, "cubic-stiffness", 3000.0)
-    assert exchange(one) is None

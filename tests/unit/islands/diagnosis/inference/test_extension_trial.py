@@ -28,7 +28,6 @@ from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.python_function import PythonFunctionSimulator
-from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.factory import make_simulator
 from lab.diagnosis.injection.unusual.table import UNUSUAL_CAUSES
 from lab.diagnosis.unusual_trial import draw_record
@@ -78,12 +77,6 @@ def test_extension_within_its_record_is_offered_with_its_ranges() -> None:
     assert y.high - y.low > u.high - u.low
 
 
-def test_extension_that_diverges_with_a_larger_input_is_refused() -> None:
-    refusal = try_runaway(12.0, 1e-3).refusal
-    assert refusal is not None
-    assert "1.2 times the recorded input" in refusal
-
-
 def rise_at_falls(u: np.ndarray, values: np.ndarray, _: object) -> np.ndarray:
     """Return a signal to which a fast fall adds much; the reverse of a sawtooth falls fast."""
     return u + values[0] * 1e3 * np.maximum(-np.diff(u, prepend=u[0]) - 1.0, 0.0)
@@ -130,25 +123,6 @@ def test_term_that_diverges_with_another_input_is_refused() -> None:
     trial = try_extension(record, base, evaluate_fit(simulation, target, np.array([1.0])), target)
     assert trial.refusal is not None
     assert "mirrored" in trial.refusal
-
-
-def test_extension_that_diverges_at_an_end_of_an_interval_is_refused() -> None:
-    trial = try_runaway(0.5, 40.0)
-    assert trial.refusal is not None
-    assert "with runaway s = " in trial.refusal
-    assert "an end of its 95 % interval" in trial.refusal
-
-
-def test_recorded_output_is_tried_with_its_input_alone() -> None:
-    rng = np.random.default_rng(1)
-    u = rng.standard_normal(400)
-    record = Dataset(u, u + 0.5 + 0.01 * rng.standard_normal(400), 0.1)
-    simulator, target = RecordedOutput("theirs", u), make_target(record, 300, {})
-    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, 300))
-    base = calibrate(simulation, target, simulation.nominal)
-    best = calibrate(simulation.with_effects([CATALOGUE["offset"]]), target, np.zeros(1))
-    trial = try_extension(record, base, best, target)
-    assert (trial.refusal, trial.input_factor) == (None, 1.0)
 
 
 @pytest.mark.parametrize("scale", [1.0, 30.0])

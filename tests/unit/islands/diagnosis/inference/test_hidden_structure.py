@@ -16,7 +16,6 @@ from islands.simulators.specification.factory import make_simulator
 from support.noise_records import (
     DT,
     SAMPLES,
-    SENSOR,
     draw_input,
     make_noisy_record,
     make_quantised_actuator,
@@ -58,14 +57,6 @@ def test_unmeasured_sweep_is_a_moving_frequency(seed: int) -> None:
     assert "moving frequency" in find(make_swept_force(seed))
 
 
-def test_missing_memory_is_found_in_coloured_noise() -> None:
-    rng = np.random.default_rng(0)
-    u = draw_input(rng)
-    late = np.concatenate([np.zeros(30), u[:-30]])
-    noise = 0.05 * np.asarray(lfilter([1.0], [1.0, -0.9], rng.standard_normal(SAMPLES)))
-    assert "memory of the input" in find(recorded(u, respond(u) + 0.05 * late + noise, DT))
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_law_of_the_state_is_a_map_of_the_output(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -75,14 +66,6 @@ def test_law_of_the_state_is_a_map_of_the_output(seed: int) -> None:
         x += 0.05 * (u[k] - x - 0.3 * abs(x) * x)
     noise = np.asarray(lfilter([1.0], [1.0, -0.9], rng.standard_normal(SAMPLES)))
     assert "map of the output" in find(recorded(u, y + 0.01 * y.std() * noise / noise.std(), DT), 1)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_sensor_of_the_absolute_value_is_a_curve_of_a_lag(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    u = draw_input(rng)
-    y = np.abs(respond(u)) + SENSOR * rng.standard_normal(SAMPLES)
-    assert "curve of a lag of the input" in find(recorded(u, y, DT))
 
 
 @pytest.mark.ci

@@ -94,19 +94,8 @@ def test_detectors_report_nothing_on_a_clean_record(seed: int, factor: float) ->
     assert detect_all(mean + noise, noise) == set()
 
 
-def test_artefacts_cover_every_detector() -> None:
-    assert ARTEFACTS.keys() == DETECTORS.keys()
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_heavy_tails_are_outliers_and_no_changing_variance(seed: int) -> None:
     mean, _ = make_clean_record(np.random.default_rng(seed))
     noise = SIGMA * np.random.default_rng(seed).standard_t(3.0, SAMPLES)
     assert detect_all(mean + noise, noise) == {"outliers"}
-
-
-def test_a_majority_of_residuals_far_from_zero_is_no_series_of_outliers() -> None:
-    """A simulation without the two levels of the output had a mean over no ordinary samples."""
-    rng = np.random.default_rng(0)
-    residual = rng.choice([-1.0, 1.0], SAMPLES, p=(0.45, 0.55)) + 1e-3 * rng.standard_normal(SAMPLES)
-    assert DETECTORS["outliers"].detect(residual, residual, make_context()) is None

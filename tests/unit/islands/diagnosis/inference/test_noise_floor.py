@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from islands.diagnosis.inference.noise_floor import (
     MIN_FRACTION,
-    MIN_PERIOD,
     detect_period,
     explainable_variance,
     noise_variance_from_periods,
@@ -36,22 +35,11 @@ def test_mean_of_a_residual_is_explained_only_where_noise_has_none(noise: str, i
         assert explained > 0.8 if is_explained else explained < MIN_FRACTION
 
 
-@given(st.integers(MIN_PERIOD, 120), st.floats(2.0, 9.0), st.integers(0, 99), st.floats(-50, 50))
-def test_period_is_exact_to_the_sample(period: int, times: float, seed: int, offset: float) -> None:
-    samples = int(np.ceil(period * times)) + 1
-    assert detect_period(offset + periodic(period, samples, seed)) == period
-
-
 @given(st.floats(0.01, 100.0), st.integers(0, 20))
 def test_period_detection_ignores_the_unit_and_small_deviations(size: float, seed: int) -> None:
     u = periodic(64, 500, seed)
     deviation = 2e-4 * np.random.default_rng(seed).standard_normal(u.size)
     assert detect_period(size * (u + deviation)) == 64
-
-
-def test_period_of_a_smooth_signal_is_the_shortest_one() -> None:
-    t = np.arange(2000)
-    assert detect_period(np.sin(2 * np.pi * t / 100) + np.sin(2 * np.pi * t / 40 + 1)) == 200
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -62,19 +50,6 @@ def test_aperiodic_signal_has_no_period(seed: int) -> None:
     assert detect_period(noise) is None
     assert detect_period(walk) is None
     assert noise_variance_from_periods(noise, noise) is None
-
-
-def test_signal_without_two_equal_periods_has_no_period() -> None:
-    assert detect_period(periodic(64, 120)) is None
-    t = np.arange(3000)
-    swept = np.sin(1e-5 * t**2)
-    assert detect_period(swept) is None
-
-
-def test_signal_with_varying_periods_has_no_period() -> None:
-    u = periodic(64, 640)
-    rng = np.random.default_rng(1)
-    assert detect_period(u + 0.01 * rng.standard_normal(u.size)) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -88,12 +63,6 @@ def test_noise_variance_is_within_its_sampling_error(sigma: float, seed: int) ->
     # 23 differences of 80 samples; successive differences share a period, and each loses its mean.
     expected, chance = sigma**2 * (1 - 1 / 80), 4 * (3 / (23 * 80)) ** 0.5
     assert found == pytest.approx(expected, rel=chance)
-
-
-def test_drifting_level_does_not_count_as_noise() -> None:
-    u = periodic(80, 2000)
-    steps = np.repeat(np.arange(25.0), 80)
-    assert noise_variance_from_periods(u, u + steps) == pytest.approx(0.0, abs=1e-20)
 
 
 def test_noise_variance_needs_three_periods() -> None:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, evaluate_fit
 from islands.diagnosis.calibration.target import Target
@@ -37,12 +36,3 @@ def test_the_response_of_a_hysteresis_returns_to_zero() -> None:
     response = respond_to_pulse(evaluate(make_piezo(), sweep))
     assert response is not None
     assert np.abs(response[2:]).max() < 0.02 * response[0]
-
-
-def test_a_signal_has_its_first_value_before_each_recording() -> None:
-    decay, signal = 0.8 ** np.arange(60), np.random.default_rng(1).standard_normal(90) + 3.0
-    filtered = convolve(signal, decay, (50, 40))
-    for part, found in zip(np.split(signal, [50]), np.split(filtered, [50]), strict=True):
-        before = np.full(60, part[0])
-        expected = lfilter(decay, [1.0], np.concatenate([before, part]))[60:]
-        assert found == pytest.approx(expected, rel=1e-9)

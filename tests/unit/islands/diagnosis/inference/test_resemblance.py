@@ -55,13 +55,6 @@ def test_force_resembles_a_law_next_to_any_linear_part() -> None:
     assert (found.law, found.formula) == ("absolute value", "|v|")
 
 
-def test_force_with_a_limited_part_resembles_a_saturation() -> None:
-    found = find_resemblance(*fit_curve(lambda v: 5.0 * v - 4.0 * np.clip(v, -0.7, 0.7), is_force=True), RATE)
-    assert found is not None
-    assert (found.law, found.unit) == ("saturation", "m/s")
-    assert found.value == pytest.approx(0.7, rel=0.15)
-
-
 @pytest.mark.parametrize(
     "law",
     [
@@ -72,20 +65,6 @@ def test_force_with_a_limited_part_resembles_a_saturation() -> None:
 )
 def test_curve_of_another_shape_resembles_no_law(law: Law) -> None:
     assert find_resemblance(*fit_curve(law), OUTPUT) is None
-
-
-def test_values_that_a_record_does_not_determine_show_no_law() -> None:
-    values, half_widths = fit_curve(lambda y: 0.9 * np.abs(y) + y)
-    assert find_resemblance(values, half_widths + 0.5 * np.max(np.abs(values)), OUTPUT) is None
-
-
-def test_flattened_ends_are_no_part_of_a_shape() -> None:
-    values, half_widths = fit_curve(lambda y: 0.9 * np.abs(y) + y)
-    flat = values.copy()
-    flat[0] = flat[1] = 20.0
-    found = find_resemblance(flat, half_widths, OUTPUT)
-    assert found is not None
-    assert found.law == "absolute value"
 
 
 def test_curve_of_zeros_resembles_no_law() -> None:

@@ -78,7 +78,7 @@ def test_overflow_is_found_and_reduces_the_error(assessed) -> None:
     assert after < 0.2 * before
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_model_error_reduces_the_effective_sample_size(assessed) -> None:
     _, fitted, outcome, _ = assessed
     assert outcome.target.effective_samples is not None

@@ -64,10 +64,3 @@ def test_the_alternatives_to_an_effect_of_time_have_another_hold() -> None:
     assert best.score_gain(without.fit) > gains["resonance"] > gains["delay"]
     assert best.effect is DELAY
     assert best.fit.values[best.fit.simulation.get_slice(DELAY)][0] == pytest.approx(LATE, rel=0.05)
-
-
-def test_another_effect_has_no_alternatives_of_another_hold() -> None:
-    hypothesis, without, target, run = find_in_late_record(OFFSET)
-    outcome = make_outcome(without.fit, screen_effects(without.fit, target, run), target, hypothesis)
-    assert not add_timing_alternatives(outcome, run).timing_alternatives
-    assert find_timing_simulator(hypothesis, target, run) is None

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.diagnosis.planning.channel_noise import make_white_noise
 from support.planned import coloured_noise, noise_covariance
 
 AUTOREGRESSIONS = [(0.97,), (-0.6,), (1.6, -0.7), (1.2, -0.5, 0.2)]
@@ -25,15 +24,6 @@ def test_colour_undoes_whitening(coefficients: tuple[float, ...]) -> None:
     noise = coloured_noise(0.3, *coefficients).scale(2.0)
     signal = np.random.default_rng(1).standard_normal(50)
     assert noise.colour(noise.whiten(signal[None])[0]) * noise.std == pytest.approx(signal)
-
-
-def test_white_noise_divides_by_its_standard_deviation() -> None:
-    noise = make_white_noise(0.37)
-    signals = np.random.default_rng(2).standard_normal((2, 40))
-    assert noise.std == 0.37
-    assert np.array_equal(noise.whiten(signals), signals / 0.37)
-    assert np.array_equal(noise.colour(signals[0]), signals[0])
-    assert noise.time_constant == 0.0
 
 
 def test_the_time_constant_is_that_of_the_slowest_pole() -> None:

@@ -45,12 +45,6 @@ def test_the_colour_of_the_noise_is_found(
     assert found.std == pytest.approx(0.05, rel=0.15)
 
 
-def test_an_error_that_repeats_is_no_noise() -> None:
-    exact, wrong = (estimate(measure(PERIODIC, "ar", error)) for error in (0.0, 0.5))
-    assert wrong.std == pytest.approx(exact.std)
-    assert wrong.model.coefficients == pytest.approx(exact.model.coefficients)
-
-
 def test_an_error_that_the_input_predicts_is_at_most_a_part_of_the_noise() -> None:
     found = estimate(measure(APERIODIC, "white", 0.1))
     error = float(np.std(0.1 * APERIODIC[:1200] ** 2))

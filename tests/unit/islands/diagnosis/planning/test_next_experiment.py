@@ -85,18 +85,6 @@ def test_a_record_with_a_fast_part_needs_no_input_beyond_it() -> None:
     assert "within the range and the rate of the record" in advice
 
 
-def test_equal_arguments_give_the_same_samples() -> None:
-    first, second = designed(wave((0.25,))), designed(wave((0.25,)))
-    assert first.input is not None
-    assert second.input is not None
-    assert np.array_equal(first.input.u, second.input.u)
-    assert write_advice(first) == write_advice(second)
-
-
-def test_no_alternative_needs_no_experiment() -> None:
-    assert design(wave((0.25,)), names=()) is None
-
-
 def test_a_recorded_simulation_predicts_no_other_input() -> None:
     u = wave((0.25,))
     experiment = design(u, RecordedOutput("theirs", 2.0 * u))
@@ -105,7 +93,7 @@ def test_a_recorded_simulation_predicts_no_other_input() -> None:
     assert "depends on this record" in write_advice(experiment)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_diagnosis_of_the_designed_experiment_names_the_cause_alone() -> None:
     """The prediction holds: causes that it separates are no equivalents in the new record."""
     t = DT * np.arange(2000)

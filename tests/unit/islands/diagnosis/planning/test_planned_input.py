@@ -8,7 +8,6 @@ from islands.diagnosis.planning.planned_input import (
     InputLimits,
     PlannedInput,
     find_limits,
-    find_rate,
 )
 from islands.errors import SettingsError
 from support.planned import DT, wave
@@ -35,25 +34,6 @@ def test_an_input_depends_on_its_seed_alone() -> None:
         )
         assert np.array_equal(one, again)
         assert not np.array_equal(one, other)
-
-
-def test_steps_hold_their_levels() -> None:
-    u = PlannedInput(InputForm.STEPS, 1.0, 2.0).make(InputLimits(-1.0, 1.0, 20.0), DT, SAMPLES)
-    resting = np.diff(u) == 0.0
-    assert 0.7 < np.mean(resting) < 1.0
-    assert np.max(u) == pytest.approx(1.0)
-    assert np.min(u) == pytest.approx(-1.0)
-
-
-def test_limits_are_those_of_the_input_by_default() -> None:
-    u = 3.0 + wave((1.0,))
-    limits = find_limits(u, DT)
-    assert (limits.lower, limits.upper) == (np.min(u), np.max(u))
-    assert limits.rate == find_rate(u, DT)
-    wider = find_limits(u, DT, amplitude=5.0, rate=2.0)
-    assert wider.amplitude == pytest.approx(5.0)
-    assert wider.middle == pytest.approx(limits.middle)
-    assert not limits.contains(u * 1.1, DT)
 
 
 def test_impossible_limits_are_refused() -> None:

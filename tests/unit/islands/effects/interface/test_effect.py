@@ -11,7 +11,7 @@ from islands.effects.catalogue import CATALOGUE, OF_EACH, find_entry
 from islands.effects.channels import channel
 from islands.effects.filters import low_pass
 from islands.effects.hysteresis import stick
-from islands.effects.interface.effect import OPERATORS, Effect, ForceLaw, SimulationContext, Site, apply_map
+from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site, apply_map
 from islands.effects.time_variation import GAIN_EFFECTS, gain_over_time
 from islands.effects.timing import RESONANCE
 from islands.expressions.evaluation import evaluate
@@ -175,19 +175,6 @@ def list_points(effect: Effect, context: SimulationContext) -> list[Array]:
     nominal = np.array([each.nominal for each in effect.parameters(context)])
     mixed = 5.0 * np.sum(points, axis=0) if effect.is_free else points[0]
     return [points[0], points[-1], mixed, nominal]
-
-
-def test_the_operators_are_those_of_the_reference() -> None:
-    assert set(NAMESPACE) == set(OPERATORS)
-
-
-def test_every_map_has_an_equation() -> None:
-    """A program of an extended simulation contains the equations of its maps."""
-    assert [each.name for each in MAPS if each.equation is None] == []
-    assert {each.name for each in CATALOGUE.values() if each.equation} == {
-        *(each.name for each in MAPS),
-        *GAIN_EFFECTS,
-    }
 
 
 @pytest.mark.parametrize("effect", MAPS, ids=lambda each: each.name)

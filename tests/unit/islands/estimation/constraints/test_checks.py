@@ -49,13 +49,3 @@ def test_gain_of_an_integrator_is_not_defined():
     _, value, met = check("gain = 2.5", {"y(k-1)": 1.0})
     assert math.isnan(value)
     assert not met
-
-
-def test_model_without_y_has_no_cluster_sum():
-    _, value, met = check("hysteresis", {"phi1(u(k-1), u(k-2))": 1.0})
-    assert math.isnan(value)
-    assert not met
-
-
-def test_no_constraint_has_no_check():
-    assert check_constraints(islands.make_model([(islands.parse("y(k-1)"), 0.5)]), "none") == ()

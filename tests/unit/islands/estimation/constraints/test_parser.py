@@ -7,12 +7,11 @@ import pytest
 from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.constraints.parts import (
-    FixedPoint,
     LinearEquality,
     ParameterSign,
     StaticGain,
 )
-from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
+from islands.estimation.parameter_constraints import constraint
 from islands.expressions.parsing import parse
 from islands.models.regressor import regressor
 
@@ -24,11 +23,6 @@ def term(text):
 def part(text):
     (found,) = constraint(text).parts
     return found
-
-
-def test_point_gives_the_inputs_before_the_output():
-    assert part("fixed-point = 1, -2.5e1") == FixedPoint("fixed-point = 1, -2.5e1", (-25.0, 1.0))
-    assert part("fixed-point=1,2,3").point == (3.0, 1.0, 2.0)
 
 
 def test_gain_has_an_input_and_an_operating_point():
@@ -66,16 +60,6 @@ def test_equality_has_a_weight_for_every_term(text, weights, target):
 )
 def test_inequality_is_the_sign_of_a_parameter(text, sign):
     assert part(text) == ParameterSign(text, term("u(k-1)"), sign)
-
-
-def test_statements_are_combined():
-    found = constraint("hysteresis; odd;[u(k-1)] >= 0; odd")
-    assert [each.text for each in found.parts] == ["hysteresis", "odd", "[u(k-1)] >= 0"]
-    assert constraint("none; odd").parts == CONSTRAINTS["odd"].parts
-
-
-def test_white_space_does_not_matter():
-    assert part(" [u(k-1)]  -\t2 *[u(k-2)]=1 ") == part("[u(k-1)] - 2 *[u(k-2)]=1")
 
 
 @pytest.mark.parametrize(

@@ -72,13 +72,6 @@ def test_contradictory_statements_cannot_be_met():
     assert not all(each.met for each in check_constraints(linear, text))
 
 
-def test_equal_statements_are_one_condition():
-    text = "gain = 0.5; gain = 0.5 at 0, 0.3"
-    model = polish(make_model(ODD), text)
-    assert all(each.met for each in check_constraints(model, text))
-    assert len(linearise_constraints(model, text).c) == 1
-
-
 def test_an_odd_model_rests_at_zero_without_a_condition():
     model = make_model(ODD)
     assert all(each.met for each in check_constraints(model, "odd; fixed-point = 0, 0"))
@@ -103,12 +96,6 @@ def test_an_odd_model_has_odd_units_without_offsets(changes, others):
     model = make_model({name: values[name] for name in names if name in values}, **fields)
     (check,) = check_constraints(model, "odd")
     assert (check.value, check.met) == (others, not others)
-
-
-def test_an_output_beyond_a_limit_of_the_sensor_is_no_fixed_point():
-    text = "fixed-point = 1, 0.8; gain = 0.4 at 1, 0.8"
-    model = replace(polish(make_model(), text), limits=SensorLimits(None, 0.7))
-    assert [(each.value, each.met) for each in check_constraints(model, text)] == [(0.7, False), (0.0, False)]
 
 
 def test_a_model_without_rest_has_no_gain():

@@ -33,14 +33,6 @@ def test_the_derivatives_are_those_of_differences(unit, channel):
         assert slope == pytest.approx((above - below) / (2.0 * step), rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize("channel", [1, 2])
-def test_the_slope_is_that_of_the_output_at_rest(channel):
-    system, u, step = make_system(("cube", "bell", "tanh")), np.array([0.4, -0.7]), 1e-5
-    moved = step * np.eye(2)[channel - 1]
-    slope = (measure(system, u + moved, 0) - measure(system, u - moved, 0)) / (2.0 * step)
-    assert measure(system, u, channel) == pytest.approx(slope, rel=1e-8)
-
-
 def test_the_rest_nearest_to_an_output_is_found():
     # x + 0.1 * (x - x^3): rest at -1, 0 and 1.
     model = make_model({"a1_1": 1.1, "c1": 2.0, "e1_1": -0.1, "w1_1": 1.0, "level": 5.0}, ("cube",), 1)

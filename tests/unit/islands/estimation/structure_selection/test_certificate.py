@@ -85,16 +85,6 @@ def test_bound_with_few_nodes_is_below_that_with_many(seed, terms, nodes):
     assert SubsetSearch(problem, terms).certify(nodes)[-1] == few
 
 
-def test_best_subsets_are_never_worse_than_forward_selection():
-    record = measured(3)
-    problem = make_selection_problem(candidates("polynomial", 3, LAGS, 1), record)
-    for certificate in SubsetSearch(problem, 6).certify(50):
-        greedy = select_forward(problem, certificate.terms)[-1]
-        errors = [root_mean_square(each, record, "none") for each in (certificate.structure, greedy)]
-        assert errors[0] <= errors[1] * (1.0 + 1e-9)
-        assert certificate.bound <= errors[0] * (1.0 + 1e-9)
-
-
 def test_best_subset_is_found_where_forward_selection_fails():
     # The sum of both terms is the first choice of forward selection, and is not in the law.
     generator = np.random.default_rng(1)
@@ -105,15 +95,6 @@ def test_best_subset_is_found_where_forward_selection_fails():
     assert [item.text for item in select_forward(problem, 1)[-1]] == ["u3(k-1)"]
     certificate = SubsetSearch(problem, 2).certify(100)[-1]
     assert [item.text for item in certificate.structure] == ["u1(k-1)", "u2(k-1)"]
-
-
-def test_duplicate_and_zero_candidates_do_not_matter():
-    record = measured(4)
-    u = np.column_stack([record.u, record.u, np.zeros(record.samples)])
-    one = make_selection_problem(candidates("polynomial", 1, LAGS, 1), record)
-    three = make_selection_problem(candidates("polynomial", 1, LAGS, 3), Dataset(u, record.y, 0.1))
-    bounds = [[each.bound for each in SubsetSearch(problem, 3).certify(1000)] for problem in (one, three)]
-    assert bounds[0] == pytest.approx(bounds[1], rel=1e-9)
 
 
 def test_gap_is_the_possible_reduction_of_the_error():
@@ -148,9 +129,3 @@ def test_fit_reports_the_gap_of_every_model():
         assert entry["gap_percent"] == pytest.approx(expected)
         assert entry["proved"] == (entry["gap_percent"] < 1e-4)
     assert "possible reduction of the one-step error" in method_text(found.search_result)
-
-
-def test_fit_without_nodes_has_no_certificate():
-    found = islands.fit(measured(), library="polynomial", degree=1, max_terms=2, certificate=0)
-    assert result_document(found.search_result)["search"]["certificates"] == []
-    assert "possible reduction" not in method_text(found.search_result)

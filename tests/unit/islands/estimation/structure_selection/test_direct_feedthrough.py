@@ -28,7 +28,7 @@ def test_inputs_are_found_together_with_those_found_before(force, found):
     assert find_direct_inputs(static(force)) == found
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_static_law_of_two_inputs_is_found_exactly():
     result = islands.fit(static(lambda i, x: 2 * i**2 + 0.5 * i * x))
     assert sorted(item.text for item in result.best.model.regressors) == ["u1(k-1)*u2(k-1)", "u1(k-1)^2"]

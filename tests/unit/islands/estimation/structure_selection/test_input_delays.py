@@ -19,11 +19,6 @@ def test_dead_times_move_the_lags_of_inputs_only(name):
     assert {tuple(sorted(item.lags)) for item in after} == moved
 
 
-def test_no_dead_time_changes_nothing():
-    before = candidates("polynomial", 2, 2, 1)
-    assert delay_inputs(before, (0,)) == before
-
-
 def test_one_dead_time_applies_to_all_inputs():
     assert expand_delays((), 2) == (0, 0)
     assert expand_delays((4,), 3) == (4, 4, 4)

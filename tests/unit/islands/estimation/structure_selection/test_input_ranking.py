@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import islands
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.structure_selection.input_ranking import rank_inputs, screen_candidates
@@ -88,17 +87,6 @@ def test_screened_library_has_all_inputs_linearly_and_some_in_products():
     assert in_products == {7, 13}
 
 
-def test_library_that_is_not_too_large_is_not_screened():
-    record = bilinear().first_inputs(3)
-    assert screen_candidates("polynomial", 3, 2, record) == candidates("polynomial", 3, 2, 3)
-
-
 def test_library_too_large_for_one_input_is_refused():
     with pytest.raises(SettingsError, match="80730 candidates are more than a library may have"):
         screen_candidates("polynomial", 5, 11, bilinear())
-
-
-def test_evolution_accepts_twenty_inputs():
-    changes = {"population": 10, "generations": 1, "max_terms": 3, "library_lags": 2, "refine": False}
-    found = islands.identify(bilinear(), preset="narx", **changes)
-    assert {plain(item.expression, INPUTS) for item in found.best.model.regressors} >= LAWS["polynomial"][3]

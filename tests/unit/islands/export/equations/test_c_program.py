@@ -9,10 +9,7 @@ import pytest
 
 import islands
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import OPERATORS, Site
-from islands.export.equations.c_language import C_OPERATORS
-from islands.export.equations.collection import CHANNEL_OPERATORS
-from islands.export.equations.matlab_language import MATLAB_OPERATORS
+from islands.effects.interface.effect import Site
 from islands.export.extension import export_extended
 from islands.export.fmu import find_compiler
 from islands.records.dataset import Dataset
@@ -20,7 +17,6 @@ from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.ode.system import OUTPUT, OdeParameter
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
-from islands.simulators.specification.table import LocalExtendedSpec
 from support.equation_programs import compare, extend, fix_states, list_effects, run_c
 from support.simulated_records import EQUATIONS, made, recorded, wave
 
@@ -164,23 +160,6 @@ def test_discovered_terms_are_in_the_program(hold, folder):
 
 
 @needs_compiler
-def test_a_system_without_states_is_simulated(folder):
-    spec = OdeSpec.model_validate(
-        {
-            "kind": "ode",
-            "name": "gain",
-            "input": "u",
-            "equations": "",
-            "output": "k*u",
-            "parameters": {"k": 2.0},
-        }
-    )
-    record = recorded(wave(50), wave(50))
-    extended, expected = extend(make_simulator(spec, record), record, [CATALOGUE["offset"]])
-    compare(run_c(extended, record, folder), expected)
-
-
-@needs_compiler
 def test_creep_of_a_resting_simulation_starts_before_the_record(folder):
     record = recorded(np.full(300, 3.0), np.full(300, 3.0))
     simulator = make_simulator(made()["bouc-wen-piezo"].spec, record)
@@ -231,34 +210,6 @@ def test_maps_act_in_the_order_of_the_simulation(names, folder):
 
 
 @needs_compiler
-def test_stiction_of_a_held_input_moves_all_the_way(folder):
-    record = made()["second-order"].record
-    record = replace(record, u=record.u[np.arange(record.samples) // 20 * 20])
-    spec, expected = extend(simulator_of("second-order"), record, [CATALOGUE["stiction"]])
-    compare(run_c(spec, record, folder), expected)
-
-
-@needs_compiler
-def test_an_extension_of_an_extension_has_the_effects_of_both(folder):
-    record = made()["bouc-wen-piezo"].record
-    inner, _ = extend(
-        simulator_of("bouc-wen-piezo"),
-        record,
-        [CATALOGUE[each] for each in ("dead-zone", "viscous", "offset")],
-    )
-    again = make_simulator(inner, record)
-    outer, expected = extend(
-        again, record, [CATALOGUE[each] for each in ("delay", "cubic-stiffness", "sensor-gain")]
-    )
-    compare(run_c(outer, record, folder), expected)
-
-
-def test_every_operator_of_maps_has_a_definition():
-    inline = {*CHANNEL_OPERATORS, "first"}
-    assert set(C_OPERATORS) == set(MATLAB_OPERATORS) == set(OPERATORS) - inline
-
-
-@needs_compiler
 @pytest.mark.parametrize("unit", ["*/ int broken = ;", "/* u", "\n#error", "\\\n", "µ°??/\n"])
 def test_a_name_or_unit_cannot_break_the_file(unit, folder):
     spec, record = make_example("second-order")
@@ -268,25 +219,3 @@ def test_a_name_or_unit_cannot_break_the_file(unit, folder):
     extended, expected = extend(make_simulator(OdeSpec.model_validate(document), record), record)
     compare(run_c(extended, record, folder), expected)
     assert export_extended(extended, "matlab").isascii()
-
-
-def test_names_of_equations_may_be_words_of_the_language():
-    text = json.dumps(
-        {
-            "kind": "ode",
-            "name": "words",
-            "input": "u",
-            "equations": "ddouble/dt = (int_*u - double)/end\ny = fabs*double",
-            "output": "y",
-            "parameters": {"int_": 2.0, "end": 0.5, "fabs": 1.0},
-        }
-    )
-    record = recorded(wave(50), wave(50))
-    extended, _ = extend(make_simulator(OdeSpec.model_validate_json(text), record), record)
-    assert "slope.double_ = (p->int_*in->u - s->double_)/p->end_;" in export_extended(extended, "c")
-
-
-def test_a_document_is_exported_after_reading():
-    spec, _ = extend(simulator_of("bouc-wen-piezo"), made()["bouc-wen-piezo"].record, [CATALOGUE["offset"]])
-    again = LocalExtendedSpec.model_validate_json(spec.model_dump_json())
-    assert export_extended(again, "c") == export_extended(spec, "c")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError
 from islands.export.equations.collection import collect_equations
 from islands.export.extension import EXTENDED_EXPORTS, export_extended
 from islands.expressions.tree import Symbol
@@ -89,13 +89,6 @@ def test_a_native_or_recorded_simulation_is_refused_where_it_cannot_be_written()
 def test_a_value_that_the_document_lacks_is_named():
     with pytest.raises(ModelError, match="effect jump has no value for instant: diagnose again"):
         collect_equations(make_spec(PIEZO, {"jump": {"c": 0.1, "when": 1.0}}))
-
-
-def test_equations_have_no_formats_of_difference_equations():
-    with pytest.raises(ModelError, match="take the format plain, python, json, c or matlab"):
-        export_extended(make_spec(SPRING), "modelica")
-    with pytest.raises(SettingsError, match="is not text"):
-        export_extended(make_spec(LINEAR), "fmu")
 
 
 def test_models_and_linear_simulations_are_exported_in_closed_form():

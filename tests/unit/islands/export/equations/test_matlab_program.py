@@ -55,16 +55,6 @@ def test_every_effect_of_a_built_in_system_is_simulated_like_the_package(name, t
 
 @pytest.mark.ci
 @needs_octave
-def test_stiction_of_a_held_input_moves_all_the_way(tmp_path):
-    simulator, record = make_case("second-order")
-    record = replace(record, u=record.u[np.arange(record.samples) // 20 * 20])
-    spec, expected = extend(simulator, record, [CATALOGUE["stiction"]])
-    (found,) = run_matlab([(spec, record)], tmp_path)
-    compare(found, expected)
-
-
-@pytest.mark.ci
-@needs_octave
 @pytest.mark.parametrize(("hold", "times"), [("first-order", 3), ("zero-order", 2), ("band-limited", 2)])
 def test_the_input_between_samples_is_that_of_the_simulation(hold, times, tmp_path):
     programs, outputs = [], []
@@ -112,15 +102,6 @@ def test_equations_with_a_channel_a_delay_and_real_functions_are_simulated(tmp_p
     found = run_matlab([(spec, given) for (spec, _), given in cases], tmp_path)
     for output, ((_, expected), _) in zip(found, cases, strict=True):
         compare(output, expected)
-
-
-@pytest.mark.ci
-@needs_octave
-def test_a_system_without_states_is_simulated(tmp_path):
-    document = {"kind": "ode", "name": "gain", "input": "u", "equations": "", "output": "2*u"}
-    record = recorded(wave(SAMPLES), wave(SAMPLES))
-    spec, expected = extend(make_simulator(OdeSpec.model_validate(document), record), record)
-    compare(run_matlab([(spec, record)], tmp_path)[0], expected)
 
 
 def test_the_program_describes_itself():

@@ -16,11 +16,6 @@ def test_a_part_that_occurs_twice_is_computed_once():
     assert render(rest) == "part1*2 - part1"
 
 
-def test_small_parts_stay():
-    expression = parse_expression("abs(v)*h + abs(v)")
-    assert take_common_parts([expression], "part") == ([], [expression])
-
-
 @pytest.mark.parametrize("place", [-1.2, -0.4, 0.1, 0.9])
 def test_parts_follow_those_that_they_read(place):
     expression = parse_expression(write_curve("x/3"))

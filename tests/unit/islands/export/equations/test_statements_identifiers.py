@@ -8,10 +8,6 @@ from hypothesis import strategies as st
 from islands.export.equations.statements import make_identifiers
 
 
-def test_a_name_that_is_an_identifier_is_kept():
-    assert make_identifiers(["m", "v_s", "F2"]) == {"m": "m", "v_s": "v_s", "F2": "F2"}
-
-
 def test_words_of_a_language_and_signs_are_replaced():
     found = make_identifiers(
         ["double", "end", "_x", "input-offset:v", "at -0.5", "at 0.5", "rate(u)", "a b", "a-b"]

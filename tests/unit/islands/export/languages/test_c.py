@@ -15,7 +15,7 @@ from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.records.dataset import Dataset
-from islands.simulation.predictors import free_run, one_step_ahead
+from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from lab.speed.compiled_c import compile_model
 from support.block_cases import OF_STATES, start_from_record
@@ -25,8 +25,6 @@ from support.programs import (
     CASES,
     HOSTILE_NAMES,
     OF_THE_LIBRARY,
-    SAMPLES,
-    at_the_edges,
     bits,
     model,
     record,
@@ -60,18 +58,6 @@ def test_the_compiled_program_simulates_like_the_kernel(name, folder):
 
 @pytest.mark.ci
 @needs_compiler
-@pytest.mark.parametrize("name", PRIMITIVES)
-def test_compiled_primitives_equal_the_kernels_at_jumps_and_limits(name, folder):
-    exported, data = at_the_edges(name)
-    ours, theirs = free_run(exported, data, bound=np.inf).y[1:], run_c(exported, data, folder)[1:]
-    if name in OF_THE_LIBRARY:
-        np.testing.assert_array_max_ulp(theirs, ours, maxulp=4)
-    else:
-        assert bits(theirs) == bits(ours)
-
-
-@pytest.mark.ci
-@needs_compiler
 @part_of_the_examples(3)  # each is compiled
 @given(models(), st.integers(0, 2**32 - 1))
 def test_the_compiled_program_equals_the_model_bit_for_bit(folder, random_model, seed):
@@ -82,26 +68,6 @@ def test_the_compiled_program_equals_the_model_bit_for_bit(folder, random_model,
     assume(run.outcome)
     lag = random_model.maximum_lag
     assert bits(run_c(random_model, data, folder)[lag:]) == bits(run.y[lag:])
-
-
-@needs_compiler
-def test_a_zero_input_gives_no_negative_zero(folder):
-    at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
-    assert bits(run_c(model({"u(k-1)": -0.5, "y(k-1)": -0.25}), at_rest, folder)) == [0] * 9
-
-
-@needs_compiler
-def test_predict_reads_past_samples_only(folder):
-    data, exported = record(dt=1e-3), PUBLISHED["12"].model
-    predict = compile_model(export(exported, "c"), FLAGS, folder).predict
-    predict.restype = ctypes.c_double
-    predicted = []
-    for k in range(3, SAMPLES):
-        seen = [np.full(SAMPLES, np.nan) for _ in range(2)]
-        for signal, whole in zip(seen, (data.y, data.u[:, 0]), strict=True):
-            signal[k - 3 : k] = whole[k - 3 : k]
-        predicted.append(predict(*(pointer(signal, k) for signal in seen)))
-    assert bits(predicted) == bits(one_step_ahead(exported, data).y[3:])
 
 
 @needs_compiler

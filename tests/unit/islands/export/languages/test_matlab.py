@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 
 from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
@@ -13,8 +11,7 @@ from islands.systems.published_models import PUBLISHED
 from support.block_cases import OF_STATES
 from support.exported_programs import needs_octave, octave, run_matlab
 from support.levels import nightly_but
-from support.programs import CASES, at_the_edges, model, record, record_of
-from support.strategies import models
+from support.programs import CASES, model, record, record_of
 
 
 @pytest.fixture(scope="module")
@@ -32,31 +29,6 @@ def test_octave_simulates_like_the_kernel(name, cases):
     assert ours.outcome
     assert cases[name][:lag].tolist() == data.y[:lag].tolist()
     np.testing.assert_allclose(cases[name][lag:], ours.y[lag:], rtol=1e-12)
-
-
-@pytest.mark.ci
-@needs_octave
-def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
-    programs = [at_the_edges(name) for name in PRIMITIVES]
-    for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
-        ours = free_run(exported, data, bound=np.inf).y
-        np.testing.assert_allclose(theirs[1:], ours[1:], rtol=1e-12, err_msg=export(exported, "plain"))
-
-
-@needs_octave
-# Each example starts Octave, so that shrinking would take minutes.
-@pytest.mark.ci
-@settings(max_examples=4, phases=[Phase.reuse, Phase.generate])
-@given(st.lists(models(), min_size=12, max_size=12), st.integers(0, 2**32 - 1))
-def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
-    data = record(2, seed)
-    runs = [(each, free_run(each, data)) for each in random_models]
-    # The kernel stops a diverging free run at the bound; Octave continues to infinity.
-    calm = [(each, run) for each, run in runs if run.outcome]
-    found = run_matlab([(each, data) for each, _ in calm], tmp_path_factory.mktemp("octave"))
-    for (each, run), theirs in zip(calm, found, strict=True):
-        lag = each.maximum_lag
-        np.testing.assert_allclose(theirs[lag:], run.y[lag:], rtol=1e-12)
 
 
 #: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and Octave's output for them.
@@ -81,14 +53,6 @@ def test_octave_accepts_vectors_of_every_shape_and_class(tmp_path):
     show = "r = {}; if ischar(r), disp(r), else, disp(mat2str(r)), end"
     shown = octave("\n".join(show.format(call) for call in CALLS), tmp_path).splitlines()
     assert dict(zip(CALLS, shown, strict=True)) == CALLS
-
-
-@needs_octave
-def test_octave_accepts_integers_for_every_input(tmp_path):
-    exported = model({"u1(k-1)": 0.25, "u2(k-1)": 0.25}, ("one", "other"))
-    (tmp_path / "narx_model.m").write_text(export(exported, "matlab"))
-    for call in ("narx_model(int8([1 1]), [2 2], 7)", "narx_model([1 1], int8([2 2]), int8(7))"):
-        assert octave(f"disp(mat2str({call}))", tmp_path).strip() == "[7 0.75]"
 
 
 @needs_octave

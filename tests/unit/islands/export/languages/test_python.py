@@ -1,6 +1,5 @@
 """Table of export formats, and the Python export, which equals the kernel bit for bit for any model."""
 
-import json
 import math
 from math import exp
 
@@ -10,17 +9,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError
 from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
-from islands.models.equations import mathml_equation
 from islands.models.regressor import Regressor
-from islands.persistence.models import model_json
 from islands.records.dataset import Dataset
-from islands.simulation.predictors import free_run, one_step_ahead
+from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
-from support.programs import CASES, HOSTILE_NAMES, SAMPLES, bits, model, record, record_of
+from support.programs import CASES, HOSTILE_NAMES, bits, model, record, record_of
 from support.strategies import models
 
 
@@ -86,13 +83,6 @@ def test_the_python_module_equals_the_model_bit_for_bit(random_model, seed):
     assert bits(theirs[lag:]) == bits(run.y[lag:])
 
 
-def test_predict_is_one_step_ahead():
-    data, chosen = record(dt=1e-3), PUBLISHED["12"].model
-    predict = module(chosen)["predict"]
-    predicted = [predict(k, data.y.tolist(), *columns(data)) for k in range(3, SAMPLES)]
-    assert bits(predicted) == bits(one_step_ahead(chosen, data).y[3:])
-
-
 @pytest.mark.parametrize(("kind", "quote"), [("python", ""), ("c", '"'), ("matlab", '"')])
 def test_every_program_names_the_columns_of_its_inputs(kind, quote):
     text = export(CASES["several inputs"], kind)
@@ -154,13 +144,6 @@ def limited(limit):
     return clipped
 
 
-def renamed(factor):
-    def saturation(a):
-        return factor * a
-
-    return saturation
-
-
 OWN = {
     "numbers of its module": saturation,
     "a NumPy number": shared,
@@ -178,11 +161,6 @@ def test_a_user_defined_primitive_is_exported_with_its_globals(scalar):
     known = PRIMITIVES | {"own": primitive("own", scalar)}
     arguments = "u(k-1), y(k-1)" if known["own"].arity == 2 else "u(k-1)"
     assert_same_free_run(model({f"own({arguments})": 0.3, "y(k-2)": 0.2}, primitives=known), record())
-
-
-def test_two_primitives_may_have_functions_of_the_same_name():
-    known = PRIMITIVES | {"a": primitive("a", saturation), "b": primitive("b", renamed(0.1))}
-    assert_same_free_run(model({"a(u(k-1))*b(y(k-1))": 0.3}, primitives=known), record())
 
 
 def refused(scalar, **others):
@@ -230,31 +208,7 @@ def test_numbers_that_would_overwrite_each_other_are_refused():
 MAXIMUM_LAG = 7
 
 
-def with_a_taken_name(a):
-    return MAXIMUM_LAG * a
-
-
-def test_a_number_with_a_name_of_the_export_is_refused():
-    assert "'own' uses MAXIMUM_LAG, a name that means something else" in refused(with_a_taken_name)
-
-
 # Other formats.
-
-
-def test_other_formats_are_equations_and_the_model_file():
-    chosen = model({"y(k-1)": 0.5, "u(k-1)": 0.25})
-    assert export(chosen, "plain") == "y(k) = 0.5*y(k-1) + 0.25*u(k-1)"
-    assert export(chosen, "latex") == r"y_{k} = 0.5 \, y_{k-1} + 0.25 \, u_{k-1}"
-    assert export(chosen, "mathml") == mathml_equation(chosen)
-    assert export(chosen, "json") == model_json(chosen)
-    assert json.loads(export(chosen, "json"))["inputs"] == ["u"]
-
-
-def test_an_unknown_format_is_refused():
-    with pytest.raises(SettingsError) as caught:
-        export(PUBLISHED["12"].model, "fortran")
-    kinds = "plain, latex, mathml, python, c, matlab, matlab-system, s-function, modelica, json"
-    assert str(caught.value) == f"unknown format 'fortran': take one of {kinds}, fmu, fmu2"
 
 
 PROGRAMS = ["python", "c", "matlab"]
@@ -274,12 +228,6 @@ def test_a_parameter_that_is_not_finite_is_refused_with_its_regressor(kind, numb
     with pytest.raises(ModelError) as caught:
         export(model({"y(k-1)": 0.5, "u(k-2)": number}), kind)
     assert str(caught.value) == f"the parameter of u1(k-2) is {number}: an export needs finite parameters"
-
-
-@pytest.mark.parametrize("kind", PROGRAMS)
-def test_a_numpy_number_is_written_as_a_number(kind):
-    plain = model({"y(k-1)": 0.1})
-    assert export(islands.Model(plain.regressors, (np.float64(0.1),)), kind) == export(plain, kind)
 
 
 @pytest.mark.parametrize("kind", PROGRAMS)

@@ -12,22 +12,16 @@ from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
 from islands.facade.automatic.kind_choice import (
     _select_kind,
     choice_from_document,
-    list_others,
     measure_share,
 )
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.fit_settings import FitSettings
-from islands.facade.trials.held_out_error import hold_out, measure_library
-from islands.facade.trials.library import take_library
 from islands.progress import ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import split
 from support.assessments import with_changes
 from support.known_records import runaway
 from support.portfolio_records import KINDS as RECORDS
-
-#: Smallest search, for the settings of its result.
-SMALL = {"population": 10, "generations": 0, "max_terms": 3, "shooting": 50, "swap_search": False}
 
 
 def record(kind, samples=600):
@@ -85,51 +79,15 @@ def test_damaged_choice_is_refused():
         choice_from_document({"kind": "smooth"})
 
 
-@pytest.mark.ci
-def test_kinds_with_the_same_library_are_tried_once():
-    changes = SMALL | {"library": "polynomial", "library_degree": 1}
-    assert set(choose_preset(record("first order", 300), 0.25, changes).trials) == {"smooth", "hysteresis"}
-
-
 def test_constraint_hysteresis_permits_hysteresis_only():
     assert list(resolve_kinds({"constraints": "hysteresis"})) == ["hysteresis"]
     assert list(resolve_kinds({"constraints": "odd"})) == list(KINDS)
-
-
-def test_explicit_settings_take_precedence():
-    changes = {"library": "polynomial", "library_degree": 1, "primitives": ("mul", "tanh"), "library_lags": 2}
-    for kind, settings in resolve_kinds(changes).items():
-        assert {name: getattr(settings, name) for name in changes} == changes, kind
-    assert resolve_kind("friction", (3,), {"library_delays": (0,)}).library_delays == (0,)
-
-
-def test_constant_output_needs_no_comparison():
-    data = record("first order", 200)
-    choice = choose_preset(Dataset(data.u, np.ones(200), data.dt), 0.25, {})
-    assert (choice.kind, dict(choice.errors)) == ("hysteresis", {})
-    assert "the output is constant" in choice.reasons[0]
 
 
 def test_record_that_is_too_short_gets_the_simplest_kind():
     choice = choose_preset(record("first order", 10), 0.25, {})
     assert choice.kind == "smooth"
     assert "too short" in choice.reasons[0]
-
-
-def test_both_ends_of_a_record_are_held_out_in_turn():
-    data = record("first order", 100)
-    last, first = hold_out(data)
-    assert np.array_equal(last.validation.y, data.y[-30:])
-    assert np.array_equal(first.validation.y, data.y[:30])
-    assert np.array_equal(first.estimation.y, data.y[30:])
-
-
-def test_held_out_error_of_the_true_library_is_the_noise():
-    clean = record("first order, clean", 300)
-    noisy = Dataset(clean.u, clean.y + 0.01 * np.random.default_rng(2).standard_normal(300), clean.dt)
-    library = take_library("polynomial", 1, 2, None)
-    assert max(measure_library(hold_out(clean), library)) < 1e-9
-    assert all(0.008 < error < 0.015 for error in measure_library(hold_out(noisy), library))
 
 
 @pytest.mark.ci
@@ -151,12 +109,6 @@ def test_models_of_means_are_compared_with_models_of_samples_in_means():
     assert choice.kind == "smooth"
     assert "in means of 2 samples of the record" in choice.reasons[0]
     assert set(result.recommended.model.parameter_names) == {"y(k-1)", "u1(k-1)", "u2(k-1)"}
-
-
-def test_errors_with_equal_digits_are_as_much():
-    errors = {"smooth": 0.1431, "friction": 0.1429, "magnitude": 0.02}
-    assert list_others(errors, "smooth") == ", compared with as much for friction, 2 % for magnitude"
-    assert list_others({"smooth": 0.1}, "smooth") == ""
 
 
 @pytest.mark.ci

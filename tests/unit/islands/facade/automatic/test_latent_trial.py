@@ -1,11 +1,8 @@
 """Preset auto: latent models are chosen where they are clearly better, and are not tried elsewhere."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from islands.evolution.presets import resolve_latent
 from islands.facade.automatic import preset_choice
 from islands.facade.automatic.kind_choice import Choice, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
@@ -106,14 +103,3 @@ def test_a_law_of_narx_models_keeps_its_kind(noise_of_output):
 def test_settings_of_narx_models_exclude_latent_models(tried, changes, count):
     choose_preset(lag_record(True), 0.25, changes)
     assert tried == ["smooth"] * count
-
-
-def test_a_constant_output_is_not_compared(tried):
-    record = lag_record(True)
-    choose_preset(replace(record, y=np.ones(record.samples)), 0.25, {})
-    assert tried == []
-
-
-def test_a_structure_of_narx_models_excludes_latent_models():
-    assert resolve_latent({"generations": 3}).generations == 3
-    assert resolve_latent({"structure": "free"}) is None

@@ -2,8 +2,6 @@
 
 import json
 from dataclasses import replace
-from itertools import count
-from math import inf
 
 import numpy as np
 import pytest
@@ -11,13 +9,6 @@ import pytest
 import islands
 from islands.errors import SettingsError
 from islands.facade.coupled.identification import StoppedCouplingError, fit_coupled, identify_coupled
-from islands.persistence.checkpoints import (
-    archipelago_from_document,
-    checkpoint_text,
-    state_document,
-    state_from_document,
-)
-from islands.progress import TimeLimit
 from islands.records.coupled import CoupledRecord
 from support.latent_systems import curves_record
 from support.undrawn import undrawn_figures
@@ -48,35 +39,11 @@ def test_a_saved_result_is_read_with_the_same_bands(found, tmp_path):
 
 
 @pytest.mark.ci
-def test_a_search_that_continues_has_the_same_result(found):
-    states = []
-    again = identify_coupled(
-        curves_record(300, 1), on_epoch=lambda state, _settings: states.append(state), **SHORT
-    )
-    assert again.model == found.model
-    assert [len(state.earlier) for state in states] == [0, 0, 0, 1, 1, 1]
-    for state in (states[1], states[4]):
-        text = checkpoint_text(state.archipelago, state_document(state))
-        stored = state_from_document(*archipelago_from_document(text, "test"))
-        assert identify_coupled(curves_record(300, 1), start=stored, **SHORT).model == found.model
-
-
-@pytest.mark.ci
 def test_a_search_that_is_stopped_names_the_outputs_that_are_missing(found):
     calls = iter(range(10_000))
     with pytest.raises(StoppedCouplingError, match="y1") as stopped:
         identify_coupled(curves_record(300, 1), stop=lambda: next(calls) >= 0, **SHORT)
     assert (stopped.value.outputs, stopped.value.found) == (("y1", "y2"), ())
-
-
-@pytest.mark.ci
-def test_all_outputs_have_models_after_a_limit_of_time():
-    calls = count()
-    identify_coupled(curves_record(300, 1), stop=TimeLimit(inf, lambda: next(calls)), **SHORT)
-    half, calls = next(calls) // 2, count()
-    limited = identify_coupled(curves_record(300, 1), stop=TimeLimit(half, lambda: next(calls)), **SHORT)
-    assert [each.search_result.search.ended_by for each in limited.results] == ["stopped", "stopped"]
-    assert limited.left_out
 
 
 @pytest.mark.ci

@@ -9,7 +9,7 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import HistoryPoint, SearchState, stop_reason
 from islands.progress import StoppedError
-from support.identifications import BUDGET, RecordingEngine, identify, record_states
+from support.identifications import BUDGET, identify, record_states
 
 
 @pytest.mark.parametrize(
@@ -52,12 +52,6 @@ def test_search_continues_until_an_island_has_a_model(target):
     assert stop_reason(waiting, replace(settings, generations=1)) == ""
 
 
-def test_exact_model_meets_every_positive_target_error():
-    exact = SearchState(empty_archipelago(1, 0), history=(HistoryPoint(0, 0, {1: 0.0}, (0.0,)),))
-    assert stop_reason(exact, resolve_settings("narx", {"target_error": 1e-9})) == "target error"
-    assert stop_reason(exact, resolve_settings("narx", {"target_error": 0.0})) == ""
-
-
 def test_epoch_in_which_a_budget_is_reached_is_completed(data, states):
     """A longer run has the same epochs, because no epoch is cut short."""
     seen = []
@@ -66,23 +60,6 @@ def test_epoch_in_which_a_budget_is_reached_is_completed(data, states):
     assert [state.evaluations for state in seen] == [30, 120]
     assert seen[-1].history == states[3].history
     assert (found.search_result.search.generations, found.search_result.search.ended_by) == (3, "evaluations")
-
-
-def test_search_that_ends_early_closes_its_engine(data):
-    engine = RecordingEngine()
-    identify(data, **BUDGET, max_evaluations=60, seed=5, engine=engine)
-    assert (len(engine.epochs), engine.closed) == (2, True)
-
-
-def test_search_that_fails_closes_its_engine(data):
-    def broken(_state, _settings):
-        raise ZeroDivisionError
-
-    engine = RecordingEngine()
-    with pytest.raises(ZeroDivisionError) as failed:
-        identify(data, **BUDGET, seed=5, engine=engine, on_epoch=broken)
-    # The engine is closed at once, not when the traceback is released.
-    assert (len(engine.epochs), engine.closed) == (1, True), failed
 
 
 def test_stopped_search_keeps_its_last_epoch(data, states):
@@ -111,19 +88,6 @@ def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
     assert resumed.search_result.search.history == states[-1].history
 
 
-def test_stop_after_the_last_epoch_leaves_out_the_steps_after_the_search(data, states):
-    seen = []
-    found = identify(data, **BUDGET, seed=5, on_epoch=record_states(seen), stop=lambda: len(seen) == 5)
-    assert seen == states
-    assert found.search_result.search.ended_by == "stopped"
-    assert found.search_result.ensemble is None
-
-
 def test_search_stopped_before_its_first_population_raises_an_error(data):
     with pytest.raises(StoppedError, match="stopped before this step: sampling rate"):
         identify(data, **BUDGET, on_epoch=pytest.fail, stop=lambda: True)
-
-
-def test_search_state_needs_an_archipelago():
-    with pytest.raises(TypeError, match="archipelago"):
-        SearchState()

@@ -9,16 +9,14 @@ import pytest
 from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.archipelago import Archipelago, empty_archipelago
-from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.facade.results.model_simulation import SIMULATION_MODES
-from islands.models.candidate_library import full_set
 from islands.persistence.checkpoints import read_checkpoint, write_checkpoint
 from islands.records.split import split
 from islands.validation.assessment import MODES
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics
-from support.identifications import BUDGET, RecordingEngine, identify, parameters, record
+from support.identifications import BUDGET, identify, parameters, record
 
 # Contents of a result.
 
@@ -34,33 +32,6 @@ def test_result_has_the_history_of_the_search(result, states):
     assert [state.archipelago.generation for state in states] == [0, 1, 2, 3, 4]
     assert [state.history[-1].generation for state in states] == [0, 1, 2, 3, 4]
     assert states[-1].history == history
-
-
-def test_full_set_has_the_lags_and_degree_of_the_hall_of_fame(result, states):
-    """Equation (5), and the memory of its regressor matrix with eight bytes per number."""
-    found = [item for entry in states[-1].archipelago.hall_of_fame.entries for item in entry.regressors]
-    lags = max(lag for item in found for _, lag in item.lags)
-    full = result.search_result.search.full_set
-    assert full["lags"] == lags >= 2
-    assert full["degree"] == max(item.degree for item in found) >= 2
-    assert full["candidates"] == full_set(full["degree"], lags, lags)
-    rows = 2250 - resolve_settings("hysteresis", BUDGET).maximum_lag
-    assert full["bytes"] == 8 * rows * full["candidates"]
-
-
-def test_models_are_ordered_and_have_different_sizes_up_to_max_terms(result):
-    sizes = [fitted.model.size for fitted in result.models]
-    assert len(set(sizes)) == len(sizes)
-    assert max(sizes) <= 5
-    errors = [fitted.metrics["validation"]["free_run"].rmse for fitted in result.models]
-    assert errors == sorted(errors)
-    assert result.best.metrics["validation"]["free_run"].mape < 0.5
-
-
-def test_constrained_models_have_property_1_and_standard_errors(result):
-    for fitted in result.models:
-        assert fitted.physics.property_1
-        assert all(error >= 0.0 for error in fitted.model.standard_errors)
 
 
 @pytest.mark.ci
@@ -82,15 +53,6 @@ def test_models_without_property_1_do_not_enter_the_hall_of_fame(data, seed):
 
 
 # Seeds and starts.
-
-
-@pytest.mark.ci
-def test_equal_seeds_give_equal_bits_and_other_seeds_other_results(data, result):
-    again = identify(data, **BUDGET, seed=5)
-    assert parameters(again) == parameters(result)
-    assert again.search_result.search.history == result.search_result.search.history
-    other = identify(data, **BUDGET, seed=6)
-    assert other.search_result.search.history != result.search_result.search.history
 
 
 @pytest.mark.ci
@@ -122,44 +84,6 @@ def test_run_from_a_start_state_equals_an_uninterrupted_run(data, result, states
 def test_start_with_other_islands_or_another_seed_raises_an_error(data, other):
     with pytest.raises(SettingsError, match="the start state has other islands or another seed"):
         identify(data, **BUDGET, islands=2, seed=5, start=SearchState(other), on_epoch=pytest.fail)
-
-
-def test_empty_start_state_equals_a_run_without_a_start_state(data, result):
-    begun = identify(data, **BUDGET, seed=5, start=SearchState(empty_archipelago(1, 5)))
-    assert parameters(begun) == parameters(result)
-    assert begun.search_result.search.history == result.search_result.search.history
-
-
-def islands_budget(**changes):
-    return {**BUDGET, "population": 12, "generations": 3, "migrants": 3, "emigrants": "random", **changes}
-
-
-def test_epochs_end_at_stops_and_report_all_generations(data):
-    states, longer = [], []
-    for to, every in ((states, 3), (longer, "2,3:1")):
-        identify(
-            data[:1000],
-            **{**islands_budget(), "generations": 4, "migrate_every": every, "seed": 5},
-            on_epoch=lambda state, _settings, to=to: to.append(state),
-        )
-    assert [state.archipelago.generation for state in states] == [0, 3, 4]
-    assert [state.archipelago.generation for state in longer] == [0, 2, 3, 4]
-    assert [state.history[-1].generation for state in states] == [0, 3, 4]
-    assert [state.evaluations // states[0].evaluations for state in states] == [1, 4, 5]
-    # A single island does not depend on the schedule.
-    assert states[-1].history == longer[-1].history
-
-
-def test_other_engine_gives_the_same_result(data, result):
-    engine = RecordingEngine()
-    found = identify(data, **BUDGET, seed=5, engine=engine)
-    assert parameters(found) == parameters(result)
-    infos = [info for epoch in engine.epochs for (info,) in epoch.steps]
-    assert len(infos) == 5
-    search = found.search_result.search
-    assert search.duplicates == sum(info.duplicates for info in infos)
-    assert search.outcomes["ok"] == sum(info.outcomes["ok"] for info in infos)
-    assert search.caches == engine.epochs[-1].caches
 
 
 def test_simulations_of_the_parts_have_the_reported_errors(result):

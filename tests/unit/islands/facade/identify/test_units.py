@@ -46,8 +46,3 @@ def test_models_and_errors_scale_exactly_with_the_units(reference, units):
         for part in ("estimation", "validation"):
             errors = (each.metrics[part]["free_run"].rmse for each in (here, there))
             assert np.ldexp(next(errors), units[2]) == next(errors)
-
-
-def test_ratio_is_found(reference):
-    texts = {item.text for item in reference.best.model.regressors}
-    assert texts == {"y(k-1)", "u1(k-1)/u2(k-1)"}

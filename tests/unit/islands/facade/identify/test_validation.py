@@ -23,49 +23,6 @@ def test_validation_data_may_be_a_separate_record(data, result):
     assert elsewhere.search_result.search.history == result.search_result.search.history
 
 
-@pytest.mark.ci
-def test_validation_data_do_not_affect_the_search(data, result):
-    """Only the selection and order of models may depend on them."""
-    parts = split(data, 0.25)
-    spoilt = replace(parts.validation, y=parts.validation.y[::-1].copy())
-    other = identify(parts.estimation, validation=spoilt, **BUDGET, seed=5)
-    assert other.search_result.search.history == result.search_result.search.history
-    assert other.search_result.search.outcomes == result.search_result.search.outcomes
-    assert parameters(other) != parameters(result)
-
-
-@pytest.mark.ci
-def test_refinement_never_makes_the_result_worse(data):
-    """Validation selects between refined and estimated models."""
-    plain, refined = (identify(data, **{**BUDGET, "refine": refine}, seed=5) for refine in (False, True))
-    assert plain.search_result.search.history == refined.search_result.search.history
-    errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in refined.models}
-    gains = [
-        errors[fitted.model.size] / fitted.metrics["validation"]["free_run"].rmse for fitted in plain.models
-    ]
-    assert max(gains) <= 1.0
-    assert min(gains) < 0.999
-
-
-def test_models_without_a_constraint_do_not_need_property_1(data):
-    found = identify(data, **BUDGET, constraints="none", structure="free")
-    assert any(not fitted.physics.property_1 for fitted in found.models)
-
-
-def test_record_with_two_inputs_and_segments_is_identified():
-    one, other = record(1200, seed=1), record(1200, seed=2)
-    rng = np.random.default_rng(3)
-    u2 = np.cumsum(rng.normal(size=2400)) / 50
-    y = np.concatenate([one.y, other.y])
-    data = Dataset(
-        np.column_stack([np.concatenate([one.u, other.u])[:, 0], u2]), y, 1e-2, segments=(1200, 1200)
-    )
-    found = identify(data, validation=two_inputs(seed=4), **{**BUDGET, "generations": 2})
-    assert found.best.model.inputs == 2
-    assert found.search_result.record.segments == (1200, 1200)
-    assert found.best.metrics["validation"]["free_run"].mape < 2.0
-
-
 # Errors before the search starts.
 
 

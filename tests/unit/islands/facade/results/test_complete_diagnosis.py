@@ -9,7 +9,6 @@ import pytest
 from scipy.signal import lfilter
 
 import islands
-from islands.diagnosis.inference.verdict import Verdict
 from islands.records.writer import write_record
 from support.command_line import succeed
 
@@ -53,13 +52,6 @@ def test_the_files_are_those_of_the_command(files, found, tmp_path):
     assert documents[0] == documents[1]
 
 
-def test_the_extended_simulation_is_that_of_the_folder(found, tmp_path):
-    folder, other = found.save(tmp_path / "saved"), made()[:200]
-    np.testing.assert_array_equal(found.simulate(other).y, islands.load(folder).simulate(other).y)
-    assert found.export("json", tmp_path / "exported.json") is None
-    assert (tmp_path / "exported.json").read_bytes() == (folder / "extended.json").read_bytes()
-
-
 def test_a_record_outside_of_the_tested_ranges_is_stated(files, found, tmp_path):
     ranges = found.document["extension"]["ranges"]
     assert [each["name"] for each in ranges] == ["u_V", "y_um"]
@@ -85,18 +77,6 @@ def test_an_extension_that_may_diverge_is_refused(found, tmp_path):
     for each in (refused, islands.load(folder)):
         with pytest.raises(islands.ModelError, match=r"diverges\. Simulate what was diagnosed, linear"):
             each.simulate(made())
-
-
-def test_a_diagnosis_without_an_effect_has_no_simulation(found, tmp_path):
-    nothing = replace(found, verdict=Verdict.NOTHING, effects=(), gain=None)
-    with pytest.raises(islands.ModelError, match=r"no extended simulation, because .* 'nothing'"):
-        nothing.simulate(made())
-    (tmp_path / "extended.json").write_text("of an earlier diagnosis")
-    assert [path.name for path in sorted(nothing.save(tmp_path).iterdir())] == [
-        "discrepancy.json",
-        "report.html",
-    ]
-    assert islands.load(tmp_path).verdict == "nothing"
 
 
 @pytest.mark.parametrize(

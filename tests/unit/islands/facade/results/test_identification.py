@@ -11,13 +11,6 @@ from support.searches import record
 from support.undrawn import undrawn_figures
 
 
-def test_the_best_model_is_the_recommended_one(result):
-    assert result.best.rank == result.recommendation.rank
-    assert result.best.model == result.search_result.recommended.model
-    least = result.models[0].metrics["validation"]["free_run"].rmse
-    assert all(model.metrics["validation"]["free_run"].rmse >= least for model in result.models)
-
-
 def test_a_result_without_a_loop_replaces_the_loop_figure_of_an_earlier_one(result, tmp_path):
     figures = tmp_path / "figures"
     figures.mkdir()
@@ -74,15 +67,6 @@ def test_rows_of_a_model_of_means_have_the_prediction_of_their_mean():
         predicted[400:600].reshape(-1, 4), np.repeat(means[100:150, None], 4, 1), equal_nan=True
     )
     assert np.isnan(predicted[604])
-
-
-@pytest.mark.ci
-def test_a_figure_of_another_record_is_that_of_its_simulation(result):
-    other = record(200, seed=5)
-    drawn = result.best.plot(record=other).axes[0].get_lines()[1].get_ydata()
-    assert np.array_equal(drawn, result.best.simulate(other).y, equal_nan=True)
-    for kind in ("loop", "hold", "residuals"):
-        assert result.best.plot(kind, record=other).axes
 
 
 def test_a_result_draws_its_recommended_model(result):

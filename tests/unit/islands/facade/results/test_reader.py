@@ -3,7 +3,6 @@
 import json
 import shutil
 
-import numpy as np
 import pytest
 
 import islands
@@ -24,16 +23,6 @@ def test_a_folder_gives_the_models_errors_and_settings_of_the_result(result, sto
     assert stored.to_pandas().equals(result.to_pandas())
     assert str(stored) == str(result)
     assert repr(stored) == f"<Result of {len(result.models)} models, recommended: {result.best.equation}>"
-
-
-def test_predictions_and_bands_of_a_folder_are_those_of_the_result(result, stored):
-    data = record(300, seed=7)
-    assert np.array_equal(stored.predict(data), result.predict(data), equal_nan=True)
-    for name in ("lower", "upper"):
-        one, other = (getattr(each.best.bands(data, 0.8), name) for each in (stored, result))
-        assert np.array_equal(one, other, equal_nan=True)
-    shooting = (each.best.simulate(data, "shooting").y for each in (stored, result))
-    assert np.array_equal(*shooting, equal_nan=True)
 
 
 def test_figures_of_a_folder_need_a_record(stored):

@@ -1,6 +1,5 @@
 """Direct feedthrough: inputs to which the output responds within the sample are read at sample k."""
 
-import json
 import re
 
 import numpy as np
@@ -14,7 +13,6 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.rate_selection import TrialLibrary
 from islands.records.dataset import Dataset, join
 from islands.records.split import split
-from islands.report.documents.result_folder import result_json
 from islands.systems.catalogue import make_record
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 5, "average": 1}
@@ -95,19 +93,6 @@ def test_a_record_without_information_has_no_direct_inputs(record):
     assert find_direct_inputs(record) == ()
 
 
-def test_inputs_are_tested_one_by_one():
-    first = white(0)
-    second = first + 0.5 * white(1)
-    y = lag(first, 0).y + lag(second, 1).y
-    record = Dataset(np.column_stack([first, second]), y, 1.0, ("a_V", "b_V"))
-    assert find_direct_inputs(record) == (0,)
-    found = islands.fit(record, **LIBRARY)
-    assert found.search_result.direct_inputs == ("a_V",)
-    assert "u1(k)" in found.best.equation
-    assert "u2(k)" not in found.best.equation
-    assert found.best.metrics["validation"]["free_run"].rmse < 1e-9
-
-
 @pytest.mark.ci
 @pytest.mark.nightly
 def test_the_defaults_find_the_static_map_of_two_inputs():
@@ -127,16 +112,6 @@ def found():
     return islands.fit(lag(white(0), 0), **LIBRARY)
 
 
-def test_a_record_with_a_delay_gives_the_same_result_as_without_the_test():
-    documents = []
-    for feedthrough in ("auto", "no"):
-        result = islands.fit(lag(smooth(6), 1, noise=0.01), **LIBRARY, feedthrough=feedthrough)
-        documents.append(json.loads(result_json(result.search_result)))
-        documents[-1]["settings"].pop("feedthrough")
-    assert documents[0] == documents[1]
-    assert documents[0]["preprocessing"]["feedthrough"] == []
-
-
 def test_the_setting_decides_without_a_test():
     data = split(Dataset(np.column_stack([white(0), white(1)]), white(2), 1.0, ("a+1", "b")))
     assert select_feedthrough(data, "no", TRIAL) is data
@@ -145,12 +120,6 @@ def test_the_setting_decides_without_a_test():
         select_feedthrough(data, "perhaps", TRIAL)
     with pytest.raises(SettingsError, match="feedthrough is auto, yes or no"):
         islands.identify(lag(white(0), 0), feedthrough="perhaps")
-
-
-def test_models_that_validate_worse_are_not_used():
-    record = lag(white(0), 0)
-    worse = Dataset(white(7, 400), -lag(white(7, 400), 0).y, 1.0, ("u_V",), "y_um")
-    assert islands.fit(record, validation=worse, **LIBRARY).search_result.direct_inputs == ()
 
 
 def test_identify_finds_it_likewise():

@@ -8,10 +8,9 @@ from scipy.signal import lfilter
 
 import islands
 from islands.facade.trials.rate_selection import TrialLibrary, select_rate
-from islands.persistence.models import model_from_json, model_json
 from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset, join
-from islands.records.split import average_split, split
+from islands.records.split import split
 from islands.report.documents.result_folder import result_json, write_result
 
 LIBRARY = {"library": "polynomial", "degree": 2, "max_terms": 4}
@@ -87,32 +86,6 @@ def test_a_record_with_little_or_much_noise_is_averaged(noise):
     assert select_rate(split(lag(noise)), "auto", TRIAL, 6)[1] > 1
 
 
-def test_means_do_not_reach_across_recordings():
-    record = join((lag(samples=4005), lag(samples=5003, seed=1)))
-    data, count = select_rate(split(record), "auto", TRIAL, 6)
-    assert count > 1
-    assert data.estimation.segments == tuple(n // count for n in split(record).estimation.segments)
-
-
-@pytest.mark.ci
-def test_the_choice_is_deterministic(averaged):
-    assert result_json(islands.fit(lag(), **LIBRARY).search_result) == result_json(averaged.search_result)
-
-
-def test_simulation_of_the_validation_data_has_the_reported_errors(averaged):
-    best = averaged.best
-    validation = split(lag()).validation
-    run = best.simulate(validation)
-    assert run.mean_squared_error**0.5 == pytest.approx(best.metrics["validation"]["free_run"].rmse)
-    again = model_from_json(model_json(best.model))
-    assert again == best.model
-    same = islands.simulate(again, validation, warm_up=best.warm_up)
-    assert np.array_equal(same.y, run.y, equal_nan=True)
-    means = average_samples(validation, best.model.average)
-    assert np.array_equal(best.simulate(means).y, run.y, equal_nan=True)
-    assert len(best.bands(validation).upper) == len(means)
-
-
 def identify(**changes):
     budget = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 2, "max_height": 1}
     return islands.identify(lag(), preset="narx", shifts=(1,), from_library=0.0, **budget, **changes)
@@ -125,23 +98,9 @@ def test_identify_averages_likewise(library):
     assert found.best.model.dt == 0.001 * found.search_result.average
 
 
-@pytest.mark.ci
-def test_refinement_at_the_rate_of_the_record_makes_averages_unnecessary():
-    assert identify().search_result.average == 1
-    assert identify(average="5").search_result.average == 5
-
-
 # A shooting interval lasts the same time at every rate.
 
 SHORT = lag(samples=2000)
-
-
-def with_or_without_means(search, **changes):
-    """Return the results of a search that averages 5 samples, and of the same search on means."""
-    data = average_split(split(SHORT), 5)
-    return search(SHORT, shooting=52, average=5, **changes), search(
-        data.estimation, data.validation, shooting=10, average=1, **changes
-    )
 
 
 def fit_with_shooting(record, validation=0.25, **changes):
@@ -156,19 +115,6 @@ def identify_in_two_epochs(record, validation=0.25, **changes):
 
 def measurements(result):
     return [(each.model.parameters, each.metrics) for each in result.models]
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("search", [fit_with_shooting, identify_in_two_epochs])
-def test_a_search_that_averages_equals_the_search_on_means(search):
-    one, other = with_or_without_means(search)
-    assert measurements(one) == measurements(other)
-
-
-def test_a_run_with_the_recorded_settings_equals_the_run():
-    found = fit_with_shooting(SHORT, average=5)
-    again = fit_with_shooting(SHORT, average=5, shooting=found.search_result.settings["shooting"])
-    assert measurements(again) == measurements(found)
 
 
 def test_a_resumed_run_on_means_equals_an_uninterrupted_one():

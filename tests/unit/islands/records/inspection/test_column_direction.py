@@ -1,6 +1,6 @@
 import numpy as np
 
-from islands.records.inspection.column_direction import WEIGHTS, estimate_direction, measure_properties
+from islands.records.inspection.column_direction import estimate_direction
 from support.known_records import lag, steps, white
 
 
@@ -13,17 +13,6 @@ def test_the_odds_favour_the_input():
     logits = estimate_direction(make()).logits
     assert logits[0, 1] > 3.0
     assert logits[1, 0] < -3.0
-
-
-def test_properties_are_differences_of_both_columns():
-    signals = make()
-    found = measure_properties(signals, estimate_direction(signals).influence)
-    assert found.shape == (2, 2, len(WEIGHTS))
-    difference = [name for name in WEIGHTS if "smoother" in name or name in ("leads", "target is noisier")]
-    for name in difference:
-        place = list(WEIGHTS).index(name)
-        assert found[0, 1, place] == -found[1, 0, place]
-        assert found[0, 1, place] > 0.0
 
 
 def test_the_odds_do_not_depend_on_the_units():
@@ -45,9 +34,3 @@ def test_a_set_point_is_none_of_the_inputs_of_its_loop():
     assert found.manipulated[1, 2] == 1.0
     assert found.manipulated[0, 2] == -1.0
     assert found.logits[1, 2] > found.logits[0, 2]
-
-
-def test_a_derivative_is_marked():
-    signals = make()
-    found = estimate_direction(np.array([*signals, np.gradient(signals[1])])).derived
-    assert found.tolist() == [[False] * 3, [False, False, True], [False, True, False]]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from islands.records.inspection.column_influence import LEAST_SAMPLES, average_middle, measure_influence
+from islands.records.inspection.column_influence import average_middle, measure_influence
 from support.known_records import delay, lag, steps, white
 
 
@@ -14,21 +14,10 @@ def test_the_past_of_the_cause_leads_and_not_that_of_the_effect():
     assert np.all(np.diag(found.visible) == 0.0)
 
 
-def test_columns_without_relation_have_no_influence():
-    walk = np.cumsum(white(1500, 2))
-    for other in (white(1500, 0), steps(1500, 1), np.cumsum(white(1500, 3))):
-        assert not measure_influence(np.array([walk, other])).visible.any()
-
-
 def test_a_response_behind_a_long_dead_time_is_visible_in_means():
     u = steps(3000, 0, 50)
     y = delay(lag(u, 20.0), 60) + 0.02 * white(3000, 1)
     assert measure_influence(np.array([u, y])).leading[0, 1] > 0.1
-
-
-def test_an_even_response_is_visible():
-    u = white(1000, 0)
-    assert measure_influence(np.array([u, u**2])).visible[0, 1] > 1.0
 
 
 def test_a_weak_cause_is_more_visible_if_the_strong_one_is_known():
@@ -51,11 +40,6 @@ def test_the_response_to_one_step_is_visible_and_a_drift_is_none():
     u = np.repeat([0.0, 1.0], [100, 300])
     assert measure_influence(np.array([u, lag(u, 30.0) + 0.01 * white(400, 0)])).leading[0, 1] > 0.05
     assert not measure_influence(np.array([u, np.cumsum(white(400, 1))])).visible.any()
-
-
-def test_a_short_record_shows_nothing():
-    u = white(LEAST_SAMPLES - 1, 0)
-    assert not measure_influence(np.array([u, lag(u, 2.0)])).visible.any()
 
 
 @pytest.mark.parametrize("scale", [1, 4])

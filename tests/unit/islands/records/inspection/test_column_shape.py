@@ -6,8 +6,6 @@ from islands.records.inspection.column_shape import (
     is_derived,
     is_feedback,
     is_label,
-    is_product,
-    is_total,
     measure_command,
     measure_noise_level,
     measure_precedence,
@@ -22,12 +20,6 @@ def test_commands_are_held_or_have_few_levels():
     assert measure_command(steps(1000, 0)) > 0.8
     assert measure_command(white(1000, 0)) == 0.0
     assert measure_command(np.full(100, 3.0)) == 0.0
-
-
-def test_a_coarse_sensor_is_not_a_command():
-    temperature = np.round(20.0 + 5.0 * np.sin(np.arange(2000) / 300), 1)
-    assert np.mean(np.diff(temperature) == 0.0) > 0.8
-    assert measure_command(temperature) < 0.2
 
 
 def test_the_noise_level_is_that_of_added_noise():
@@ -53,18 +45,6 @@ def test_a_derivative_is_recognised(differentiate):
     assert not is_derived(2.0 * y + 1.0, y)
 
 
-def test_a_total_of_one_sign_is_recognised():
-    current = steps(1000, 0) + 0.01 * white(1000, 1)
-    voltage = 3.5 + 0.1 * current
-    for sign in (1.0, -1.0):
-        charge = np.cumsum(np.maximum(sign * current, 0.0))
-        assert is_total(charge, current)
-        assert is_total(np.cumsum(np.maximum(sign * current * voltage, 0.0)), current)
-        assert not is_total(current, charge)
-    assert not is_total(np.cumsum(current), current)
-    assert not is_total(np.cumsum(np.maximum(white(1000, 2), 0.0)), current)
-
-
 def test_columns_of_a_controller_determine_each_other():
     set_point, measured = steps(800, 0, 40), lag(steps(800, 0, 40), 20.0) + 0.01 * white(800, 1)
     error = set_point - measured
@@ -82,27 +62,9 @@ def test_a_controller_with_rounded_columns_is_a_feedback_and_a_response_is_none(
     assert not is_feedback(white(800, 3), set_point, measured)
 
 
-def test_a_step_number_is_a_label_of_the_current():
-    current = np.round(4.0 * steps(2000, 0)) / 4.0
-    step = 1.0 + (current > 0.1) + 2.0 * (current < -0.6)
-    measured = current + 1e-3 * white(2000, 1)
-    assert is_label(step, measured)
-    assert not is_label(measured, step)
-
-
 def test_a_switched_command_is_no_label_of_its_response():
     command = (steps(2000, 0) > 0.0).astype(float)
     assert not is_label(command, command * 12.0 + 1e-3 * white(2000, 1))
     assert not is_label(command, lag(command, 10.0))
     slow = lag(white(2000, 2), 50.0)
     assert not is_label((slow < 0.0).astype(float), slow)
-
-
-def test_a_power_is_the_product_of_voltage_and_current():
-    current = steps(2000, 0)
-    voltage = 3.7 + 0.1 * lag(current, 10.0)
-    power = np.round(voltage * current, 3)
-    assert is_product(power, voltage + 1e-3 * white(2000, 1), current)
-    assert not is_product(voltage, power, current)
-    assert not is_product(lag(power, 5.0), voltage, current)
-    assert not is_product(1.001 * current, np.ones(2000) + 1e-3 * white(2000, 2), current)

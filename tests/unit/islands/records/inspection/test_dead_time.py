@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from islands.records.dataset import Dataset, join
+from islands.records.dataset import Dataset
 from islands.records.inspection.dead_time import estimate_dead_times
 from lab.inspection.dead_times import make_record as draw_record
 from support.known_records import delay, lag, measure, slow, steps, white
@@ -26,13 +26,6 @@ def test_dead_time_is_found_within_one_sample(make_input, dead_time):
         assert fact.interval[0] <= dead_time + 1 <= fact.interval[1]
 
 
-def test_dead_time_of_a_clean_record_is_exact():
-    for dead_time in (0, 3, 11):
-        fact = estimate(make_record(white, dead_time, noise=0.0))
-        assert fact.value == dead_time + 1
-        assert fact.confidence > 0.9
-
-
 @pytest.mark.ci
 def test_stated_confidence_is_the_frequency_of_right_values():
     # Systems of third order begin so slowly that noise hides the first samples.
@@ -45,13 +38,6 @@ def test_stated_confidence_is_the_frequency_of_right_values():
         confidences.append(fact.confidence)
     assert np.mean(right) >= np.mean(confidences) - 0.15
     assert np.mean(confidences) > 0.5
-
-
-def test_direct_response_has_no_dead_time():
-    u = white(1000, 0)
-    fact = estimate(measure(u, u + lag(u, 5.0), 0.02))
-    assert fact.value == 0
-    assert "within the sample" in fact.sentence
 
 
 def test_predictable_input_does_not_tell_the_dead_time():
@@ -86,34 +72,11 @@ def test_periodic_and_drifting_inputs_do_not_invent_dead_times(seed):
     assert all(fact.value is None or abs(fact.value - 1) <= 1 for fact in facts)
 
 
-def test_input_without_effect_has_no_visible_response():
-    record = Dataset(white(1500, 0), white(1500, 1), 1.0)
-    assert "visible" in estimate(record).sentence
-
-
 def test_every_input_has_its_own_dead_time():
     u, v = white(2000, 1), white(2000, 2)
     y = delay(lag(u, 5.0), 3) + delay(lag(v, 5.0), 9)
     record = Dataset(np.column_stack([u, v]), y + 0.05 * white(2000, 3), 1.0)
     assert [fact.value for fact in estimate_dead_times(record, (0, 1))] == [4, 10]
-
-
-def test_short_record_does_not_tell_the_dead_time():
-    fact = estimate(make_record(white, 2, samples=40))
-    assert fact.value is None
-    assert "too short" in fact.sentence
-
-
-def test_missing_outputs_are_left_out():
-    whole = make_record(white, 4)
-    y = whole.y.copy()
-    y[300:320] = np.nan
-    assert estimate(Dataset(whole.u, y, whole.dt)).value == 5
-
-
-def test_recordings_are_not_joined():
-    parts = tuple(make_record(white, 4, seed=seed, samples=500) for seed in range(3))
-    assert estimate(join(parts)).value == 5
 
 
 @pytest.mark.parametrize("part", [0.03, 0.19])

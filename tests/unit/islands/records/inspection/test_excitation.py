@@ -36,29 +36,10 @@ def test_spectrum_is_that_of_scipy(samples, length, centres_parts):
     np.testing.assert_allclose(power, expected[1], atol=1e-13 * expected[1].max())
 
 
-def test_white_noise_fills_the_band_up_to_half_the_sampling_rate():
-    fact = excite(white(4000, 0))["band"]
-    assert fact.value == pytest.approx(0.975 * 50.0, rel=0.03)
-
-
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_order_of_persistent_excitation_is_twice_the_number_of_sines(count):
     found = excite(sines(*(3.0 + 8.0 * place for place in range(count))))
     assert found["excitation-order"].value == 2 * count
-
-
-def test_white_noise_excites_every_tested_order():
-    fact = excite(white(4000, 0))["excitation-order"]
-    assert fact.value == 50
-    assert "or more" in fact.sentence
-
-
-def test_levels_of_steps_are_counted():
-    binary = np.sign(steps(2000, 0))
-    assert excite(binary)["levels"].value == 2
-    assert "nonlinearity" in excite(binary)["levels"].sentence
-    assert excite(np.round(steps(4000, 0) * 3.0))["levels"].value == 7
-    assert excite(white(2000, 0))["levels"].value is None
 
 
 def test_coverage_is_the_part_of_the_range_with_samples():

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from islands.records.inspection.gross_errors import find_gross_errors, find_input_codes
 from support.laws import LAWS
-from support.measured_events import ERRORS, EVENTS, SIGNALS
+from support.measured_events import EVENTS
 from support.portfolio_records import KINDS
 
 SAMPLES = 1200
@@ -43,19 +43,6 @@ def test_a_single_code_of_missing_values_is_found_and_named(code):
     assert errors.describe("line {}".format) == f"1 times {code:.12g}, a code of missing values (line 17)"
 
 
-def test_a_frequent_level_is_no_code():
-    rng = np.random.default_rng(3)
-    y = np.where(rng.random(SAMPLES) < 0.3, 1.0, 1e-9 * rng.normal(size=SAMPLES))
-    assert not found(y, stepped()).samples.size
-
-
-def test_two_different_codes_are_found():
-    u = stepped()
-    y = lagged(u)
-    y[[5, 6, 90]], y[[300, 301]] = -9999.0, 9999.0
-    assert found(y, u).samples.tolist() == [5, 6, 90, 300, 301]
-
-
 def test_a_part_with_a_stuck_sensor_is_found():
     u = stepped()
     y = lagged(u)
@@ -67,12 +54,6 @@ def test_an_output_that_rests_without_noise_is_not_stuck():
     u = stepped()
     u[500:700] = u[500]
     y = np.round(lfilter([0, 0.2], [1, -0.9], u), 2)
-    assert not found(y, u).samples.size
-
-
-def test_a_saturated_output_is_not_stuck():
-    u = stepped()
-    y = np.minimum(lagged(u), 14.0)
     assert not found(y, u).samples.size
 
 
@@ -152,17 +133,6 @@ def test_a_physical_event_is_no_error(name):
         u, y = EVENTS[name](np.random.default_rng([seed, *map(ord, name)]))
         deleted += found(y, u).samples.size > 0
     assert deleted <= 1 - (name != "floods")
-
-
-@pytest.mark.parametrize("kind", ["single samples", "dropouts"])
-@pytest.mark.parametrize("name", SIGNALS)
-def test_gross_errors_are_found_in_signals_of_all_kinds(name, kind):
-    rng = np.random.default_rng([0, *map(ord, name + kind)])
-    u, y = SIGNALS[name](rng)
-    wrong, places = ERRORS[kind](y, rng)
-    samples = found(wrong, u).samples.tolist()
-    assert set(samples) <= set(places)
-    assert len(samples) >= 0.75 * len(places)
 
 
 def test_only_a_known_code_is_an_error_of_an_input():

@@ -23,10 +23,3 @@ def test_no_response_stays_within_the_band():
         found = estimate_impulse_response(Dataset(white(2000, seed), white(2000, [seed, 1]), 1.0), 0)
         inside.append(np.mean(np.abs(found.values) <= found.errors))
     assert np.mean(inside) >= 0.93
-
-
-def test_predictable_input_tells_none():
-    u = np.sin(0.02 * np.arange(2000))
-    assert estimate_impulse_response(measure(u, lag(u, 5.0)), 0) is None
-    assert estimate_impulse_response(measure(white(8, 0), white(8, 1)), 0) is None
-    assert estimate_impulse_response(Dataset(np.ones(500), white(500, 0), 1.0), 0) is None

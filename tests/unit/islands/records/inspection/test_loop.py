@@ -16,14 +16,6 @@ def test_loop_of_a_hysteresis_remains_at_low_frequency(noise):
         assert fact.confidence > 0.9
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_loop_of_a_linear_system_does_not_remain(noise):
-    for seed in range(3):
-        u = slow(3000, seed)
-        for y in (lag(u, 10.0), delay(u, 10), lag(lag(u, 20.0), 20.0)):
-            assert check_loop(measure(u, y, noise, seed), 0).value is not True
-
-
 def test_turning_points_of_one_repeated_loop_tell_hysteresis_from_delay():
     u = np.sin(2.0 * np.pi * np.arange(4000) / 400.0)
     assert check_loop(measure(u, hysteresis(u)), 0).value is True
@@ -31,21 +23,11 @@ def test_turning_points_of_one_repeated_loop_tell_hysteresis_from_delay():
         assert check_loop(measure(u, y), 0).value is False
 
 
-def test_static_nonlinearity_is_no_loop():
-    u = slow(3000, 0)
-    assert check_loop(measure(u, np.tanh(u / u.std())), 0).value is False
-
-
 def test_input_that_turns_within_a_few_samples_makes_no_loop():
     u = white(2000, 0)
     fact = check_loop(measure(u, lag(u, 5.0)), 0)
     assert fact.value is False
     assert "slowly" in fact.sentence
-
-
-def test_monotone_input_leaves_it_open():
-    u = np.linspace(0.0, 1.0, 500)
-    assert check_loop(measure(u, u**2), 0).value is None
 
 
 def test_loop_of_an_integrator_is_none_of_a_hysteresis():

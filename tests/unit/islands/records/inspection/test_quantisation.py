@@ -36,16 +36,6 @@ def test_continuous_signal_is_not_quantised():
         assert find(white(2000, seed)).value is None
 
 
-def test_more_levels_than_a_converter_has_are_no_quantisation():
-    assert find(np.round(white(2000, 0), 6)).value is None
-
-
-def test_two_levels_are_no_lattice():
-    fact = find(np.tile([0.0, 1.0], 50))
-    assert fact.value is None
-    assert fact.sentence == "y_V has two levels, 0 V and 1 V."
-
-
 def test_a_held_excitation_has_one_count_of_levels_and_no_converter():
     force = 20.0 * np.random.default_rng(0).choice([0, 5, 19], 60).repeat(10)
     channel = Channel("force_N", "N", force, is_output=False)
@@ -58,9 +48,3 @@ def test_a_held_excitation_has_one_count_of_levels_and_no_converter():
 def test_a_staircase_and_a_converter_have_one_description():
     """Nothing tells 1, 2, 3, 4, each held for a while, from a slow ramp in a coarse lattice."""
     assert find(np.repeat([1.0, 2.0, 3.0, 4.0], 50)).sentence == "y_V has 4 levels in steps of 1 V."
-
-
-def test_missing_values_are_left_out():
-    y = np.round(white(1000, 0), 2)
-    y[::7] = np.nan
-    assert find(y).value == pytest.approx(0.01, rel=1e-9)

@@ -19,11 +19,6 @@ def test_every_fact_is_measured_once_for_each_signal():
     assert [keys.count(("dead-time", name)) for name in ("u1", "u2", "y")] == [1, 1, 0]
 
 
-def test_equal_records_have_equal_facts():
-    record = measure(slow(2000, 0), lag(slow(2000, 0), 5.0), 0.05)
-    assert measure_facts(record) == measure_facts(record)
-
-
 def test_facts_do_not_depend_on_the_units():
     u, y = slow(2000, 0), lag(slow(2000, 0), 5.0)
     one, other = (measure_facts(measure(u * scale, 7.0 + y * scale, 0.05)) for scale in (1.0, 1000.0))
@@ -37,14 +32,6 @@ def test_a_part_of_a_long_record_is_stated():
     fact = measure_facts(measure(u, u)).find("samples")
     assert fact.value == MOST_SAMPLES + 1000
     assert f"samples 500 to {MOST_SAMPLES + 499}" in fact.sentence
-
-
-def test_missing_outputs_are_counted():
-    u = slow(2000, 0)
-    y = lag(u, 5.0)
-    y[100:150] = np.nan
-    sentence = measure_facts(Dataset(u, y, 1.0)).find("samples").sentence
-    assert sentence == f"{len(y)} samples of 1 s: {len(y)} s. y is missing in 50 of them."
 
 
 @pytest.mark.parametrize("samples", [1, 2, 5, 30])

@@ -21,22 +21,6 @@ def test_a_note_advises_the_options_of_its_text(option: str, value: object) -> N
         assert make_note(join_text("give ", name_option(option, value))).advice == advice
 
 
-def test_a_value_that_only_the_user_knows_is_none() -> None:
-    text = join_text(
-        "name it by ", name_option("time"), " or ", name_option("timezone", example="Europe/Berlin")
-    )
-    assert text == 'name it by time= or timezone="Europe/Berlin"'
-    assert make_note(text).advice == (AdvisedOption("time", None), AdvisedOption("timezone", None))
-
-
-def test_options_have_the_order_of_the_text_and_occur_once() -> None:
-    split, dt = name_option("gaps", "split"), name_option("dt", 1.0)
-    assert get_options(join_text("give ", split, " or ", dt, " or ", split)) == (
-        ("gaps", "split"),
-        ("dt", 1.0),
-    )
-
-
 def test_a_message_keeps_its_options_in_an_error_and_in_copies() -> None:
     text = join_text("give ", name_option("gaps", "split"))
     assert get_options(RecordError(text).message) == (("gaps", "split"),)
@@ -73,7 +57,3 @@ def test_every_option_that_a_note_on_a_file_names_is_advised(name: str, tmp_path
     named = {note.text: set(re.findall(r"(?<![\w-])(\w+)=", note.text)) & OPTIONS for note in notes}
     assert {note.text: {each.option for each in note.advice} for note in notes} == named
     assert any(named.values()), notes
-
-
-def test_a_note_lists_a_limited_number_of_rows() -> None:
-    assert make_note("many", rows=range(1000)).rows == tuple(range(20))

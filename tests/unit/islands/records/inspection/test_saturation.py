@@ -37,19 +37,8 @@ def test_share_of_clipped_samples_is_found(digits):
         assert "minimum" not in fact.sentence
 
 
-def test_lower_limit_is_found():
-    y = np.maximum(slow(3000, 0), 0.0)
-    assert "minimum 0 V" in find(y).sentence
-
-
 def test_steps_are_held_but_not_saturated():
     for seed in range(5):
         binary = np.sign(steps(3000, seed))
         assert find(binary).value is None
         assert find(steps(3000, seed)).value is None
-
-
-def test_a_switched_signal_is_not_saturated():
-    pulses = np.zeros(1000)
-    pulses[100::200] = 12.0
-    assert "switched between two levels" in find(pulses).sentence

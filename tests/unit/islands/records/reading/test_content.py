@@ -1,6 +1,5 @@
 """The format of a file by its content."""
 
-import gzip
 import shutil
 
 import numpy as np
@@ -21,11 +20,6 @@ def test_a_table_of_text_is_read_whatever_its_ending(tmp_path, name):
     assert record.samples == len(lines()) - 1
     stated = f"{name} is text and is read as a table of text" in preview(tmp_path / name).warnings
     assert stated == name.endswith((".xls", ".xlsx", ".mat", ".npz"))
-
-
-def test_a_table_of_text_in_a_compressed_file_needs_no_ending(tmp_path):
-    (tmp_path / "r.gz").write_bytes(gzip.compress(TABLE.encode()))
-    assert read_record(tmp_path / "r.gz", ["u_V"], "y_um").samples == len(lines()) - 1
 
 
 @pytest.mark.parametrize("name", ["r.xls", "r", "r.csv"])

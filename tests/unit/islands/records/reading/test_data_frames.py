@@ -10,8 +10,6 @@ import pytest
 import xarray as xr
 
 import islands
-from islands.records.writer import write_record
-from islands.report.documents.result_folder import content_sha256
 from support.searches import record
 
 TIME = 0.04 * np.arange(400)
@@ -63,13 +61,6 @@ def test_the_same_columns_give_the_same_record_in_every_container(data):
     assert np.array_equal(made.y, RECORD.y)
 
 
-def test_a_frame_and_its_file_give_the_same_record(tmp_path):
-    write_record(RECORD, tmp_path / "record.csv")
-    read = islands.read_record(tmp_path / "record.csv", **CHOICE)
-    made = islands.as_record(pd.read_csv(tmp_path / "record.csv"), **CHOICE)
-    assert content_sha256(made) == content_sha256(read)
-
-
 @pytest.mark.parametrize(
     ("u", "y", "names"),
     [
@@ -99,12 +90,6 @@ def test_a_coordinate_of_an_xarray_data_set_is_in_its_unit(unit, step):
     )
     record = islands.as_record(data, **CHOICE)
     assert (record.dt, record.reading) == (pytest.approx(step), ())
-
-
-def test_units_of_an_xarray_data_set_are_those_of_the_record():
-    data = SAME["xarray"].assign(y=("t", RECORD.y, {"units": "um"}))
-    made = islands.as_record(data, **CHOICE)
-    assert (made.input_units, made.output_unit) == (("V",), "um")
 
 
 @pytest.mark.parametrize("name", ["u_V", None])
@@ -146,12 +131,6 @@ def test_a_list_of_frames_is_a_record_of_recordings():
     made = islands.as_record([FRAME[:150], FRAME[150:]], dt=0.04, **CHOICE)
     assert made.segments == (150, 250)
     assert np.array_equal(made.y, RECORD.y)
-
-
-def test_an_input_of_a_frame_may_act_at_once():
-    made = islands.as_record(FRAME, dt=0.04, inputs="u_V+1", output="y")
-    assert made.input_names == ("u_V+1",)
-    assert made.u[0, 0] == RECORD.u[1, 0]
 
 
 GAP = np.where(TIME < 8.0, TIME, TIME + 1.0)
@@ -214,31 +193,6 @@ def test_arrays_import_no_library_of_frames():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
-
-
-WITH_GAPS = FRAME.assign(t_s=TIME, u_V=np.where(np.isin(np.arange(400), [50, 51, 300]), np.nan, FRAME["u_V"]))
-WITH_WORDS = FRAME.assign(t_s=TIME, y=[f"{y:.17g}" if k % 90 else "Failed" for k, y in enumerate(FRAME["y"])])
-
-
-@pytest.mark.parametrize(
-    ("frame", "options"),
-    [
-        (WITH_GAPS, {"gaps": "split"}),
-        (WITH_GAPS, {"gaps": "interpolate"}),
-        (WITH_WORDS, {"missing": ["Failed"]}),
-        (FRAME.assign(t_s=TIME), {"resample": 0.08}),
-        (FRAME.assign(k=1000 * TIME), {"time": "k", "time_unit": "ms"}),
-        (FRAME.assign(t_s=TIME, y=FRAME["y"].where(np.arange(400) % 4 == 0)), {"rates": "sample"}),
-    ],
-)
-def test_options_of_reading_are_those_of_a_file(tmp_path, frame, options):
-    frame.to_csv(tmp_path / "r.csv", index=False)
-    same = islands.read_record(tmp_path / "r.csv", ["u_V"], "y", **options)
-    found = islands.as_record(frame, **CHOICE, **options)
-    assert (found.dt, found.segments, found.samples) == (same.dt, same.segments, same.samples)
-    assert np.array_equal(found.u, same.u)
-    assert np.array_equal(found.y, same.y, equal_nan=True)
-    assert len(found.reading) == len(same.reading) > 0 or "time" in options
 
 
 @pytest.mark.parametrize(

@@ -50,12 +50,6 @@ def test_gross_errors_of_the_output_are_missing_values(tmp_path, values, errors)
     assert not np.isnan(islands.as_record(frame, inputs="u", output="y", outliers="keep").y).any()
 
 
-def test_a_sound_record_has_no_statement(tmp_path):
-    record = read_record(write(tmp_path / "r.csv"), ["u"], "y")
-    assert record.reading == ()
-    assert np.isfinite(record.y).all()
-
-
 def test_a_code_in_an_input_is_refused_without_gaps(tmp_path):
     rows = write(tmp_path / "r.csv", u=with_values(-9999, U)).read_text().splitlines()
     message = refusal(tmp_path, rows, inputs=("u",), output="y")
@@ -128,13 +122,6 @@ def test_the_uniform_first_column_of_a_file_without_a_header_is_the_time(tmp_pat
     path = tmp_path / "r.csv"
     np.savetxt(path, np.column_stack([step * np.arange(len(U)), U, Y]), delimiter=",", fmt="%.3f")
     assert read_record(path, ["c2"], "c3", header=False).dt == pytest.approx(step, rel=1e-3)
-
-
-def test_a_number_of_samples_is_no_time(tmp_path):
-    path = tmp_path / "r.csv"
-    np.savetxt(path, np.column_stack([np.arange(len(U)), U, Y]), delimiter=",", fmt="%g")
-    with pytest.raises(islands.RecordError, match="sampling time"):
-        read_record(path, ["c2"], "c3", header=False)
 
 
 @pytest.mark.parametrize("held", [False, True])

@@ -1,9 +1,7 @@
 """Preview: every column of a file, with the messages of `read_record` as its problems."""
 
-import json
 import subprocess
 import sys
-from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -105,14 +103,6 @@ WRITERS = {
 }
 
 
-def test_a_valid_file_is_described_without_problems(tmp_path):
-    seen = preview(table(tmp_path))
-    assert (seen.time, seen.dt, seen.samples, seen.warnings) == ("t_s", pytest.approx(0.01), SAMPLES, ())
-    assert [column.name for column in seen.columns] == ["t_s", "u_V", "y_um"]
-    assert [column.unit for column in seen.columns] == ["s", "V", "um"]
-    assert not any(column.problem for column in seen.columns)
-
-
 def test_the_statistics_are_those_of_the_samples(tmp_path):
     column = preview(table(tmp_path)).columns[2]
     assert (column.samples, column.minimum, column.maximum) == (SAMPLES, Y.min(), Y.max())
@@ -138,10 +128,6 @@ def test_every_format_gives_the_same_preview(tmp_path, save, suffix):
     assert preview(file) == preview(table(tmp_path))
 
 
-def test_a_preview_is_plain_data(tmp_path):
-    assert json.loads(json.dumps(asdict(preview(table(tmp_path)))))["columns"][1]["name"] == "u_V"
-
-
 # Problems of columns
 
 
@@ -164,29 +150,12 @@ def test_a_column_with_an_invalid_sample_has_no_statistics(tmp_path):
     assert (constant.minimum, constant.maximum, constant.mean, constant.deviation) == (2.5, 2.5, 2.5, 0.0)
 
 
-def test_numbers_too_large_for_a_mean_have_no_statistics(tmp_path):
-    column = preview(table(tmp_path, x=[1.7e308] * (SAMPLES - 1) + [1.6e308])).columns[3]
-    assert (column.mean, column.problem) == (None, "")
-
-
 def test_a_ragged_line_is_the_problem_of_every_column(tmp_path):
     file = table(tmp_path)
     file.write_text(file.read_text() + "\n0.6,1")
     message = refusal(file, ["u_V"], "y_um")
     assert problems(file) == dict.fromkeys(("t_s", "u_V", "y_um"), message)
     assert preview(file).samples == 0
-
-
-def test_an_array_of_unique_length_has_a_problem(tmp_path):
-    file = archive(tmp_path, u=U, y=Y, short=U[:50], gain=2.0 * np.ones(1), dt=0.1)
-    found = problems(file)
-    assert set(found) == {"short", "gain", "dt"}
-    assert found["short"] == refusal(file, ["u"], "short")
-    assert (
-        found["short"]
-        == "r.npz: column u has 60 samples, column short 50: the channels of a record must have equal length"
-    )
-    assert preview(file).samples == SAMPLES
 
 
 def test_two_recordings_in_one_file_are_a_warning_not_a_problem(tmp_path):
@@ -205,18 +174,7 @@ def test_single_numbers_are_not_a_recording(tmp_path):
     assert preview(file).warnings == ()
 
 
-def test_a_file_without_channels_still_has_a_sampling_time(tmp_path):
-    seen = preview(archive(tmp_path, cube=np.ones((2, 3, 4)), fs=100.0))
-    assert (seen.samples, seen.dt, seen.warnings) == (0, pytest.approx(0.01), ())
-
-
 # Warnings
-
-
-def test_a_decimal_comma_is_a_warning_that_shows_the_first(tmp_path):
-    seen = preview(table(tmp_path, separator=";", comma=True))
-    assert seen.warnings == ("the comma in r.csv, line 2, column t_s (0,0) is read as a decimal mark",)
-    assert seen.dt == pytest.approx(0.01)
 
 
 # Time
@@ -260,25 +218,11 @@ def test_a_first_column_in_a_unit_of_time_that_increases_is_the_time(tmp_path):
         assert preview(file).time is None
 
 
-def test_a_stated_sampling_time_is_shown_and_compared_with_the_time(tmp_path):
-    assert preview(archive(tmp_path, u=U, y=Y, fs=250.0)).dt == pytest.approx(0.004)
-    file = archive(tmp_path, u=U, y=Y, t=T, fs=250.0)
-    assert preview(file).dt is None
-    assert preview(file).warnings == (refusal(file, ["u"], "y"),)
-
-
 def test_readers_of_rare_formats_import_their_libraries_on_demand():
     rare = ("asammdf", "h5py", "nptdms", "openpyxl", "pyarrow", "scipy")
     program = f"import sys, islands.records.reading; print([m for m in {rare} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-def test_a_column_has_the_sampling_time_of_its_samples(tmp_path):
-    rows = (f"{0.1 * k:.1f},{k % 7},{k % 5 if k % 4 == 0 else ''}" for k in range(400))
-    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *rows]))
-    found = {column.name: column.dt for column in preview(tmp_path / "a.csv").columns}
-    assert found == {"t_s": pytest.approx(0.1), "u": pytest.approx(0.1), "y": pytest.approx(0.4)}
 
 
 def test_only_warnings_that_prevent_reading_are_problems(tmp_path):

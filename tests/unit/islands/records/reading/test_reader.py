@@ -8,8 +8,8 @@ import pytest
 
 from islands.errors import IslandsError, RecordError
 from islands.records.channel_names import parse_unit
-from islands.records.reading import READERS, fingerprint, read_columns, read_record
-from islands.records.reading.column_names import looks_like_time, time_column
+from islands.records.reading import READERS, fingerprint, read_record
+from islands.records.reading.column_names import looks_like_time
 from support.bad_records import refusal
 
 SAMPLES = 50
@@ -71,46 +71,12 @@ def test_a_record_carries_names_and_units_of_its_columns(tmp_path):
     assert record.segments == (SAMPLES,)
 
 
-def test_inputs_keep_the_order_in_which_they_are_given(tmp_path):
-    record = read_record(written(tmp_path), ["y_um", "u_V"], "t_s", dt=1.0)
-    assert record.input_names == ("y_um", "u_V")
-    assert record.u[:, 0].tolist() == Y.tolist()
-    assert record.u[:, 1].tolist() == U.tolist()
-
-
 def test_a_byte_order_mark_and_trailing_blank_lines_are_accepted(tmp_path):
     file = written(tmp_path)
     file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes() + b"\n  \n,,\n\n")
     record = read_record(file, ["u_V"], "y_um")
     assert record.samples == SAMPLES
     assert record.dt == pytest.approx(0.01)
-
-
-def test_a_separator_at_the_end_of_every_line_is_accepted(tmp_path):
-    file = written(tmp_path, ";", comma=True)
-    file.write_text(file.read_text().replace("\n", ";\n"))
-    assert read_record(file, ["u_V"], "y_um").y.tolist() == Y.tolist()
-
-
-def test_quoted_names_may_contain_the_separator_and_blanks(tmp_path):
-    file = written(tmp_path)
-    file.write_text(file.read_text().replace("u_V", '"drive, left (V)"'))
-    record = read_record(file, ["drive, left (V)"], "y_um")
-    assert record.input_units == ("V",)
-    assert record.u[:, 0].tolist() == U.tolist()
-
-
-def test_quoted_numbers_may_have_decimal_commas_between_commas(tmp_path):
-    rows = (f'"{t:.4f}","{u:.4f}","{y:.4f}"'.replace(".", ",") for t, u, y in zip(T, U, Y, strict=True))
-    (tmp_path / "r.csv").write_text("\n".join(["t_s,u_V,y_um", *rows]))
-    assert read_record(tmp_path / "r.csv", ["u_V"], "y_um").y.tolist() == Y.tolist()
-
-
-def test_an_unused_text_column_does_no_harm(tmp_path):
-    lines = written(tmp_path).read_text().splitlines()
-    text = [lines[0] + ",note", *(f"{line},n.a. 1_000" for line in lines[1:])]
-    (tmp_path / "r.csv").write_text("\n".join(text))
-    assert read_record(tmp_path / "r.csv", ["u_V"], "y_um").u[:, 0].tolist() == U.tolist()
 
 
 # Time
@@ -169,14 +135,6 @@ def test_a_column_with_another_name_is_not_the_time(name):
     assert not looks_like_time(name)
 
 
-def test_a_timestamp_column_next_to_the_time_does_no_harm():
-    assert time_column(["timestamp", "t_s", "T_K"], "r.csv") == "t_s"
-    assert time_column(["timestamp"], "r.csv") == "timestamp"
-    assert time_column(["Run Time (s)", "timestamp"], "r.csv") == "timestamp"
-    assert time_column(["Test_Time(s)", "Step_Time(s)"], "r.csv") == "Test_Time(s)"
-    assert time_column(["T_K", "t_weeks", "k"], "r.csv") is None
-
-
 @pytest.mark.parametrize(
     ("name", "unit"),
     [
@@ -197,14 +155,6 @@ def test_a_unit_follows_the_last_underscore_or_is_in_brackets(name, unit):
     assert parse_unit(name) == unit
 
 
-@pytest.mark.ci
-def test_time_printed_with_five_digits_is_uniform(tmp_path):
-    t = 2.13e-4 * np.arange(40_001)
-    rows = (f"{value:.5g},{k % 7},{k % 11}" for k, value in enumerate(t))
-    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *rows]))
-    assert read_record(tmp_path / "r.csv", ["u"], "y").dt == pytest.approx(2.13e-4, rel=1e-5)
-
-
 def test_time_printed_with_few_decimals_is_uniform_to_half_of_the_last(tmp_path):
     t = 0.00317 * np.arange(2000)
     rows = (f"{value:.3f},{k % 7},{k % 11}" for k, value in enumerate(t))
@@ -212,21 +162,11 @@ def test_time_printed_with_few_decimals_is_uniform_to_half_of_the_last(tmp_path)
     assert read_record(tmp_path / "r.csv", ["u"], "y").dt == pytest.approx(0.00317, rel=1e-4)
 
 
-def test_time_in_single_precision_is_uniform(tmp_path):
-    t = (np.arange(100_000) / 610.35).astype(np.float32)
-    file = archive(tmp_path, t=t, u=np.arange(100_000) % 7, y=np.arange(100_000) % 11)
-    assert read_record(file, ["u"], "y").dt == pytest.approx(1 / 610.35, rel=1e-6)
-
-
 def test_the_given_sampling_time_is_used_without_a_time_column(tmp_path):
     file = written(tmp_path)
     file.write_text(file.read_text().replace("t_s", "k"))
     record = read_record(file, ["u_V"], "y_um", dt=0.25, rows=slice(4, 44))
     assert (record.dt, record.start, record.samples) == (0.25, 1.0, 40)
-
-
-def test_the_time_column_takes_precedence_over_a_similar_sampling_time(tmp_path):
-    assert read_record(written(tmp_path), ["u_V"], "y_um", dt=0.01005).dt == pytest.approx(0.01, rel=1e-12)
 
 
 # Rows
@@ -270,20 +210,6 @@ def test_a_missing_output_after_the_warm_up_is_accepted_on_request(tmp_path, cel
     assert np.isnan(record.y[10:]).all()
 
 
-def test_missing_cells_and_decimal_commas_may_be_combined(tmp_path):
-    lines = written(tmp_path, ";", comma=True).read_text().splitlines()
-    lines[20] = lines[20].rpartition(";")[0] + ";"
-    (tmp_path / "r.csv").write_text("\n".join(lines))
-    record = read_record(tmp_path / "r.csv", ["u_V"], "y_um", missing_output=True)
-    assert np.flatnonzero(np.isnan(record.y)).tolist() == [19]
-    assert record.y[20] == Y[20]
-
-
-def test_a_constant_output_is_accepted_on_request(tmp_path):
-    file = archive(tmp_path, y=np.zeros(SAMPLES), dt=0.01)
-    assert read_record(file, ["u"], "y", missing_output=True).output_range == 0.0
-
-
 # NumPy archives
 
 
@@ -296,32 +222,7 @@ def test_an_archive_may_state_its_sampling(tmp_path, name, value):
     assert record.start == pytest.approx(0.04)
 
 
-@pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 1), (1, SAMPLES)])
-def test_an_array_with_one_long_axis_is_a_channel(tmp_path, shape):
-    record = read_record(archive(tmp_path, u=U.reshape(shape), dt=1.0), ["u"], "y")
-    assert record.u.shape == (SAMPLES, 1)
-    assert record.u[:, 0].tolist() == U.tolist()
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.int16, np.uint8, np.bool_])
-def test_arrays_of_other_numbers_become_double_precision(tmp_path, kind):
-    u = (np.arange(SAMPLES) % 2).astype(kind)
-    record = read_record(archive(tmp_path, u=u, dt=1.0), ["u"], "y")
-    assert record.u.dtype == np.float64
-    assert record.u[:3, 0].tolist() == [0.0, 1.0, 0.0]
-
-
-def test_an_unused_array_does_no_harm(tmp_path):
-    file = archive(tmp_path, dt=1.0, extra=np.array([{"a": 1}], dtype=object), short=np.ones(3))
-    assert read_record(file, ["u"], "y").samples == SAMPLES
-
-
 # Column names and fingerprints
-
-
-def test_columns_are_listed_in_the_files_order(tmp_path):
-    assert read_columns(written(tmp_path, ";")) == ("t_s", "u_V", "y_um")
-    assert read_columns(archive(tmp_path, fs=10.0)) == ("u", "y", "fs")
 
 
 def test_a_fingerprint_is_the_sha_256_of_the_bytes(tmp_path):
@@ -341,23 +242,7 @@ def test_an_input_with_the_suffix_plus_one_is_read_one_sample_early(tmp_path):
     assert np.array_equal(early.y, plain.y)
 
 
-def test_a_column_name_with_the_suffix_plus_one_is_not_shifted(tmp_path):
-    file = tmp_path / "record.csv"
-    file.write_text("t_s,u,u+1,y\n" + "\n".join(f"{k / 10:g},{k},{-k},{k % 7}" for k in range(40)))
-    assert read_record(file, ["u+1"], "y").u[3, 0] == -3.0
-
-
 # Invalid files
-
-
-def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(RecordError, match=r"there is no file .*none\.csv: check the path"):
-        read_record(tmp_path / "none.csv", ["u"], "y")
-
-
-def test_a_folder_is_refused(tmp_path):
-    with pytest.raises(RecordError, match="is a folder: give the path of the file in it"):
-        read_record(tmp_path, ["u"], "y")
 
 
 def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):

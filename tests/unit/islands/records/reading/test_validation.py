@@ -56,18 +56,6 @@ def test_a_word_is_refused_with_the_option_for_missing_values(tmp_path):
     assert "missing" in message
 
 
-def test_the_first_of_several_bad_cells_is_named(tmp_path):
-    rows = changed(30, 1, "late")
-    rows[11] = "0.1,early,0.5"
-    assert "line 12, column u_V: 'early'" in refusal(tmp_path, rows)
-
-
-def test_a_time_of_day_is_refused_with_advice_on_the_time_column(tmp_path):
-    message = refusal(tmp_path, changed(2, 0, "10:15:00"))
-    assert "line 2, column t_s: '10:15:00' is not a number" in message
-    assert "write the time as a number or as 2026-11-22 14:05:03.250, or rename" in message
-
-
 @pytest.mark.parametrize(("column", "name"), [(1, "u_V"), (2, "y_um")])
 def test_a_constant_channel_is_refused(tmp_path, column, name):
     rows = lines()
@@ -85,11 +73,6 @@ def test_a_constant_input_is_accepted_for_a_simulation_only(tmp_path):
     assert "column u_V is constant" in refusal(tmp_path, rows)
     (tmp_path / "hold.csv").write_text("\n".join(rows))
     assert read_record(tmp_path / "hold.csv", ["u_V"], "y_um", missing_output=True).u.max() == 1.0
-
-
-def test_line_numbers_are_the_files_when_rows_are_selected(tmp_path):
-    message = refusal(tmp_path, changed(30, 1, "nan"), rows=slice(10, 60))
-    assert "line 30, column u_V" in message
 
 
 # Lengths
@@ -120,18 +103,6 @@ def test_a_decimal_comma_between_commas_is_recognised(tmp_path):
     assert "if it is a decimal comma, save with ';' between the columns" in message
 
 
-def test_an_input_that_ends_early_is_refused_as_of_unequal_length(tmp_path):
-    rows = lines()
-    for line in range(41, len(rows)):
-        cells = rows[line].split(",")
-        cells[1] = ""
-        rows[line] = ",".join(cells)
-    message = refusal(tmp_path, rows)
-    assert "line 42, column u_V and all below, to line 61, are empty" in message
-    assert "unequal lengths" in message
-    assert "select the rows that are complete" in message
-
-
 def test_a_blank_line_between_samples_is_refused(tmp_path):
     rows = lines()
     rows.insert(20, "")
@@ -145,11 +116,6 @@ def test_too_few_samples_are_refused_and_just_enough_are_not(tmp_path):
     assert "29 samples, from line 2 to line 30, are too few: at least 30 are needed" in message
     (tmp_path / "enough.csv").write_text("\n".join(lines(MIN_SAMPLES)))
     assert read_record(tmp_path / "enough.csv", ["u_V"], "y_um").samples == 30
-
-
-def test_a_selection_of_too_few_samples_is_refused(tmp_path):
-    message = refusal(tmp_path, lines(), rows=slice(10, 20))
-    assert "10 samples, from line 12 to line 21, are too few" in message
 
 
 @pytest.mark.parametrize(
@@ -180,12 +146,6 @@ def test_a_gap_is_refused_at_the_line_after_it(tmp_path):
     assert 'a gap of 0.02 before line 31; give gaps="split"' in message
 
 
-@pytest.mark.parametrize("missing", [2, 30, 59])
-def test_a_gap_of_one_sample_is_found_anywhere_even_in_integers(tmp_path, missing):
-    rows = ["t_s,u_V,y_um", *(f"{k},{k % 7},{k % 11}" for k in range(61) if k != missing)]
-    assert f"line {missing + 2}, column t_s follows a gap" in refusal(tmp_path, rows)
-
-
 def test_a_repeated_time_stamp_is_refused(tmp_path):
     message = refusal(tmp_path, changed(25, 0, "0.22"))
     assert "line 25, column t_s repeats the time stamp 0.22" in message
@@ -208,30 +168,6 @@ def test_jittered_sampling_is_refused(tmp_path):
     assert "dt=0.01" in message
 
 
-def test_early_stamps_are_checked_with_their_own_number_of_digits(tmp_path):
-    rows = [HEADER, *(f"{2.13e-4 * k:.5g},{k % 7},{k % 11}" for k in range(10_000))]
-    rows[100] = f"{2.13e-4 * 99 + 1e-5:.5g},1,1"
-    assert "line 101, column t_s is off the uniform grid" in refusal(tmp_path, rows)
-
-
-def test_jitter_is_refused_at_two_but_not_at_half_a_per_cent(tmp_path):
-    assert "line 33, column t_s" in refusal(tmp_path, changed(33, 0, "0.3102000001"))
-    (tmp_path / "good.csv").write_text("\n".join(changed(33, 0, "0.3100500001")))
-    assert read_record(tmp_path / "good.csv", ["u_V"], "y_um").dt == pytest.approx(0.01)
-
-
-def test_jitter_of_whole_milliseconds_is_not_taken_for_rounding(tmp_path):
-    rows = ["t_ms,u_V,y_um", *(f"{10 * k + (k % 5 == 2)},{k % 7},{k % 11}" for k in range(60))]
-    assert "column t_ms is off the uniform grid" in refusal(tmp_path, rows)
-
-
-def test_a_change_of_the_sampling_rate_is_refused_at_its_line(tmp_path):
-    t = [k * 0.01 if k < 30 else 0.3 + (k - 30) * 0.02 for k in range(60)]
-    rows = [HEADER, *(f"{t[k]:.4f},{k % 7},{k % 11}" for k in range(60))]
-    message = refusal(tmp_path, rows)
-    assert "line 32, column t_s" in message
-
-
 def test_a_time_column_and_a_sampling_time_that_disagree_are_refused(tmp_path):
     message = refusal(tmp_path, lines(), dt=0.0102)
     assert "0.01 s by column t_s and 0.0102 s by dt=" in message
@@ -248,13 +184,6 @@ def test_a_file_without_a_sampling_time_is_refused(tmp_path):
     message = refusal(tmp_path, rows)
     assert "bad.csv has no time column" in message
     assert "give the sampling time by dt=, or name the column by time=" in message
-
-
-def test_a_time_column_in_an_unknown_unit_is_named(tmp_path):
-    rows = lines()
-    rows[0] = "t_weeks,u_V,y_um"
-    message = refusal(tmp_path, rows)
-    assert "if t_weeks is the time, end its name in one of the units s, ms, us, ns, min, h" in message
 
 
 def test_two_possible_time_columns_are_refused(tmp_path):
@@ -275,17 +204,3 @@ def test_columns_of_one_name_are_refused(tmp_path):
     rows[0] = "t_s,u_V,u_V"
     message = refusal(tmp_path, rows, output="u_V")
     assert "several columns named u_V: rename them" in message
-
-
-def test_one_column_as_input_and_output_is_refused(tmp_path):
-    message = refusal(tmp_path, lines(), inputs=["u_V", "y_um"])
-    assert "column y_um is given as input and as output" in message
-
-
-def test_an_input_given_twice_is_refused(tmp_path):
-    assert "column u_V is given as an input twice" in refusal(tmp_path, lines(), inputs=["u_V", "u_V"])
-
-
-def test_a_choice_without_input_is_refused(tmp_path):
-    message = refusal(tmp_path, lines(), inputs=[])
-    assert message == "no input is given: name one or more of the columns t_s, u_V, y_um"

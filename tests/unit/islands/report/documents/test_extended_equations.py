@@ -76,10 +76,6 @@ def test_maps_of_an_actuator_are_written_in_the_order_in_which_they_act() -> Non
     assert "dv/dt = (play(sign(u)*max(abs(u) - d, 0), b) - c*v - k*x)/m" in written[1]
 
 
-def test_without_forces_the_equation_has_no_symbol_for_them() -> None:
-    assert "dv/dt = (u - c*v - k*x)/m" in texts("second-order", "offset")
-
-
 def test_a_name_that_the_simulation_has_gets_a_number() -> None:
     lines = texts("second-order", "cubic-stiffness", "quadratic-drag")
     assert "dv/dt = (u - c*v - k*x - c2*abs(v)*v - k2*x**3)/m" in lines

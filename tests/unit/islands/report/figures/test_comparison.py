@@ -28,8 +28,3 @@ def test_every_run_has_a_line_and_a_residual_in_its_style():
         np.testing.assert_array_equal(line.get_ydata(), run)
         np.testing.assert_array_equal(residual.get_ydata(), MEASURED_OUTPUT - run)
     assert len(draw(runs, residuals=False).axes) == 1
-
-
-def test_a_diverging_run_does_not_hide_the_others():
-    low, high = draw({"A": 1e5 * TIME, "B": MEASURED_OUTPUT}).axes[0].get_ylim()
-    assert -2.0 < low < -1.0 < 1.0 < high < 2.0

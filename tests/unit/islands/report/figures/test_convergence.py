@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from islands.evolution.search_state import HistoryPoint
 from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
@@ -79,23 +78,6 @@ def test_front_shows_both_parts_over_the_number_of_terms():
         "recommended": [[2.0, 1.0]],
     }
     assert integer_ticks(get_axes(figure)) == [1, 2, 3]
-
-
-@pytest.mark.parametrize("errors", [(2.7, 4.2), (0.051, 0.062), (9.5, 10.5), (0.01, 100.0)])
-def test_error_axis_has_tick_labels_for_every_range(errors):
-    """A range within one decade may contain no power of ten, so minor ticks need labels."""
-    figure = draw_front(make_result(models=((2, errors[0], errors[0]), (3, errors[1], errors[1]))))
-    axes = get_axes(figure)
-    low, high = axes.get_ylim()
-    figure.draw_without_rendering()
-    ticks = [*axes.yaxis.get_major_ticks(), *axes.yaxis.get_minor_ticks()]
-    numbers = [
-        float(tick.label1.get_text())
-        for tick in ticks
-        if low <= tick.get_loc() <= high and tick.label1.get_text()
-    ]
-    assert numbers
-    assert all(low * 0.99 <= number <= high * 1.01 for number in numbers)
 
 
 def test_diverged_and_exact_models_do_not_affect_the_error_axis():

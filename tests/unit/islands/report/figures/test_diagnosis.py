@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.effects.catalogue import get_title
-from islands.report.figures.diagnosis import draw_residual, draw_screening
+from islands.report.figures.diagnosis import draw_residual
 
 pytestmark = pytest.mark.usefixtures("without_layout")
 
@@ -76,31 +75,9 @@ def test_residual_structure_does_not_reach_across_recordings() -> None:
     assert len(single[4].lines[0].get_xdata()) == 112
 
 
-def test_dry_friction_separates_the_directions_only_before_extension() -> None:
-    lines = residual_figure().axes[1].lines[:-1]
-    mean = {
-        (line.get_color(), line.get_linestyle()): np.mean(line.get_ydata())
-        for line in lines
-        if len(line.get_ydata()) > 2
-    }
-    before = mean["#c56fa0", "-"] - mean["#c56fa0", "--"]
-    after = mean["#d55e00", "-"] - mean["#d55e00", "--"]
-    assert before == pytest.approx(-0.6, abs=0.05)
-    assert after == pytest.approx(0.0, abs=0.05)
-
-
 def test_spectrum_integrates_to_the_variance_of_the_residual() -> None:
     found = diagnosis()
     before = residual_figure().axes[4].lines[0]
     frequency, density = before.get_xydata().T
     residual = found.record.y - found.base.output
     assert np.trapezoid(density**2, frequency) == pytest.approx(np.var(residual), rel=0.25)
-
-
-def test_screening_figure_colours_the_named_effects() -> None:
-    found = diagnosis()
-    axes = draw_screening(found).axes[0]
-    names = [text.get_text() for text in axes.get_yticklabels()]
-    orange = [name for name, bar in zip(names, axes.patches, strict=True) if bar.get_facecolor()[0] > 0.8]
-    assert orange == ["dry friction"]
-    assert names[-1] == get_title(found.candidates[0].name)

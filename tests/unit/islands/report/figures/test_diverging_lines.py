@@ -9,7 +9,6 @@ from islands.errors import SettingsError
 from islands.records.dataset import Dataset
 from islands.report.figures.diverging_lines import (
     annotate_divergence,
-    break_line,
     divergence,
     finite_part,
     limits,
@@ -35,17 +34,6 @@ def test_values_that_are_infinite_or_beyond_the_bound_are_not_drawn():
 def test_simulation_of_another_length_raises_settings_error():
     with pytest.raises(SettingsError, match=r"each of the record's 3 samples, got shape \(2,\)"):
         finite_part(record([0.0, 1.0, 2.0]), np.zeros(2))
-
-
-def test_line_is_broken_only_between_segments():
-    made = break_line(record([1.0, 2.0, 3.0, 4.0, 5.0], segments=(2, 2, 1)), np.arange(5.0))
-    np.testing.assert_array_equal(made, [0.0, 1.0, NAN, 2.0, 3.0, NAN, 4.0])
-    np.testing.assert_array_equal(break_line(record([1.0, 2.0]), np.arange(2.0)), [0.0, 1.0])
-
-
-def test_axis_follows_one_range_beyond_the_measured_output():
-    made = within_reach(record([1.0, NAN, 3.0]), np.array([-1e5, 0.0, 2.5, 1e5, NAN]))
-    np.testing.assert_array_equal(made, [-1.0, 0.0, 2.5, 5.0, NAN])
 
 
 def test_axis_follows_the_simulation_without_measured_output():
@@ -88,7 +76,3 @@ def test_mark_is_where_the_line_finally_leaves_the_axes():
     figure = draw_diverging(([1.0, 2.0, 3.0, 4.0, 5.0], [5.0, 20.0, 5.0, 30.0, -900.0]))
     assert marks(figure) == [(4.0, 10.0)]
     assert annotations(figure) == ["diverged"]
-
-
-def test_empty_line_has_no_mark():
-    assert marks(draw_diverging(([], []))) == []

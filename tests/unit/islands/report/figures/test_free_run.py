@@ -8,7 +8,7 @@ import pytest
 from islands.errors import SettingsError
 from islands.records.dataset import Dataset
 from islands.report.figures.free_run import draw_free_run
-from islands.report.figures.style import MEASURED, RESIDUAL, SIMULATED, save
+from islands.report.figures.style import MEASURED, save
 from islands.validation.prediction_bands import PredictionBand
 
 if TYPE_CHECKING:
@@ -61,16 +61,6 @@ def test_segments_are_separated_and_not_joined():
     np.testing.assert_array_equal(np.delete(y, 150), record.y)
 
 
-def test_missing_output_is_a_gap_and_the_simulation_is_complete():
-    whole = sine(3)
-    y = whole.y.copy()
-    y[100:120] = np.nan
-    figure = draw_free_run(Dataset(whole.u, y, whole.dt), whole.y)
-    assert np.isnan(curve(figure.axes[0], MEASURED)[1][100:120]).all()
-    assert not np.isnan(curve(figure.axes[0], SIMULATED)[1]).any()
-    assert np.isnan(curve(figure.axes[1], RESIDUAL)[1]).sum() == 20
-
-
 def diverging(record: Dataset, at: int) -> np.ndarray:
     k = np.arange(record.samples)
     return np.where(k < at, np.exp(0.1 * np.minimum(k, at)) - 1.0, np.nan)
@@ -91,14 +81,6 @@ def test_divergence_is_annotated_and_does_not_flatten_other_lines(tmp_path):
     # exp(0.1 k) - 1 passes 9.6 between samples 23 and 24.
     assert mark.get_xdata()[0] == pytest.approx(0.24)
     save(figure, tmp_path / "diverged.svg")
-
-
-def test_axes_follow_a_bounded_simulation_with_large_errors():
-    record = sine(3)
-    figure = draw_free_run(record, record.y + 60.0)
-    assert figure.axes[0].get_ylim()[1] > 63.0
-    assert figure.axes[1].get_ylim()[0] < -60.0
-    assert annotations(figure.axes[0]) == []
 
 
 @pytest.mark.parametrize("y", [np.full(50, np.nan), np.zeros(50)])

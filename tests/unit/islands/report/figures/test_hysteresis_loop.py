@@ -34,17 +34,6 @@ def test_inputs_have_one_panel_each_with_name_and_unit(inputs):
         np.testing.assert_array_equal(simulated.get_ydata(), 0.9 * record.y)
 
 
-def test_last_five_of_many_loops_are_drawn():
-    record = loops(40)
-    (axes,) = draw_loop(record, record.y).axes
-    assert axes.get_title(loc="left") == "the last 5 of 40 loops"
-    u, y = axes.lines[0].get_data()
-    first = int(np.flatnonzero(record.y == y[0])[-1])
-    np.testing.assert_array_equal(y, record.y[first : first + 5 * 200 + 1])
-    assert first + 5 * 200 > record.samples - 200
-    np.testing.assert_array_equal(u, record.u[first : first + 5 * 200 + 1, 0])
-
-
 @pytest.mark.parametrize(("periods", "part"), [(3, ""), (40, "the last 5 of 40 loops; ")])
 def test_divergence_is_in_the_title_and_does_not_flatten_the_loops(periods, part, tmp_path):
     record = loops(periods)

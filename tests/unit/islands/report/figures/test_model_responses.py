@@ -12,7 +12,6 @@ LAG = islands.make_model(
     [(islands.parse("y(k-1)"), 0.5), (islands.parse("u2(k-1)"), 2.0), (islands.parse("u1(k-1)"), 1.0)],
     ("offset", "valve"),
 )
-HYSTERESIS = islands.make_model([(islands.parse("y(k-1)"), 1.0), (islands.parse("u(k-1) - u(k-2)"), 0.8)])
 
 
 @pytest.fixture(scope="module")
@@ -30,11 +29,6 @@ def test_the_first_varying_input_steps_and_the_others_rest(record):
     output = drawn["step-response"].axes[1].get_lines()[0].get_ydata()
     assert output[0] == pytest.approx(6.0 + 4.0 * quartiles[0])
     assert output[-1] == pytest.approx(6.0 + 4.0 * quartiles[1], rel=0.01)
-
-
-def test_models_of_hysteresis_have_no_response_figure():
-    record = islands.Dataset(RNG.normal(size=100), RNG.normal(size=100), 1.0)
-    assert draw_responses(HYSTERESIS, record) == {}
 
 
 def test_a_record_with_constant_inputs_has_no_response_figure():

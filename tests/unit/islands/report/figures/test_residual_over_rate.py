@@ -8,6 +8,7 @@ import pytest
 
 import islands
 from islands.diagnosis.rate_effect import find_rate_effect
+from islands.effects.catalogue import CATALOGUE
 from islands.report.figures.diagnosis import BEFORE
 from islands.report.figures.residual_over_rate import draw_residual_over_rate
 from islands.report.figures.style import SIMULATED
@@ -21,12 +22,13 @@ FRICTION = 0.3
 def diagnosis(friction: float = FRICTION):
     """Return a diagnosis of a recorded simulation without dry friction, whose output has an offset."""
     rng = np.random.default_rng(5)
-    time = 0.01 * np.arange(900)
+    time = 0.01 * np.arange(500)
     u = 4 * np.sin(3 * time) * np.sin(0.8 * time + 0.5)
     simulated = 1.5 * u
     y = 0.2 + simulated - friction * np.sign(np.gradient(u)) + 0.05 * rng.standard_normal(time.size)
     record = islands.Dataset(u[:, None], y, 0.01, ("u_V",), "y_um", ("V",), "um")
-    return islands.diagnose(record, "column:y_sim", columns={"y_sim": simulated})
+    effects = [CATALOGUE[name] for name in ("coulomb-friction", "offset")]
+    return islands.diagnose(record, "column:y_sim", columns={"y_sim": simulated}, effects=effects)
 
 
 @pytest.mark.ci

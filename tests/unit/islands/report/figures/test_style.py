@@ -56,19 +56,6 @@ def test_matplotlib_settings_are_restored_after_drawing(matplotlib):
     assert dict(matplotlib.rcParams.copy()) == before
 
 
-def test_matplotlib_settings_are_restored_after_an_exception(matplotlib):
-    with pytest.raises(ZeroDivisionError), house_style():
-        raise ZeroDivisionError
-    assert matplotlib.rcParams["svg.hashsalt"] is None
-
-
-def test_matplotlib_settings_of_the_user_have_no_effect(tmp_path, matplotlib):
-    save(example(), tmp_path / "plain.svg")
-    with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "none"}):
-        save(example(), tmp_path / "expected.svg")
-    assert (tmp_path / "expected.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
-
-
 def test_file_has_no_date_no_image_and_no_font(tmp_path, matplotlib):
     save(example(), str(tmp_path / "figure.svg"))
     text = (tmp_path / "figure.svg").read_text(encoding="utf-8")

@@ -170,11 +170,6 @@ def test_texts_do_not_overlap(name):
     assert over == []
 
 
-@every_figure
-def test_text_has_at_least_seven_points(name):
-    assert min(text.get_fontsize() for text, _ in drawn(name).texts) >= 7.0
-
-
 @fast(SAVED)
 def test_saving_twice_gives_equal_bytes(name, tmp_path):
     for file in ("first", "second"):

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from islands.errors import ModelError
 from islands.records.dataset import Dataset
 from islands.report.figures.unit_curves import draw_unit_curves
 from islands.validation.ensemble import Ensemble, EnsembleStructure
-from support.latent_systems import SPRING, make_model, spring_record
+from support.latent_systems import make_model, spring_record
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("without_layout")]
@@ -35,12 +34,6 @@ def test_members_of_the_ensemble_give_a_band():
     assert not draw_unit_curves(model, record, 20).axes[0].collections
 
 
-def test_a_linear_model_has_no_curves():
-    linear = make_model({name: value for name, value in SPRING.items() if name[0] not in "ew"}, ())
-    with pytest.raises(ModelError, match="no units"):
-        draw_unit_curves(linear, spring_record(100), 20)
-
-
 def test_a_run_that_leaves_the_range_of_the_record_ends_there():
     unstable = {"a1_1": 1.05, "b1": 0.1, "c1": 1.0, "e1_1": 0.1, "w1_1": 1.0}
     record = spring_record(400)
@@ -49,11 +42,3 @@ def test_a_run_that_leaves_the_range_of_the_record_ends_there():
     # The argument is the state, which the output shows.
     assert axes.get_xlabel().startswith("y_mm, which")
     assert np.abs(line.get_xdata()).max() <= np.abs(record.y).max() + np.ptp(record.y)
-
-
-def test_a_run_that_diverges_at_once_has_no_curve():
-    record = spring_record(400)
-    model = make_model({"a1_1": 1.2, "c1": 1.0, "e1_1": 0.1, "w1_1": 1.0, "level": 1e6}, ("tanh",), 1)
-    figure = draw_unit_curves(model, record, 20)
-    assert not figure.axes
-    assert "diverges at once" in figure.get_suptitle()

@@ -40,12 +40,6 @@ def test_terms_have_the_names_of_the_columns(found):
         assert f'<th scope="row">{term}</th>' in page
 
 
-def test_figures_of_hysteresis_are_in_the_report_of_a_model_of_hysteresis_alone(found):
-    assert "Output over input" not in write(found)
-    settings = {**found.settings, "constraints": ["hysteresis"]}
-    assert "Output over input" in write(found, settings=settings)
-
-
 def test_names_of_columns_are_text(found):
     document = result_document(found.search_result)
     names = {"inputs": ["<u>"], "output": "<script>"}

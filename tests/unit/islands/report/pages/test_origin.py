@@ -15,7 +15,3 @@ def test_facts_are_those_that_are_known():
     assert known.list_facts(HASH) == [
         *("2024-02-29", version, "data set 0123456789ab", "owner alice", "job f00")
     ]
-
-
-def test_day_is_that_of_universal_time():
-    assert Origin.from_seconds("r.csv", 86_399.0).day == date(1970, 1, 1)

@@ -42,12 +42,6 @@ def test_report_of_several_outputs_has_the_equations_and_the_free_run_of_each(tm
     assert page.count("<img ") == 2
 
 
-def test_a_new_result_removes_the_report_of_the_earlier_one(folder):
-    (folder / "report.html").write_bytes(b"earlier")
-    islands.fit(record(300), lags=1, **SETTINGS).save(folder, figures=())
-    assert not (folder / "report.html").exists()
-
-
 def test_report_of_a_diagnosis_is_the_one_that_it_wrote(tmp_path):
     (tmp_path / "discrepancy.json").write_text('{"schema": "islands.discrepancy/1"}')
     with pytest.raises(ModelError, match="stopped before its report: diagnose again"):

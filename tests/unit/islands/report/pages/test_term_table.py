@@ -28,15 +28,6 @@ def test_parameter_that_the_constraints_determine_is_fixed_and_has_no_interval()
     assert (found["standard error"], found["95 % interval"]) == ("fixed", "-")
 
 
-def test_unknown_standard_error_gives_no_interval():
-    found = cells(term(1.0, None), term(1.0, 0.1))
-    assert (found["standard error"], found["95 % interval"]) == ("-", "-")
-
-
-def test_a_column_without_a_value_is_left_out():
-    assert cells(term(1.0, None)) == {"term": "y(k-1)", "parameter": "1"}
-
-
 def test_parameters_with_names_have_values():
     headings, _ = list_terms([term(1.0, None)], named=True)
     assert headings == ("parameter", "value")

@@ -72,7 +72,7 @@ def y_of_a_lag(u):
     return y
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
     """Least squares is biased by the noise; linear models are estimated for the free run as well."""
     rng = np.random.default_rng(0)

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.errors import ModelError, RecordError, SettingsError
+from islands.errors import RecordError, SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
 from islands.records.dataset import Dataset
-from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status
 from islands.simulation.predictors import (
     BOUND,
@@ -126,46 +125,6 @@ def test_divergence_only_ends_its_own_interval():
     assert np.array_equal(found[predicted], data.u[predicted - 1, 0])
 
 
-def test_divergence_outcome_names_the_earliest_interval():
-    # Lanes are sorted by length: the short last interval of the first segment follows longer ones.
-    data = record(spikes(s87=1e9, s200=1e9), segments=(90, 210))
-    found = multiple_shooting(model((1.0, "u(k-1)")), data, 40)
-    assert found.outcome.reason.endswith("at sample 88")
-
-
-def test_divergence_of_a_block_does_not_affect_the_next_block(monkeypatch):
-    # Blocks of eight lanes: the first block leaves the bound at its 41st step. The work memory still contains
-    # that value when a lane of the second block ends after 30 steps while its neighbour leaves the bound.
-    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (8,))
-    chosen, segments = model((1.0, "u(k-1)")), (31, *(101,) * 8, 61, 6)
-    u, y = np.random.default_rng(12).normal(size=(2, sum(segments)))
-    u[[31 + 40, sum(segments) - 4]] = 1e9
-    data = Dataset(u, y, 0.1, segments=segments)
-    assert layout(data, 1).length.tolist() == [100] * 8 + [60, 30, 5]
-    expected, first = simulate_scalar(chosen, data)
-    found = free_run(chosen, data)
-    assert first == 31 + 41
-    assert found.outcome.reason.endswith("at sample 72")
-    assert np.array_equal(found.y, expected, equal_nan=True)
-
-
-def test_short_intervals_prevent_divergence_of_an_unstable_model():
-    chosen = model((1.2, "y(k-1)"), (1.0, "u(k-1)"))
-    assert free_run(chosen, record()).outcome.verdict is Status.DIVERGED
-    assert multiple_shooting(chosen, record(), 20).outcome
-    assert one_step_ahead(chosen, record()).outcome
-
-
-def test_given_bound_replaces_that_of_the_record():
-    chosen, data = model((1.2, "y(k-1)"), (1.0, "u(k-1)")), record()
-    expected, first = simulate_scalar(chosen, data, bound=50.0)
-    found = free_run(chosen, data, bound=50.0)
-    assert found.outcome.reason == f"|y| left 50 at sample {first}"
-    assert np.array_equal(found.y, expected, equal_nan=True)
-    assert np.nanmax(np.abs(found.y)) <= 50.0
-    assert free_run(model((1.0, "u(k-1)")), record(spikes(s100=1e9)), bound=1e10).outcome
-
-
 @pytest.mark.parametrize(
     ("y", "scale"),
     [
@@ -194,31 +153,7 @@ def test_output_known_only_as_zero_does_not_give_a_zero_bound():
     assert found.y[-1] == pytest.approx(2.0)
 
 
-def test_missing_output_makes_the_error_nan_without_divergence():
-    data = record()
-    y = data.y.copy()
-    y[150] = math.nan
-    found = free_run(model((1.0, "u(k-1)")), replace(data, y=y))
-    assert found.outcome == OK
-    assert math.isnan(found.mean_squared_error)
-    assert np.array_equal(found.y[1:], data.u[:-1, 0])
-
-
 # Invalid arguments.
-
-
-def test_too_short_record_is_refused():
-    with pytest.raises(RecordError) as caught:
-        free_run(model((1.0, "u(k-300)")), record())
-    assert "the longest recording has 300 samples" in str(caught.value)
-    assert "the warm-up takes 300: take a longer recording" in str(caught.value)
-
-
-def test_error_for_a_too_long_warm_up_does_not_mention_lags():
-    with pytest.raises(RecordError) as caught:
-        free_run(model((1.0, "u(k-1)")), record(), warm_up=400)
-    assert "the warm-up takes 400" in str(caught.value)
-    assert "lag is" not in str(caught.value)
 
 
 @pytest.mark.parametrize("simulate", [one_step_ahead, free_run])
@@ -230,28 +165,6 @@ def test_missing_output_in_a_warm_up_is_refused(simulate):
         simulate(model((0.5, "y(k-2)")), replace(data, y=y))
     assert "the output is missing at sample 1, where a simulation starts from it" in str(caught.value)
     assert "fill the gap" in str(caught.value)
-
-
-def test_record_is_matched_with_the_model_by_columns_and_sampling_time():
-    chosen = make_model([(parse("u1(k-1)"), 1.0), (parse("u2(k-1)"), 10.0)], ("a_V", "b_V"), dt=0.1)
-    u = np.arange(18.0).reshape(9, 2)
-    data = Dataset(u, np.zeros(9), 0.1, ("a_V", "b_V"))
-    swapped = Dataset(u[:, ::-1], np.zeros(9), 0.1, ("b_V", "a_V"))
-    assert free_run(chosen, swapped).y[1:].tolist() == free_run(chosen, data).y[1:].tolist()
-    assert free_run(chosen, data).y[1] == 10.0
-    for changes, message in (
-        ({"dt": 1.0}, "the model has a sampling time of 0.1 s"),
-        ({"input_names": ("a_V", "b_mV"), "input_units": ("V", "mV")}, "some names occur in both"),
-        ({"input_names": ("a", "b"), "input_units": ("mV", "V")}, "multiply a by 0.001"),
-    ):
-        with pytest.raises(RecordError, match=message):
-            free_run(chosen, replace(data, **changes))
-
-
-def test_model_without_parameters_is_refused():
-    structure = replace(model((1.0, "u(k-1)")), theta=None)
-    with pytest.raises(ModelError, match=r"^the model has no parameters yet: estimate them first$"):
-        free_run(structure, record())
 
 
 @pytest.mark.parametrize("interval", [0, -1])

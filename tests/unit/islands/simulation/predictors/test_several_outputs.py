@@ -50,22 +50,6 @@ def test_a_free_run_equals_a_simulation_with_python_floats(model) -> None:
     np.testing.assert_array_equal(free_run(model, record).y[warm_up:], expected[warm_up:])
 
 
-def test_a_free_run_reads_the_outputs_in_the_warm_up_only() -> None:
-    record = make_coupled_record(TWO_MASSES, noise=0.05)
-    known = np.arange(record.samples) < TWO_MASSES.maximum_lag
-    blind = record.map(lambda each: replace(each, y=np.where(known, each.y, np.nan)))
-    simulated = free_run(TWO_MASSES, blind)
-    np.testing.assert_array_equal(simulated.y, free_run(TWO_MASSES, record).y)
-    assert np.isnan(simulated.mean_squared_errors).all()
-
-
-def test_an_interval_of_one_sample_is_the_prediction_one_step_ahead() -> None:
-    record = make_coupled_record(PREY, noise=0.05)
-    steps = multiple_shooting(PREY, record, 1)
-    expected = simulate_scalar(PREY, record.records[0].u[:10], record.y[:9])
-    np.testing.assert_array_equal(steps.y[9], expected[9])
-
-
 def test_a_divergence_ends_all_outputs_of_its_segment_only() -> None:
     unstable = TWO_MASSES.with_parameters((1.6, -0.8, 0.1, 5e3, 1.5, 3.0, 0.12, -0.04))
     record = make_coupled_record(TWO_MASSES, segments=(300, 100))
@@ -76,13 +60,6 @@ def test_a_divergence_ends_all_outputs_of_its_segment_only() -> None:
     assert np.isnan(simulated.y[first:300]).all()
     assert np.isfinite(simulated.y[302]).all()
     assert simulated.mean_squared_errors == (np.inf, np.inf)
-
-
-def test_means_are_simulated_from_the_samples_of_the_record() -> None:
-    means = CoupledModel(tuple(replace(each, average=2, dt=0.2) for each in TWO_MASSES.models))
-    record = make_coupled_record(TWO_MASSES)
-    averaged = record.map(lambda each: average_samples(each, 2))
-    np.testing.assert_array_equal(free_run(means, record).y, free_run(means, averaged).y)
 
 
 def test_outputs_and_inputs_are_matched_by_name() -> None:

@@ -43,14 +43,6 @@ def test_all_parameters_and_settable_states_are_the_default() -> None:
     assert [(each.variable.name, each.place) for each in found.initial] == [("v", -1)]
 
 
-def test_all_states_of_a_model_exchange_can_be_set() -> None:
-    found = choose_variables(describe(interface=FmiInterface.MODEL_EXCHANGE))
-    assert [(each.variable.name, each.place, each.sample_of) for each in found.initial] == [
-        ("x", 0, "output"),
-        ("v", 1, ""),
-    ]
-
-
 def test_start_values_of_exported_models_are_initial_values() -> None:
     names = ("start.x[1]", "start.u[2]", "start.other[1]", "gain")
     parameters = tuple(FmiVariable(name, place, start=1.0) for place, name in enumerate(names))
@@ -87,15 +79,6 @@ def test_values_tolerances_and_bounds_can_be_given() -> None:
 def test_an_unsuitable_choice_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         choose_variables(describe(), **options)
-
-
-def test_one_of_several_inputs_has_to_be_chosen() -> None:
-    several = describe(inputs=tuple(FmiVariable(f"u{place}", place) for place in range(20)))
-    with pytest.raises(SettingsError, match=r"has 20 inputs: choose input=NAME of u0, .*u11 and 8 more"):
-        choose_variables(several)
-    assert choose_variables(several, input="u7", channels=["u3"]).channels[0].name == "u3"
-    with pytest.raises(SettingsError, match="has no output that is a scalar of type real"):
-        choose_variables(describe(outputs=()))
 
 
 def test_parameters_have_to_be_chosen_if_there_are_many() -> None:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 import islands
 from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.inference.verdict import Verdict
-from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.export import write_export
@@ -106,34 +105,6 @@ def test_an_exported_model_gives_its_free_run(kind: str, dt: float, tmp_path: Pa
     np.testing.assert_allclose(found, y[1 :: round(dt / DT)], rtol=1e-12)
 
 
-def test_a_channel_drives_a_further_input() -> None:
-    record = oscillation()
-    u = np.column_stack([record.u[:, 0] - wave()[::-1], wave()[::-1]])
-    part = replace(record, u=u, input_names=("u_N", "w_N"), input_units=("N", "N"))
-    simulator = make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", part)
-    error = simulate(simulator, part) - simulate(make_simulator(f"fmu:{oscillator()}", record), record)
-    assert np.abs(error).max() < 1e-9
-    with pytest.raises(RecordError, match=r"reads the channel w, and the channels of the record are none"):
-        make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", record)
-
-
-@pytest.mark.ci
-def test_values_of_a_channel_and_the_output_in_each_others_column_are_found() -> None:
-    record, w = oscillation(noise=1e-3), 100.0 + 20.0 * wave()[::-1]
-    y = record.y + simulate_oscillator(w, 0.5, 4.0, 200.0)
-    part = replace(
-        record,
-        u=np.column_stack([record.u[:, 0], y]),
-        y=w,
-        input_names=("u_N", "w_N"),
-        input_units=("N", "N"),
-    )
-    simulator = make_simulator(f"fmu:{oscillator(disturbance=True)}?input=u&channels=w", part)
-    found = diagnose(part, simulator, dict.fromkeys("mck", 0.02), catalogue=())
-    assert found.verdict == Verdict.GROSS_ERROR
-    assert {each.name for each in found.effects} == {"swapped-channels"}
-
-
 def test_a_simulator_is_sent_to_another_process_by_its_path() -> None:
     record = oscillation()
     simulator = make_simulator(f"fmu:{oscillator()}", record)
@@ -179,14 +150,7 @@ def test_a_record_that_does_not_fit_is_refused(change: dict[str, object], query:
         make_simulator(f"fmu:{path}{query}", replace(oscillation(), **change))  # type: ignore[arg-type]
 
 
-def test_a_fixed_step_leaves_no_choice_between_samples() -> None:
-    path = oscillator(interfaces="CoSimulation", fixed_step=0.005)
-    simulator = make_simulator(f"fmu:{path}", oscillation())
-    assert not simulator.is_continuous_time
-    assert make_simulator(f"fmu:{oscillator()}", oscillation()).is_continuous_time
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_hidden_effect_is_named_and_a_clean_record_has_none(tmp_path: Path) -> None:
     """The output of the FMU is cut off at 0.15 m; the result is saved, and simulated and diagnosed again."""
     clean = oscillation(250, 0.001)

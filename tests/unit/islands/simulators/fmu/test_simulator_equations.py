@@ -9,12 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 import islands
-from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.calibration.record_simulation import simulate_spec
-from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
 from islands.diagnosis.inference.verdict import Verdict
-from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import Parameter, SimulationContext
 from islands.effects.interface.effect import Effect, Site
@@ -141,12 +137,6 @@ def simulate(
     return extended.simulate(np.array([*inner, *values]))
 
 
-def test_terms_act_as_in_written_equations() -> None:
-    found, expected = simulate(make_fmu(TERMS)), simulate(make_equations(TERMS))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-    assert np.abs(found - simulate(make_fmu({}))).max() > 0.05
-
-
 @pytest.mark.parametrize(
     ("name", "values"),
     [
@@ -174,15 +164,7 @@ def make_record(spec: FmuSpec | OdeSpec, samples: int = 300, noise: float = 1e-3
     return recorded(wave(samples), y, units=("N", "m"))
 
 
-def search(spec: FmuSpec, record: Dataset) -> TermSearchResult | None:
-    simulator = make_simulator(spec, record)
-    fitted = count_fitted_samples(record)
-    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, fitted))
-    target = make_target(record, fitted, {})
-    return search_terms(calibrate(simulation, target, simulation.nominal), target, DiagnosisRun())
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_missing_stiffness_is_discovered_in_the_equation_of_an_fmu() -> None:
     """The equations of the record have a cubic term; the extended FMU is saved and simulated again."""
     record = make_record(make_equations({"v": "- 60*d*x**3"}))
@@ -198,23 +180,6 @@ def test_a_missing_stiffness_is_discovered_in_the_equation_of_an_fmu() -> None:
     assert document["core"]["equations"] == "dv/dt = fmu(v) + a1*x**3\n"
     again = simulate_spec(document, record)
     np.testing.assert_allclose(again, found.best.output, rtol=0, atol=5e-4)
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    "interface", ["model-exchange", pytest.param("co-simulation", marks=pytest.mark.nightly)]
-)
-def test_a_clean_record_gets_no_terms(interface: str) -> None:
-    spec = FmuSpec(kind="fmu", file=oscillator(), interface=interface)  # type: ignore[arg-type]
-    assert search(spec, make_record(make_fmu({}), noise=2e-3)) is None
-
-
-@pytest.mark.ci
-def test_a_missing_term_is_discovered_in_the_output_of_a_co_simulation() -> None:
-    record = make_record(make_fmu({"output": "+ 0.9*x**2"}), samples=200)
-    found = search(FmuSpec(kind="fmu", file=oscillator(), interface="co-simulation"), record)
-    assert found is not None
-    assert found.describe().startswith("output = fmu(x) + a1*fmu(x)**2; a1 = 0.")
 
 
 @pytest.mark.parametrize(

@@ -27,11 +27,6 @@ def as_function(effect: Effect) -> Effect:
     return replace(effect, form=replace(effect.form, equation="", state_equation=""))
 
 
-def test_every_force_law_is_an_expression() -> None:
-    laws = {each.name for each in CATALOGUE.values() if isinstance(each.form, ForceLaw)}
-    assert laws == {name for name, _ in LAWS}
-
-
 @pytest.mark.parametrize(("name", "law"), LAWS)
 def test_expression_of_a_force_law_has_the_values_of_its_function(name: str, law: ForceLaw) -> None:
     pairs = [(law.equation, law.force), (law.state_equation, law.state_derivative)]

@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from islands.expressions.evaluation import evaluate
-from islands.expressions.tree import Symbol
 from islands.simulators.ode.lane_simulation import simulate_lanes
 from islands.simulators.ode.lane_values import LaneInput
 from islands.simulators.ode.program import generate_program
@@ -108,21 +107,6 @@ def test_a_lane_does_not_depend_on_the_others() -> None:
     assert np.array_equal(together[:, :, ::3], simulate_lanes(program, DT, lanes, every=3), equal_nan=True)
 
 
-MOTION = {
-    "name": "motion",
-    "input": "F",
-    "equations": "dx/dt = v\ndv/dt = (F - c*v - k*x - force)/m",
-    "output": "x",
-    "parameters": {"m": 0.5, "c": 1.2, "k": 80.0},
-    "force": {"coordinate": "x", "rate": "v"},
-}
-
-
-def motion(**changes: Any) -> LaneInput:
-    parameters = {"m": 0.5, "c": 1.2, "k": 80.0}
-    return LaneInput(parameters, {"x": 0.01, "v": 0.3}, {"F": interpolate_linearly(FORCE)}, **changes)
-
-
 def test_halving_the_step_divides_the_error_by_sixteen() -> None:
     system = make_system(
         {"name": "s", "input": "F", "equations": "dx/dt = -x**3 + F*x", "output": "x", "states": {"x": {}}}
@@ -135,29 +119,3 @@ def test_halving_the_step_divides_the_error_by_sixteen() -> None:
         errors.append(simulate_lanes(program, step, [LaneInput({}, {"x": 1.5}, {"F": signal})])[0, 0, -1])
     ratio = (errors[0] - errors[2]) / (errors[1] - errors[2])
     assert ratio == pytest.approx(16.0, rel=0.25)
-
-
-def test_limits_hold_a_state_and_leave_other_lanes() -> None:
-    program = generate_program(make_system(MOTION), (Symbol("x"), Symbol("v")))
-    limits = {"x": (-0.02, 0.03)}
-    lanes = [motion(), motion(limits=limits), motion(limits=limits, spills={"x": ("v", 0.5)})]
-    free, limited, spilled = simulate_lanes(program, DT, lanes)
-    for lane, found in zip(lanes, (free, limited, spilled), strict=True):
-        assert np.array_equal(found, simulate_lanes(program, DT, [lane])[0])
-    assert not np.array_equal(limited, spilled)
-    assert (limited[0].min(), limited[0].max()) == (-0.02, 0.03)
-    assert free[0].max() > 0.03
-
-
-def test_parts_without_states_are_computed_once() -> None:
-    """Sections: parameters alone, signals, states, outputs."""
-    document = {
-        "name": "s",
-        "input": "F",
-        "equations": "dx/dt = exp(a)*atan(F) - exp(a)*(x*b) - x*b + a*b\nunused = sqrt(x)",
-        "output": "2*x*b + atan(F)",
-        "parameters": {"a": 1.0, "b": 2.0},
-    }
-    ends = generate_program(make_system(document)).instructions.ends
-    # exp, a*b; atan, product; x*b, difference with product, difference, sum; 2*x, sum with product.
-    assert np.diff(ends, prepend=0).tolist() == [2, 2, 4, 2]

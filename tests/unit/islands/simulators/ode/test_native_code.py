@@ -123,16 +123,6 @@ def test_restarted_runs_have_the_bits_of_the_interpreter(
     assert not np.isfinite(native[2, -1]).all()
 
 
-def test_functions_of_the_library_remain_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_code, "COMPILED_FROM", 0)
-    monkeypatch.setattr(native_code, "_compile", pytest.fail)
-    system = make_system(
-        {"name": "s", "input": "F", "equations": "dx/dt = F - atan(x)", "output": "x", "states": {"x": {}}}
-    )
-    lane = LaneInput({}, {"x": 0.0}, {"F": interpolate_linearly(FORCE)})
-    assert np.isfinite(simulate_lanes(generate_program(system), DT, [lane])).all()
-
-
 def test_program_is_compiled_once_it_has_run_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     program = generate_program(make_system(ARITHMETIC))
     monkeypatch.setattr(native_code, "COMPILED_FROM", 3 * SAMPLES * len(program.instructions.code))
@@ -169,17 +159,6 @@ def test_damaged_code_is_compiled_again(
     forget_programs(monkeypatch)
     assert simulate_lanes(program, DT, make_lanes()).tobytes() == native.tobytes()
     assert {file: file.read_bytes() for file in files} == stored
-
-
-def test_programs_run_without_a_folder_to_store_them(
-    empty_store: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = generate_program(make_system(ARITHMETIC))
-    for folder in (None, empty_store / "deleted"):
-        monkeypatch.setattr(native_code, "cache_folder", lambda folder=folder: folder)
-        forget_programs(monkeypatch)
-        interpreted, native = simulate_natively(program, make_lanes(), monkeypatch)
-        assert native.tobytes() == interpreted.tobytes()
 
 
 def test_the_older_half_of_too_many_programs_is_deleted(

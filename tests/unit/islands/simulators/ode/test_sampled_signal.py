@@ -25,12 +25,6 @@ def test_the_delay_of_a_held_signal_keeps_its_mean() -> None:
     assert delayed.start[0] == FORCE[0]
 
 
-def test_the_rate_of_a_held_signal_is_that_of_a_ramp_to_the_next_value() -> None:
-    rate = SampledSignal.join(FORCE, FORCE, FORCE).differentiate(DT)
-    assert rate.middle[:-1] == pytest.approx(np.diff(FORCE) / DT)
-    assert rate.end[-1] == 0.0
-
-
 def test_the_rate_of_a_parabola_is_exact() -> None:
     time = np.array([0.0, 0.1, 0.2])
     parabola = SampledSignal.join(*((time + ahead) ** 2 for ahead in (0.0, 0.05, 0.1)))
@@ -57,14 +51,3 @@ def test_the_rate_of_a_signal_with_kinks_is_continuous_in_its_values() -> None:
     ones = np.ones(last.size)
     signal = SampledSignal(np.column_stack([0.0 * ones, ones, ones + last]), has_kinks=True)
     assert np.abs(np.diff(signal.differentiate(1.0).moments, axis=0)).max() <= 6.01e-3
-
-
-def test_a_divided_step_keeps_lines_parabolas_and_held_values() -> None:
-    line, held = interpolate_linearly(FORCE).refine(3), SampledSignal.join(FORCE, FORCE, FORCE).refine(4)
-    steps = np.arange(3 * SAMPLES) / 3
-    assert line.middle == pytest.approx(np.interp(steps + 1 / 6, np.arange(SAMPLES), FORCE), abs=1e-13)
-    assert line.end[:-1] == pytest.approx(line.start[1:], abs=1e-13)
-    for part in (held.start, held.middle, held.end):
-        assert np.array_equal(part, np.repeat(FORCE, 4))
-    parabola = SampledSignal.join(*((np.array([0.0, 0.1]) + ahead) ** 2 for ahead in (0.0, 0.05, 0.1)))
-    assert parabola.refine(2).end == pytest.approx(np.array([0.05, 0.1, 0.15, 0.2]) ** 2, abs=1e-15)

@@ -2,14 +2,11 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-import islands
 from islands.effects.catalogue import CATALOGUE
-from islands.expressions.tree import Symbol
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.ode import native_code
@@ -104,23 +101,6 @@ def test_shooting_fits_the_states_of_every_interval() -> None:
     assert set(np.flatnonzero(jumps > 1e-4) % 50) <= {49}
 
 
-def test_only_intervals_whose_states_change_are_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
-    simulate, asked = IntervalSimulation.simulate, []
-
-    def watch(simulation: IntervalSimulation, lanes: Any, states: Any, is_asked: Any) -> Any:
-        asked.append(int(np.count_nonzero(is_asked)))
-        return simulate(simulation, lanes, states, is_asked)
-
-    monkeypatch.setattr(IntervalSimulation, "simulate", watch)
-    record, _ = make_sticking_axis(0, samples=300)
-    truth = {"m": 2.0, "c": 6.0, "F": 4.0, "vs": 0.01}
-    simulator = make_simulator(PhysicalSpec(kind="rigid-axis", parameters=truth), record)
-    simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    simulation.simulate(simulation.nominal)
-    assert min(asked) > 0
-    assert min(asked) < max(asked)
-
-
 def make_sticking_axis(seed: int, samples: int = 1500) -> tuple[Dataset, float]:
     """Return a record of an axis that sticks at times, with 2 % of noise, and the noise."""
     rng = np.random.default_rng(seed)
@@ -145,36 +125,6 @@ def test_shots_of_an_axis_that_sticks_have_the_error_of_the_noise(seed: int) -> 
     simulator = make_simulator(PhysicalSpec(kind="rigid-axis", parameters=truth), record)
     simulation = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
     assert np.std(record.y - simulation.simulate(simulation.nominal)) < 1.02 * sigma
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_noise_hardly_changes_the_estimate_of_an_axis(seed: int) -> None:
-    record, _ = make_sticking_axis(seed)
-    simulator = make_simulator("rigid-axis", record)
-    found = {each.name: each.nominal for each in simulator.parameters}
-    assert found["m"] == pytest.approx(2.0, rel=0.2)
-    assert found["c"] == pytest.approx(6.0, rel=0.2)
-
-
-def test_recordings_begin_with_a_shooting_interval() -> None:
-    record = made()["rigid-axis"].record
-    both = islands.join((record[:330], record[330:]))
-    spec = made()["rigid-axis"].spec
-    simulator = make_simulator(spec, both)
-    joined = ExtendedSimulator(simulator, (), make_context(both, simulator, both.samples))
-    output = joined.simulate(joined.nominal)
-    part = make_simulator(spec, both).for_samples(330, 600)  # type: ignore[attr-defined]
-    alone = ExtendedSimulator(part, (), make_context(record[330:], part, 270))
-    assert np.array_equal(output[330:], alone.simulate(alone.nominal))
-
-
-def test_interval_is_no_longer_than_the_record() -> None:
-    """With samples of a nanosecond half a second has more of them than fit into memory."""
-    record = replace(made()["rigid-axis"].record, dt=1e-9)
-    simulator = make_simulator(made()["rigid-axis"].spec, record)
-    assert isinstance(simulator, OdeSimulator)
-    assert simulator.shots is not None
-    assert simulator.shots.interval == record.samples
 
 
 @pytest.fixture(params=["interpreted", "native"])
@@ -217,23 +167,6 @@ def test_each_interval_has_the_bits_of_a_separate_simulation(program: OdeProgram
         assert np.array_equal(found[run, number, : expected.size], expected)
     fewer = IntervalSimulation(program, DT, lanes, "xvz", INTERVAL, every=3)
     assert np.array_equal(fewer.simulate(order, states, is_asked)[:, 0], found[..., ::3], equal_nan=True)
-
-
-def test_other_states_are_kept(program: OdeProgram) -> None:
-    """A state that is not given at the restarts is that of the sample before."""
-    lanes = make_lanes()[:2]
-    states = np.random.default_rng(3).standard_normal((2, INTERVALS, 2))
-    kept = generate_program(make_system(MOTION), (Symbol("z"), Symbol("x"), Symbol("v")))
-    simulation = IntervalSimulation(kept, DT, lanes, "xv", INTERVAL)
-    is_asked = np.zeros((2, INTERVALS), dtype=bool)
-    is_asked[1, 2] = True
-    found = simulation.simulate(np.array([0, 1]), states, is_asked)
-    assert not simulation.is_independent
-    assert np.isnan(found[0]).all()
-    z, x, v = found[1]
-    assert np.array_equal(np.stack([x[:, 0], v[:, 0]], axis=-1), states[1])
-    assert np.abs(np.diff(z.reshape(-1)[:SAMPLES])).max() < 0.1
-    assert np.ptp(z[:, 0]) > 0.0
 
 
 def test_divergence_is_that_of_one_interval(program: OdeProgram) -> None:

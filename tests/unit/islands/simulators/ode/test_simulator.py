@@ -1,6 +1,5 @@
 """Simulators that are equations: examples, several runs at once, mistakes in files."""
 
-import json
 from functools import cache
 from pathlib import Path
 
@@ -94,51 +93,6 @@ def test_every_parameter_of_an_example_has_a_unit_and_an_effect(simulation: Exte
         values[place] += simulation.scales[place]
         assert parameter.unit, parameter
         assert 1e-8 < np.max(np.abs(simulation.simulate(values) - before)) / np.ptp(before) < 10.0, parameter
-
-
-def test_a_finer_step_hardly_changes_an_example(simulation: ExtendedSimulator) -> None:
-    """The sampling times of the records suit the examples."""
-    before = simulation.simulate(simulation.nominal)
-    finer = ResampledSimulator(simulation.simulator, InterSample.FOH, 4)
-    after = ExtendedSimulator(finer, (), simulation.context).simulate(simulation.nominal)
-    assert np.max(np.abs(after - before)) < 2e-3 * np.ptp(before)
-
-
-def test_the_description_of_an_example_is_complete(simulation: ExtendedSimulator) -> None:
-    values = simulation.nominal * 1.01
-    spec = describe_extension(simulation.simulator, values, ("drive", "room_degC"), "y")
-    again = parse_spec_of(spec.model_dump(mode="json"))
-    assert again == spec
-    changed = make_simulator(again, make_record(simulation.simulator.name)).parameters
-    expected = [value for each, value in zip(changed, values, strict=True) if not each.initial]
-    assert [each.nominal for each in changed if not each.initial] == expected
-
-
-def parse_spec_of(document: dict[str, object]) -> object:
-    spec = type(parse_spec(path_of("second-order")))
-    return spec.model_validate(json.loads(json.dumps(document)))
-
-
-def test_an_offset_of_the_oscillator_is_an_offset_of_its_force() -> None:
-    ours = example("second-order")
-    offset = ours.simulate(ours.nominal, {"input-offset:v": 3.0 / 0.5})
-    moved = ExtendedSimulator(ours.simulator, (), ours.context)
-    assert np.mean(offset - moved.simulate(moved.nominal)) == pytest.approx(3.0 / 200.0, rel=0.05)
-
-
-def test_a_limit_of_a_state_holds_in_both_directions() -> None:
-    ours = example("second-order")
-    values = np.array([0.5, 4.0, 200.0, 0.0, 0.0])
-    limited = ours.simulate(values, {"state-clip:x": 0.05})
-    assert (limited.min(), limited.max()) == (-0.05, 0.05)
-    assert np.ptp(ours.simulate(values)) > 0.2
-
-
-def test_a_range_of_a_state_has_a_lower_and_an_upper_limit() -> None:
-    ours = example("second-order")
-    values = np.array([0.5, 4.0, 200.0, 0.0, 0.0])
-    limited = ours.simulate(values, {"state-range:x lower": -0.02, "state-range:x upper": 0.05})
-    assert (limited.min(), limited.max()) == (-0.02, 0.05)
 
 
 def test_effects_enter_where_the_file_says() -> None:
@@ -262,7 +216,7 @@ def test_equations_without_states_are_simulated(tmp_path: Path) -> None:
     assert np.array_equal(again.simulate(again.nominal), 3.0 * record.u[:, 0])
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_missing_term_of_equations_without_states_is_discovered(tmp_path: Path) -> None:
     path, record = make_static(tmp_path)
     diagnosis = islands.diagnose(record, path, effects=FEW)
@@ -313,7 +267,7 @@ def simulate_motor(samples: int, friction: float) -> tuple[Array, Array]:
     return u, speeds
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_dry_friction_that_the_equations_lack_is_named() -> None:
     """The parameters differ from those of the file by less than their tolerances, which therefore apply."""
     u, speed = simulate_motor(600, 4e-3)

@@ -94,6 +94,7 @@ def test_exchanged_columns_are_found(name: str, places: tuple[int, int]) -> None
     assert (found.verdict, found.effects[0].name) == (Verdict.GROSS_ERROR, "swapped-channels")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("effect", CHANNELS)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_effect_of_a_channel_is_named(name: str, effect: str) -> None:

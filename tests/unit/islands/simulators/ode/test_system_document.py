@@ -78,11 +78,6 @@ def test_a_wrong_term_is_refused(
         make_system(DOCUMENT).with_term(target, term, parameters)
 
 
-def test_other_values_keep_everything_else() -> None:
-    changed = make_system(DOCUMENT).with_values({"k": 5.0, "initial x1": 3.0})
-    assert changed == make_system(change(parameters={**DOCUMENT["parameters"], "k": 5.0}))
-
-
 @pytest.mark.parametrize(
     ("fields", "message"),
     [

@@ -12,10 +12,6 @@ from islands.simulators.specification.table import parse_spec
 from support.simulated_records import write_fmu
 
 
-def test_a_file_alone_leaves_every_choice_to_the_description() -> None:
-    assert parse_spec("fmu:axis.fmu") == FmuSpec(kind="fmu", file="axis.fmu")
-
-
 def test_names_and_values_follow_the_file() -> None:
     names = "input=u&output=x&channels=w,T&parameters=m,c=4.5,K[1,2]=-1e3&initial="
     assert parse_spec(f"fmu:axis.fmu?{names}&interface=co-simulation") == FmuSpec(

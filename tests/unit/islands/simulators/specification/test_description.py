@@ -19,15 +19,12 @@ from islands.export.extension import as_json
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document, extended_json
 from islands.simulators.extended import ExtendedSimulator, SavedExtension, make_context
-from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import (
     LocalExtendedSpec,
     ModelSpec,
-    PhysicalSpec,
     innermost,
-    parse_spec,
 )
 from support.simulated_records import SpecAndRecord, made, names
 
@@ -113,14 +110,6 @@ def test_each_single_effect_has_the_output_of_the_written_simulation(case: SpecA
         assert_same_output(case, extend(case, [effect]))
 
 
-def test_the_initial_state_of_an_effect_is_fitted() -> None:
-    case, effect = made()["bouc-wen-piezo"], CATALOGUE["second-hysteresis"]
-    fit = extend(case, [effect])
-    values = fit.values.copy()
-    values[fit.simulation.get_slice(effect)] = (0.2, 0.05, 0.0, 8.0)
-    assert_same_output(case, replace(fit, values=values, output=fit.simulation.simulate(values)))
-
-
 def test_effects_of_channels_find_the_columns_of_the_record() -> None:
     case = made()["bouc-wen-piezo"]
     time = np.arange(case.record.samples)
@@ -148,30 +137,6 @@ def test_a_document_is_unchanged_after_reading_and_writing(case: SpecAndRecord) 
     assert isinstance(simulator, SavedExtension)
     values = np.array([parameter.nominal for parameter in simulator.parameters])
     assert as_json(describe_extension(simulator, values, spec.inputs, spec.output)) == text
-
-
-def test_a_built_in_system_keeps_the_steps_per_sample_of_its_diagnosis() -> None:
-    """The damper needs four steps; with the calibrated values one step would not diverge."""
-    case = made()["second-order"]
-    damped = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 500.0, "k": 200.0})
-    simulator = make_simulator(damped, case.record)
-    assert isinstance(simulator, OdeSimulator)
-    assert simulator.system.steps == 4
-    values = np.array([0.5, 4.0, 200.0, 0.0, 0.0])
-    written = describe_extension(simulator, values, case.record.input_names, case.record.output_name)
-    again = make_simulator(PhysicalSpec.model_validate_json(written.model_dump_json()), case.record)
-    assert isinstance(again, OdeSimulator)
-    assert again.system.steps == 4
-    context = make_context(case.record, simulator, case.record.samples)
-    ours, theirs = (ExtendedSimulator(each, (), context).simulate(values) for each in (simulator, again))
-    assert np.array_equal(ours, theirs)
-
-
-def test_a_file_of_an_extension_is_parsed_as_a_model(case: SpecAndRecord, tmp_path) -> None:
-    text = extended_json(extend(case, effect_of_each_site(case)[:1]), case.record)
-    path = tmp_path / "extended.json"
-    path.write_text(text)
-    assert as_json(parse_spec(f"model:{path}")) == text
 
 
 def test_an_extension_can_be_extended_again(case: SpecAndRecord) -> None:
@@ -263,25 +228,6 @@ def test_an_invalid_document_is_refused_with_a_reason(reason: str) -> None:
     with pytest.raises(error) as raised:
         simulate_spec(document, oscillator.record)
     assert words in str(raised.value)
-
-
-def test_columns_of_a_record_are_matched_with_those_of_the_document() -> None:
-    oscillator = made()["second-order"]
-    record = oscillator.record
-    with_channel = replace(
-        record,
-        u=np.column_stack([record.u, np.zeros(record.samples)]),
-        input_names=("u_N", "T_K"),
-        input_units=("N", "K"),
-    )
-    document = extended_document(extend(oscillator, [CATALOGUE["cubic-stiffness"]]), with_channel)
-    reversed_columns = replace(
-        with_channel, u=with_channel.u[:, ::-1], input_names=("T_K", "u_N"), input_units=("K", "N")
-    )
-    expected = simulate_spec(document, with_channel)
-    assert simulate_spec(document, reversed_columns).tolist() == expected.tolist()
-    with pytest.raises(RecordError, match=r"multiply u_mN by 0\.001"):
-        simulate_spec(document, replace(with_channel, input_names=("u_mN", "T_mK"), input_units=("mN", "mK")))
 
 
 def test_a_document_has_the_states_at_the_first_sample_of_its_record() -> None:

@@ -12,7 +12,6 @@ from islands.simulators.specification.base import SimulatorEntry
 from islands.simulators.specification.table import (
     SIMULATORS,
     ExtendedSpec,
-    LocalExtendedSpec,
     LocalSpec,
     PhysicalSpec,
     SimulationSpec,
@@ -31,10 +30,6 @@ def members(annotated: object) -> set[type]:
     return set(get_args(union))
 
 
-def test_the_local_union_has_the_models_of_the_table() -> None:
-    assert members(LocalSpec) == {entry.spec for entry in SIMULATORS.values()} | {LocalExtendedSpec}
-
-
 def test_the_remote_union_has_the_remote_models_of_the_table() -> None:
     remote = {entry.spec for entry in SIMULATORS.values() if entry.is_remote}
     assert members(SimulationSpec) == remote | {ExtendedSpec}
@@ -45,23 +40,8 @@ def test_an_entry_has_its_name_as_key_and_kind(entry: SimulatorEntry) -> None:
     assert entry.name in get_args(entry.spec.model_fields["kind"].annotation)
 
 
-def test_an_entry_has_a_summary_without_a_final_period(entry: SimulatorEntry) -> None:
-    assert entry.summary
-    assert not entry.summary.endswith(".")
-
-
 def test_a_factory_can_be_imported_and_takes_three_arguments(entry: SimulatorEntry) -> None:
     assert len(signature(resolve_name(entry.factory)).parameters) == 3
-
-
-def test_only_physical_systems_have_parameters_in_the_table(entry: SimulatorEntry) -> None:
-    assert bool(entry.parameters) == (entry.spec is PhysicalSpec)
-
-
-def test_physical_systems_are_parsed_without_arguments() -> None:
-    for name, entry in SIMULATORS.items():
-        if entry.spec is PhysicalSpec:
-            assert parse_spec(name) == PhysicalSpec(kind=name)
 
 
 @pytest.mark.parametrize(

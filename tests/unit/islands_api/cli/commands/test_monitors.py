@@ -39,21 +39,6 @@ def run(service: Service, monkeypatch: pytest.MonkeyPatch, command_line: Run) ->
 
 
 @pytest.mark.ci
-def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
-    code, shown, _ = run(*CREATE, "--false-alarms", "1 per 720 records", "--name", "press 4", "--json")
-    made = json.loads(shown)
-    assert (code, made["spec"]["false_alarms"]) == (0, "1 per 720 records")
-    assert made["id"] in run("show")[1]
-    assert run("show", made["id"])[1] == f"monitor {made['id']} (press 4): waiting, records 0, alarms 0\n"
-    code, _, complaint = run("show", made["id"], "--out", "states")
-    assert code == 2
-    assert "waits for its first record" in complaint
-    assert run("delete", made["id"])[0] == 0
-    code, _, complaint = run("show", made["id"])
-    assert (code, "no monitor" in complaint) == (2, True)
-
-
-@pytest.mark.ci
 def test_the_states_of_a_monitor_are_shown_and_downloaded(
     run: Run, command_line: Run, service: Service, tmp_path: Path
 ) -> None:

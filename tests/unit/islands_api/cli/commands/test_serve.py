@@ -30,14 +30,6 @@ def test_lease_shorter_than_a_second_is_rejected(tmp_path: Path, lease: float) -
         service_settings(data_dir=tmp_path, lease=lease)
 
 
-def test_password_of_the_database_is_no_argument_of_a_process(tmp_path: Path) -> None:
-    """Every user of the machine can read the arguments."""
-    settings = ServiceSettings(data_dir=tmp_path, database="postgresql+psycopg://me:secret@host/islands")
-    commands = [role.command for role in roles(settings, 3, 4)]
-    assert len(commands) == 3 + settings.coordinators
-    assert "secret" not in repr(commands)
-
-
 def test_the_reader_of_files_has_no_settings_of_the_service(tmp_path: Path) -> None:
     """A file may make it execute code, and the settings contain secrets."""
     (reader,) = [role for role in roles(ServiceSettings(data_dir=tmp_path), 3, 4) if role.name == "reader"]

@@ -55,22 +55,6 @@ def test_migrations_create_the_tables_of_the_code(empty_database):
                 assert foreign["options"] == {"ondelete": "CASCADE"}
 
 
-def test_new_database_is_empty(empty_database):
-    with Store(empty_database) as store:
-        assert not any(contents(store).values())
-        submitted(store)
-
-
-def test_repeated_preparation_changes_nothing(database):
-    with Store(database) as store:
-        submitted(store)
-        before = contents(store)
-        prepare(store.database)
-        with store.database.exclusive() as connection:
-            upgrade(connection)
-        assert contents(store) == before
-
-
 def test_concurrent_preparation_of_new_databases_succeeds(empty_database, tmp_path):
     urls = [empty_database]
     if empty_database.startswith("sqlite"):

@@ -2,99 +2,16 @@
 
 import json
 import shutil
-import signal
 
 import pytest
 
-from islands.persistence.checkpoints import read_checkpoint, write_hall
-from islands.records.dataset import Dataset
 from islands.records.writer import write_record
-from support.identify_runs import COLUMNS, DEEPEST, SMALL, TWO, models, record, refused
+from support.identify_runs import COLUMNS, DEEPEST, SMALL, record, refused
 
 # Files of a run.
 
 
-@pytest.mark.ci
-def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
-    code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4", "--figures", "all")
-    assert (code, error) == (0, "")
-    assert "out/: result.json, models/, figures/, summary.txt, method.txt" in out
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "checkpoint.json",
-        "figures",
-        "hall.json",
-        "method.txt",
-        "models",
-        "result.json",
-        "summary.txt",
-    }
-    assert {"convergence.svg", "front.svg", "free-run.svg", "loop.svg", "hold.svg"} <= {
-        path.name for path in (tmp_path / "out/figures").iterdir()
-    }
-    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
-    assert (search["generations"], search["evaluations"]) == (3, 40)
-    feasible = sum(search["outcomes"].get(name, 0) for name in ("ok", "abandoned"))
-    assert search["feasible_share"] == feasible / 40
-    assert search["wall_s"] > 0
-    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
-    assert archipelago.generation == 3
-    assert about["job"]["seed"] == archipelago.islands[0].seed == 4
-    assert [about["history"][at][0] for at in (0, -1)] == [0, 3]
-    assert search["ended_by"] == "generations"
-
-
-@pytest.mark.ci
-def test_signal_handlers_are_restored_after_a_run(run):
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
-    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
-
-
-@pytest.mark.ci
-def test_files_of_an_earlier_run_are_deleted(run, tmp_path):
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--test", "0.2")[0] == 0
-    assert (tmp_path / "out/test.json").exists()
-    assert (tmp_path / "out/hall.json").exists()
-    assert "--force" in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out"))
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--force")[0] == 0
-    assert not (tmp_path / "out/test.json").exists()
-    code, _, error = run(
-        "r.csv", *COLUMNS, *SMALL, "--out", "out", "--force", "--seed", "9", "--wall-time", "1e-9"
-    )
-    assert code == 0
-    assert error.startswith("stopped: the result is the best so far")
-    assert read_checkpoint(tmp_path / "out/checkpoint.json")[1]["job"]["seed"] == 9
-
-
-@pytest.mark.ci
-def test_hall_of_fame_of_all_islands_is_written_with_the_checkpoint(run, tmp_path):
-    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
-    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
-    assert len(archipelago.islands) == 2
-    write_hall(archipelago.hall_of_fame, tmp_path / "expected.json")
-    assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "expected.json").read_bytes()
-    best = [min(entry.fitness for entry in island.hall_of_fame.entries) for island in archipelago.islands]
-    assert about["history"][-1][3] == best
-
-
 # Test data.
-
-
-@pytest.mark.ci
-def test_values_of_the_test_data_do_not_change_the_models(run, tmp_path):
-    assert run("r.csv", *COLUMNS, *SMALL, "--out", "one", "--test", "0.2")[0] == 0
-    spoilt = record()
-    y = spoilt.y.copy()
-    y[560:] = 5.0 + 0.01 * y[560:]
-    write_record(Dataset(spoilt.u, y, spoilt.dt, ("u_V",), "y_um"), "r.csv")
-    code, out, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "other", "--test", "0.2")
-    assert code == 0
-    assert models(tmp_path / "one") == models(tmp_path / "other")
-    assert json.loads((tmp_path / "one/result.json").read_text())["record"]["samples"] == 560
-    good, bad = (json.loads((tmp_path / name / "test.json").read_text()) for name in ("one", "other"))
-    assert good["outcome"] == bad["outcome"] == "ok"
-    assert good["mape"] < 1.0 < bad["mape"]
-    assert f"not used before: free run ok, MAPE {bad['mape']:.4f} %" in out
 
 
 @pytest.mark.parametrize(

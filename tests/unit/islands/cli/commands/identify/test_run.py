@@ -3,7 +3,6 @@
 import json
 import signal
 from contextlib import contextmanager
-from math import inf
 
 import pytest
 
@@ -11,10 +10,8 @@ from islands.cli.runs import identify as command
 from islands.cli.runs import timed_engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.search_state import HistoryPoint, SearchState
-from islands.persistence.checkpoints import read_checkpoint, state_document, write_checkpoint
-from islands.records.writer import write_record
-from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
+from islands.persistence.checkpoints import read_checkpoint, write_checkpoint
+from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, refused
 
 pytestmark = pytest.mark.ci
 
@@ -67,20 +64,6 @@ def test_ctrl_c_in_the_last_generation_leaves_out_the_refinement(run, interrupte
     assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
-@pytest.mark.parametrize(
-    ("signals", "code"),
-    [((signal.SIGINT, signal.SIGINT), 130), ((signal.SIGTERM, signal.SIGTERM), 0)],
-)
-def test_second_ctrl_c_interrupts_and_keeps_finished_epochs(run, interrupted, tmp_path, signals, code):
-    """A second SIGTERM has no further effect: process managers may send it twice."""
-    interrupted(1, *signals)
-    before = signal.getsignal(signal.SIGINT)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == code
-    assert (tmp_path / "out/result.json").exists() == (code == 0)
-    assert signal.getsignal(signal.SIGINT) is before
-    assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
-
-
 @pytest.mark.parametrize("outputs", ["y_um", "y_um,z_um"])
 def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_path, outputs):
     """Ray takes a second to end."""
@@ -102,33 +85,6 @@ def test_ctrl_c_while_the_engine_ends_keeps_the_result(run, monkeypatch, tmp_pat
     assert (tmp_path / "out/result.json").exists()
 
 
-def test_epoch_is_kept_if_its_display_fails(run, watched, tmp_path):
-    def broken(state):
-        if state.archipelago.generation == 2:
-            raise OSError(28, "No space left on device")
-
-    watched(broken)
-    assert "No space left" in run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[2]
-    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
-    assert archipelago.generation == about["history"][-1][0] == 2
-
-
-def test_infinite_fitness_is_stored_as_null_and_restored(tmp_path):
-    """JSON has no infinity."""
-    history = (
-        HistoryPoint(0, 20, {}, (inf, inf)),
-        HistoryPoint(1, 40, {2: 0.1 + 0.2}, (0.1 + 0.2, inf)),
-        HistoryPoint(2, 60, {1: 0.0, 2: 5e-324}, (0.0, 5e-324)),
-    )
-    state = SearchState(empty_archipelago(2, 5), 60, 7, {"ok": 31, "diverged": 29}, history)
-    header = {"job": {"seed": 5}, "wall_s": 12.5, **state_document(state)}
-    assert [least for *_, least in header["history"]] == [[None, None], [0.1 + 0.2, None], [0.0, 5e-324]]
-    path = tmp_path / command.CHECKPOINT
-    write_checkpoint(state.archipelago, path, header)
-    assert "Infinity" not in path.read_text()
-    assert command.load_run(tmp_path) == ({"seed": 5}, state, 12.5)
-
-
 def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "whole")[0] == 0
     engines(Broken())
@@ -138,24 +94,6 @@ def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     engines(SerialEngine())
     assert run("--resume", "out")[0] == 0
     assert models(tmp_path / "out") == models(tmp_path / "whole")
-
-
-def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tmp_path):
-    """An epoch takes six seconds of the replaced clock."""
-    clock, found = [0.0], []
-    for module in (command, timed_engine):
-        monkeypatch.setattr(module, "monotonic", lambda: clock[0])
-
-    def watch(state):
-        clock[0] += 6.0
-        path = tmp_path / "out/checkpoint.json"
-        found.append(read_checkpoint(path)[0].generation if path.exists() else None)
-
-    watched(watch)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--generations", "6", "--out", "out")[0] == 0
-    # The first populations are written immediately.
-    assert found == [None, 0, 0, 2, 2, 4, 4]
-    assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
 
 
 def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
@@ -179,29 +117,6 @@ def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     assert "stopped" in run("--resume", "out", "--wall-time", "5")[2]
     assert json.loads((tmp_path / "out/result.json").read_text())["search"]["generations"] == 2
     assert run("--resume", "out")[2] == ""
-
-
-def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted, tmp_path):
-    interrupted(0)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 130
-    path = tmp_path / "out/checkpoint.json"
-    document = json.loads(path.read_text())
-    document["about"]["wall_s"] += 1000.0
-    path.write_text(json.dumps(document))
-    assert run("--resume", "out")[0] == 0
-    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
-    assert 1000 < search["wall_s"] < 1100
-    assert 1000 < json.loads(path.read_text())["about"]["wall_s"] < search["wall_s"]
-    assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
-
-
-def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monkeypatch):
-    write_record(record(seed=1), "v.csv")
-    interrupted(1)
-    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--validation", "v.csv")[0] == 130
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path / "elsewhere")
-    assert run("--resume", "../out")[0] == 0
 
 
 def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
@@ -257,26 +172,3 @@ def test_engine_is_chosen_by_the_options_and_the_number_of_islands(run, engines,
     # A resumed run has the same number of islands.
     assert run("--resume", "out", *words)[0] == 0
     assert requested == [expected] * 2
-
-
-def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
-    requested = engines(SerialEngine())
-    assert run("r.csv", *COLUMNS, *TWO, "--out", "whole")[0] == 0
-    interrupted(1)
-    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 130
-    interrupted(None)
-    words = (
-        "--engine",
-        "ray",
-        "--set",
-        "ray_address=there:6379",
-        "--wall-time",
-        "1e9",
-        "--set",
-        "verbose=true",
-    )
-    code, out, _ = run("--resume", "out", *words)
-    assert code == 0
-    assert "cache of structures: " in out
-    assert requested == [("serial", None, 2), ("serial", None, 2), ("ray", "there:6379", 2)]
-    assert models(tmp_path / "out") == models(tmp_path / "whole")

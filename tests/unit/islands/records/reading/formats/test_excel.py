@@ -47,8 +47,3 @@ def test_a_given_sheet_without_a_table_is_named_with_those_that_have_one(write, 
     """The message was that the workbook has no sheet with a table."""
     with pytest.raises(RecordError, match=words):
         preview(write(*sheets), ReadingOptions(sheet="Info"))
-
-
-def test_an_unknown_sheet_is_refused_with_a_similar_one(write):
-    with pytest.raises(RecordError, match=r"no sheet Dat; its sheets are Info, Data\. Did you mean 'Data'"):
-        read_record(write("Data"), ["u"], "y", sheet="Dat")

@@ -5,7 +5,6 @@ import os
 import tempfile
 import zipfile
 
-import numpy as np
 import pytest
 
 from islands.errors import RecordError
@@ -33,17 +32,6 @@ def folder(tmp_path, monkeypatch):
     assert list(folder.iterdir()) == []
 
 
-def test_arrays_in_an_archive_are_read_on_demand(tmp_path):
-    np.savez(tmp_path / "r.npz", u=np.arange(60.0), y=np.arange(60.0) ** 2, dt=0.1)
-    (tmp_path / "r.npz.gz").write_bytes(gzip.compress((tmp_path / "r.npz").read_bytes()))
-    assert read_record(tmp_path / "r.npz.gz", ["u"], "y").dt == 0.1
-
-
-def test_messages_name_the_line_of_the_unpacked_file(tmp_path):
-    (tmp_path / "r.csv.gz").write_bytes(gzip.compress(TEXT.replace(b"0.1,", b"off,", 1)))
-    assert "r.csv, line 12, column t_s" in refusal(tmp_path / "r.csv.gz")
-
-
 def test_a_bomb_is_refused_while_it_unpacks(tmp_path, monkeypatch):
     monkeypatch.setattr("islands.records.reading.size_limits.MOST_UNPACKED", 500)
     monkeypatch.setattr("islands.records.reading.formats.packed._CHUNK", 256)
@@ -52,13 +40,6 @@ def test_a_bomb_is_refused_while_it_unpacks(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "r.zip", "w") as archive:
         archive.writestr("../../r.csv", TEXT)
     assert "r.zip unpacks to more than" in refusal(tmp_path / "r.zip")
-
-
-def test_the_folders_of_a_member_are_not_made(tmp_path, folder):
-    with zipfile.ZipFile(tmp_path / "r.zip", "w") as archive:
-        archive.writestr("../../../outside/r.csv", TEXT)
-    assert read_record(tmp_path / "r.zip", ["u_V"], "y_um").samples == 60
-    assert not (tmp_path / "outside").exists()
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Parquet files: types of numbers, times in the unit of their name, and checks of declared sizes."""
 
 import struct
-from datetime import UTC, date, datetime, timedelta
 from decimal import Decimal
 
 import numpy as np
@@ -11,7 +10,6 @@ from pyarrow import parquet
 
 from islands.errors import RecordError
 from islands.records.reading import read_columns, read_record
-from islands.records.reading.formats.parquet import read_parquet
 from islands.records.reading.size_limits import MOST_SAMPLES
 
 SAMPLES = 60
@@ -65,23 +63,12 @@ def test_numbers_of_every_kind_become_double_precision(write, column):
     assert read_record(write(u_V=column), ["u_V"], "y_um").u[:, 0].tolist() == K.tolist()
 
 
-def test_booleans_are_zero_and_one_and_large_integers_are_rounded(write):
-    file = write(on=pa.array((K % 2 == 1).tolist()), large=pa.array((2**62 + K).tolist()))
-    table = read_parquet(file)
-    assert table.load("on").tolist() == (K % 2).tolist()
-    assert table.load("large")[0] == 2.0**62
-
-
 @pytest.mark.parametrize("kind", [pa.float64(), pa.int32(), pa.decimal128(9, 3)])
 def test_a_null_is_a_missing_value(write, kind):
     column = pa.array([None if k == 17 else k for k in K.tolist()], kind)
     assert "r.parquet, sample 17, column u_V is empty or NaN" in refusal(write(u_V=column))
     record = read_record(write(y_um=column), ["u_V"], "y_um", missing_output=True)
     assert np.flatnonzero(np.isnan(record.y)).tolist() == [17]
-
-
-def test_a_column_of_nulls_alone_is_empty(write):
-    assert "column u_V has no values" in refusal(write(u_V=pa.nulls(SAMPLES)))
 
 
 @pytest.mark.parametrize(
@@ -105,13 +92,6 @@ def test_only_the_requested_columns_are_read(write):
     file.write_bytes(content[:place] + b"\xff" * 24 + content[place + 24 :])
     assert read_record(file, ["u_V"], "y_um").samples == SAMPLES
     assert "r.parquet is damaged or not a Parquet file" in refusal(file, ["other"])
-
-
-def test_a_name_may_contain_points_and_be_a_prefix_of_another(write):
-    record = read_record(write(**{"k_N.m": U, "k_N": Y}), ["k_N.m"], "k_N")
-    assert record.u[:, 0].tolist() == U.tolist()
-    assert record.y.tolist() == Y.tolist()
-    assert record.input_units == ("N.m",)
 
 
 # Times
@@ -140,12 +120,6 @@ def test_points_in_time_are_relative_to_the_first_in_any_unit(write, name, colum
     assert record.start == pytest.approx(1.0)
 
 
-def test_nanoseconds_keep_their_precision(write):
-    """In seconds since 1970, double precision would give these stamps a jitter of a quarter of their step."""
-    record = read_record(timed(write, "time", stamps("ns", 1e-6)), ["u_V"], "y_um")
-    assert record.dt == pytest.approx(1e-6, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("kind", "step"),
     [
@@ -159,23 +133,6 @@ def test_durations_and_times_of_day_are_times(write, kind, step):
     column = pa.array([int(k) * step + 10 * step for k in K], kind)
     record = read_record(timed(write, "t_ms", column), ["u_V"], "y_um")
     assert (record.dt, record.start) == (pytest.approx(0.125), pytest.approx(1.25))
-
-
-@pytest.mark.parametrize("kind", [pa.date32(), pa.date64()], ids=str)
-def test_dates_are_a_day_apart(write, kind):
-    column = pa.array([date(2024, 1, 1) + timedelta(days=int(k)) for k in K], kind)
-    assert read_record(timed(write, "time", column), ["u_V"], "y_um").dt == 86_400.0
-
-
-def test_a_missing_point_in_time_is_refused_by_sample(write):
-    column = [datetime(2024, 1, 1, tzinfo=UTC) + timedelta(seconds=int(k)) for k in K]
-    column[9] = None
-    assert "sample 9, column time is empty or NaN" in refusal(timed(write, "time", pa.array(column)))
-
-
-def test_a_gap_in_time_is_refused_by_sample(write):
-    column = [datetime(2024, 1, 1, tzinfo=UTC) + timedelta(seconds=int(k + 5 * (k > 30))) for k in K]
-    assert "sample 31, column time follows a gap" in refusal(timed(write, "time", pa.array(column)))
 
 
 # Damaged files, wrong sizes, and the optional dependency
@@ -192,14 +149,6 @@ def test_a_gap_in_time_is_refused_by_sample(write):
 def test_a_file_of_another_format_is_refused(tmp_path, content, words):
     (tmp_path / "r.parquet").write_bytes(content)
     assert words in refusal(tmp_path / "r.parquet")
-
-
-def test_a_file_truncated_at_any_position_is_refused(write):
-    file = write()
-    content = file.read_bytes()
-    for length in range(1, len(content) - 1, 97):
-        file.write_bytes(content[:length])
-        assert "r.parquet is damaged or not a Parquet file" in refusal(file)
 
 
 def varint(number):

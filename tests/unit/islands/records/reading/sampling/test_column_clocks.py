@@ -116,7 +116,7 @@ def test_columns_of_different_clocks_give_the_law_at_the_rate_of_the_slowest(tmp
     assert f", every {record.dt:.4g} s" in record.reading[0].partition("read at those of ")[2]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("case", ["empty cells", "held"])
 def test_the_defaults_find_the_law_of_columns_of_different_clocks(tmp_path, case):
     """Held values gave a dead time of nine samples, terms of friction and twelve times the error."""
@@ -127,28 +127,6 @@ def test_the_defaults_find_the_law_of_columns_of_different_clocks(tmp_path, case
     assert best.metrics["validation"]["free_run"].rmse < 1.2 * NOISE
 
 
-@pytest.mark.parametrize("delay", [0.1, 0.25, 0.3])
-@pytest.mark.parametrize("first", [0.0, 0.003])
-def test_no_shift_in_time(tmp_path, first, delay):
-    """The smallest lag to which the output responds is that of the simulated dead time."""
-    record = read(tmp_path, join(sample(0.01), sample(0.1, first), delay))
-    found = islands.inspect_record(record).find("dead-time").value
-    assert isinstance(found, float)
-    assert abs(found - 1 - delay / 0.1) < 1.6
-    lags = np.array([np.roll(record.u[:, 0], lag) for lag in range(6)] + [np.roll(record.y, 1)])[:, 8:]
-    weights = np.linalg.lstsq(lags.T, record.y[8:])[0][:6]
-    # A dead time of 2.5 samples is between lags of 3 and 4: the mean of both, weighted by their response.
-    centre = weights @ np.arange(6) / weights.sum()
-    assert centre == pytest.approx(delay / 0.1 + 1, abs=0.06)
-
-
-def test_a_faster_input_can_be_sampled(tmp_path):
-    frame = join(sample(0.01), sample(0.1))
-    record = read(tmp_path, frame, rates="sample")
-    assert np.allclose(record.u[:, 0], frame["u_V"].to_numpy()[::10], rtol=1e-5)
-    assert "the value at each for u_V" in record.reading[0]
-
-
 def test_an_input_that_is_held_with_the_output_does_not_hide_its_clock(tmp_path):
     """Two sensors of one slow logger, one of them an input or another output, and a fast command."""
     frame = hold(0.1)
@@ -157,16 +135,6 @@ def test_an_input_that_is_held_with_the_output_does_not_hide_its_clock(tmp_path)
     record = read_record(tmp_path / "r.csv", ["u_V", "other"], "y_mm")
     assert (record.dt, record.samples) == (0.1, 600)
     assert np.array_equal(record.u[:, 1], frame["other"].to_numpy()[::10])
-
-
-def test_a_logger_that_repeats_all_columns_has_the_clock_of_their_changes(tmp_path):
-    u, y = signals()
-    at = np.repeat(sample(0.1), 10)
-    noisy = u[at] + np.repeat(np.random.default_rng(9).normal(0.0, 0.001, 600), 10)
-    frame = pd.DataFrame({"time_s": 0.01 * np.arange(6000), "u_V": noisy, "y_mm": y[at]})
-    record = read(tmp_path, frame)
-    assert (record.dt, record.samples) == (0.1, 600)
-    assert fit_law(record)[2] < 0.013
 
 
 def test_a_faster_input_of_a_static_system_is_sampled_by_default(tmp_path):
@@ -192,17 +160,6 @@ def test_a_faster_input_that_varies_between_samples_is_averaged_by_default(tmp_p
     assert errors[0] < 0.3 * errors[1]
 
 
-def test_every_row_is_a_sample_on_request(tmp_path):
-    record = read(tmp_path, hold(0.1), rates="rows")
-    assert (record.dt, record.samples, record.reading) == (pytest.approx(0.01), round(END / 0.01), ())
-
-
-def test_a_mean_of_a_command_at_rest_is_its_level(tmp_path):
-    record = read(tmp_path, join(sample(0.01), sample(0.1)))
-    levels = np.unique(read(tmp_path, join(sample(0.01), sample(0.1)), rates="sample").u)
-    assert np.isin(record.u, levels).all()
-
-
 def test_a_mean_of_a_smooth_input_is_its_integral(tmp_path):
     """A smooth input that were held between its samples would be late by half of their step."""
     fast, slow = 0.03 * np.arange(2000), 0.1 * np.arange(600)
@@ -226,13 +183,6 @@ def test_resampling_interpolates_each_column_between_its_samples(tmp_path, step)
         assert gain == pytest.approx(GAIN, rel=0.04)
 
 
-def test_a_missing_sample_of_the_slow_output_is_a_missing_output(tmp_path):
-    frame = join(sample(0.01), sample(0.1))
-    frame.loc[[100, 110, 2000], "y_mm"] = np.nan
-    record = read(tmp_path, frame)
-    assert np.flatnonzero(np.isnan(record.y)).tolist() == [10, 11, 200]
-
-
 def test_a_gap_of_the_fast_input_is_refused_with_its_row(tmp_path):
     frame = join(sample(0.01), sample(0.1))
     frame.loc[1004:1006, "u_V"] = np.nan
@@ -244,32 +194,12 @@ def test_a_gap_of_the_fast_input_is_refused_with_its_row(tmp_path):
     assert record.segments == (100, 499)
 
 
-def test_time_without_a_time_column(tmp_path):
-    frame = join(sample(0.01), sample(0.1)).drop(columns="time_s")
-    record = read(tmp_path, frame, dt=0.01)
-    assert (record.dt, record.samples) == (pytest.approx(0.1), 600)
-
-
-def test_a_frame_is_read_like_a_file():
-    record = islands.as_record(join(sample(0.01), sample(0.1)), inputs="u_V", output="y_mm")
-    assert (record.dt, record.samples) == (pytest.approx(0.1), 600)
-
-
 def test_a_simulation_extends_to_the_end_of_its_inputs(tmp_path):
     frame = join(sample(0.01), sample(0.1))
     frame.loc[400:, "y_mm"] = np.nan
     record = read(tmp_path, frame, missing_output=True)
     assert (record.dt, record.samples) == (pytest.approx(0.1), 600)
     assert np.isfinite(record.y).sum() == 40
-
-
-def test_the_preview_names_the_clocks(tmp_path):
-    join(sample(0.01), sample(0.1, 0.003)).to_csv(tmp_path / "r.csv", index=False)
-    found = preview(tmp_path / "r.csv")
-    assert [column.problem for column in found.columns] == ["", "", ""]
-    assert found.dt == pytest.approx(0.1)
-    (warning,) = found.warnings
-    assert warning == "columns have samples at different times: u_V every 0.01 s, y_mm every 0.1 s"
 
 
 def test_the_preview_of_a_file_without_a_time_counts_rows(tmp_path):

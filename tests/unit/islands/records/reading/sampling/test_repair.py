@@ -33,20 +33,6 @@ def blank(values, *samples):
     return values
 
 
-def test_a_record_without_defects_is_unchanged_by_the_options(tmp_path):
-    plain = read(tmp_path, rows())
-    for options in ({"gaps": "split"}, {"gaps": "interpolate"}):
-        repaired = read(tmp_path, rows(), **options)
-        assert np.array_equal(repaired.u, plain.u)
-        assert (repaired.dt, repaired.segments, repaired.reading) == (plain.dt, (400,), ())
-
-
-def test_gaps_are_counted_and_the_longest_is_named(tmp_path):
-    message = refusal(tmp_path, gone(rows(), 50, 120, 121, 122))
-    assert "line 50, column t_s follows a gap: the time changes from 0.47 to 0.49" in message
-    assert '2 gaps, the longest of 0.04 before line 119; give gaps="split"' in message
-
-
 def test_gaps_become_segments(tmp_path):
     record = read(tmp_path, gone(rows(), 50, 120, 121, 122), gaps="split")
     assert record.segments == (48, 69, 279)
@@ -81,13 +67,6 @@ def test_missing_values_are_named_interpolated_or_separate_segments(tmp_path):
     assert split.reading[0] == "left out: 3 rows with missing values, the first is line 102"
 
 
-def test_an_output_that_may_be_missing_remains_missing(tmp_path):
-    table = rows(u=blank(U, 100), y=blank(Y, *range(10, 400)))
-    record = read(tmp_path, table, gaps="interpolate", missing_output=True)
-    assert np.isnan(record.y[10:]).all()
-    assert np.isfinite(record.u).all()
-
-
 def test_missing_values_at_the_ends_are_left_out(tmp_path):
     table = rows(u=blank(U, 0, 1, 399))
     record = read(tmp_path, table, gaps="interpolate")
@@ -119,10 +98,6 @@ def test_stamps_that_are_printed_too_coarsely_are_repeated_and_replaced_by_dt(tm
     assert "repeats the time stamp 0 (320 of 400 rows do)" in refusal(tmp_path, table)
     assert "or, if only the printed time is too coarse, dt=DT" in refusal(tmp_path, table)
     assert read(tmp_path, table, dt=DT).dt == DT
-
-
-def test_dt_does_not_hide_a_gap(tmp_path):
-    assert "follows a gap" in refusal(tmp_path, gone(rows(), *range(100, 110)), dt=DT)
 
 
 def test_repeated_rows_are_left_out_and_other_rows_of_equal_time_averaged(tmp_path):
@@ -177,18 +152,6 @@ def test_resampling_does_not_cross_a_gap_unless_it_is_to_be_interpolated(tmp_pat
     whole = read(tmp_path, table, resample=0.02, gaps="interpolate")
     assert whole.samples == 200
     assert "interpolated: a gap of 0.31 before line 100" in whole.reading[0]
-
-
-def test_steps_of_irregular_sampling_are_not_gaps(tmp_path):
-    t = np.cumsum(np.random.default_rng(2).exponential(DT, 400))
-    record = read(tmp_path, rows(t, np.sin(t), np.cos(t)), resample=DT)
-    assert np.abs(record.u[:, 0] - np.sin(record.time)).max() < 2e-3
-
-
-def test_a_record_without_time_is_resampled_from_dt(tmp_path):
-    table = [line.partition(",")[2] for line in rows()]
-    record = read(tmp_path, table, dt=DT, resample=0.005)
-    assert (record.samples, record.dt) == (799, 0.005)
 
 
 def test_a_grid_with_too_many_samples_is_refused(tmp_path):

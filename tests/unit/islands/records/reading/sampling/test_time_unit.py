@@ -3,12 +3,10 @@
 from datetime import datetime, timedelta
 
 import numpy as np
-import pandas as pd
 import pytest
 
-import islands
 from islands.errors import RecordError, SettingsError
-from islands.records.reading import preview, read_record
+from islands.records.reading import read_record
 from support.bad_records import refusal
 
 SAMPLES = 300
@@ -41,21 +39,6 @@ def test_days_of_excel_at_one_minute_are_not_seconds(tmp_path, name):
     (note,) = record.reading
     assert note.startswith(f"column {name} is read as days: 45987.5 is 2025-11-26 12:00:00 (Excel); ")
     assert "give it the time unit s" in note
-
-
-def test_jitter_of_a_clock_in_days_is_reported_in_seconds(tmp_path):
-    late = np.random.default_rng(1).integers(0, 13, SAMPLES)
-    stamps = 45987.5 + (60 * K + late) / 86_400
-    message = refusal(tmp_path, table("Time", stamps, 9).split("\n"), ("u",), "y")
-    assert "the usual step is 6" in message
-    assert "resample=6" in message
-    assert read(tmp_path, "Time", stamps, resample=60.0).dt == 60.0
-
-
-def test_a_gap_in_days_is_a_gap(tmp_path):
-    stamps = 45987.5 + np.where(K < 100, K, K + 30) / 1440
-    record = read(tmp_path, "Date", stamps, gaps="split")
-    assert (record.dt, record.segments) == (60.0, (100, 200))
 
 
 @pytest.mark.parametrize(
@@ -91,10 +74,6 @@ def test_numbers_that_may_be_both_are_read_by_their_header_and_said_so(tmp_path)
 def test_a_given_unit_overrules_what_is_inferred(tmp_path, unit, step):
     record = read(tmp_path, "Date", 45987.5 + K / 1440, time_unit=unit)
     assert (record.dt, record.reading) == (pytest.approx(step, rel=1e-6), ())
-
-
-def test_a_given_unit_overrules_the_name(tmp_path):
-    assert read(tmp_path, "t_s", 0.25 * K, time_unit="h").dt == 900.0
 
 
 @pytest.mark.parametrize(
@@ -158,20 +137,6 @@ def test_times_of_day_of_a_spreadsheet_are_fractions_of_a_day(tmp_path, digits):
 def test_a_short_time_in_seconds_is_no_time_of_day(tmp_path, first, step, digits):
     record = read(tmp_path, "Time", first + step * K, digits)
     assert (record.dt, record.reading) == (pytest.approx(step, rel=1e-4), ())
-
-
-def test_the_preview_states_the_unit(tmp_path):
-    (tmp_path / "r.csv").write_text(table("Date", 45987.5 + K / 1440, 9))
-    found = preview(tmp_path / "r.csv")
-    assert found.dt == 60.0
-    assert any("column Date is read as days" in warning for warning in found.warnings)
-
-
-def test_a_column_of_a_frame_is_read_like_that_of_a_file():
-    frame = pd.DataFrame({"Date": 45987.5 + K / 1440, "u": K % 7, "y": K * K % 11})
-    record = islands.as_record(frame, inputs="u", output="y")
-    assert record.dt == pytest.approx(60.0, rel=1e-6)
-    assert "read as days" in record.reading[0]
 
 
 def test_time_stamps_have_no_unit(tmp_path):

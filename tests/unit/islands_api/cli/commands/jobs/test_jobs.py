@@ -3,8 +3,6 @@
 import json
 import os
 import re
-import signal
-import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +11,7 @@ from typing import Any
 import pytest
 
 from islands_service.domain.job import JobOutcome
-from support.command_line import COLUMNS, ISLANDS
+from support.command_line import COLUMNS
 from support.processes import eventually
 from support.service import FIGURES, Service, ahead, kept, spec
 from support.stores import FAILED, brought_on, taken
@@ -90,30 +88,6 @@ def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, ow
     assert json.loads(out)["problem"]["detail"] == "it broke"
 
 
-@pytest.mark.ci
-def test_interrupting_watch_does_not_cancel_the_job(service: Service, owner: str) -> None:
-    job = ahead(service, owner)
-    taken(service.store, job)
-    with subprocess.Popen(
-        [ISLANDS, "jobs", "show", job, "--watch"],
-        env={**os.environ},
-        stderr=subprocess.PIPE,
-        text=True,
-        # A shell ignores SIGINT in background processes, and the child would inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no thread yet
-    ) as process:
-        # The command has received one answer and waits for a change.
-        eventually(lambda: any(each.get("path") == f"/v1/jobs/{job}" for each in service.logs))
-        time.sleep(0.3)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert f"the job continues: 'islands jobs show {job} --watch' follows it again" in err
-    assert "Traceback" not in err
-    now = service.store.jobs.get(owner, job)
-    assert (now.state, now.cancel_requested) == ("running", False)
-
-
 # Results.
 
 
@@ -153,25 +127,6 @@ def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) 
 
 
 # Errors: one line, exit code 2.
-
-
-@pytest.mark.ci
-def test_jobs_are_renamed_tagged_and_found(run: Run, service: Service, owner: str) -> None:
-    job, other = ahead(service, owner, name="one"), ahead(service, owner, name="two")
-    assert run("label", job, "--name", "[red] stage")[1] == f"job {job}: [red] stage, no tags\n"
-    assert (
-        run("label", job, "--tag", "rig 2", "--tag", "cold")[1]
-        == f"job {job}: [red] stage, tags: rig 2, cold\n"
-    )
-    for filters in (["--tag", "cold"], ["--search", "STAGE rig"]):
-        out = run("list", "--kind", "identification", *filters)[1]
-        assert job in out
-        assert "[red] stage [rig 2] [cold]" in out
-        assert other not in out
-    assert run("label", job, "--tag", "")[1] == f"job {job}: [red] stage, no tags\n"
-    code, _, err = run("list", "--tag", "a,b")
-    assert code == 2
-    assert "tag" in err
 
 
 @pytest.mark.parametrize(

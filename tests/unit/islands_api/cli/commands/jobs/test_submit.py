@@ -1,6 +1,5 @@
 """``islands jobs submit`` and ``diagnose`` in this process: submitted values and errors."""
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import fields
@@ -14,8 +13,7 @@ from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome
 from islands_service.domain.job_spec import Identification
 from islands_service.store.blobs import Blobs
 from support.command_line import COLUMNS
-from support.oscillator_fmus import write_oscillator
-from support.service import Service, csv, held
+from support.service import Service, held
 from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
@@ -127,51 +125,6 @@ def diagnosed(service: Service, owner: str) -> str:
     found = JobOutcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
     service.store.leases.finish(taken(service.store, job), found)
     return job
-
-
-@pytest.mark.ci
-def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: str) -> None:
-    words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--set", "priority=5")
-    code, out, err = run("diagnose", "r.csv", *COLUMNS, *words, "--rows", "0:150", "--json")
-    assert (code, err) == (0, "")
-    job = json.loads(out)
-    assert (job["kind"], job["name"], job["priority"]) == (DISCREPANCY, "r.csv", 5)
-    wanted = {"tolerance": {"dp": 0.01}, "seed": 3, "rows": "0:150"}
-    assert job["spec"] == {
-        **held(job["spec"]["dataset"], **wanted),
-        "simulation": {"kind": "bouc-wen-piezo", "parameters": {}},
-    }
-    code, out, err = run("show", job["id"])
-    assert out.splitlines()[0] == f"job {job['id']}: queued"
-
-
-@pytest.mark.ci
-def test_the_fmu_of_a_diagnosis_is_uploaded(serve: Any, command_line: Run, tmp_path: Path) -> None:
-    (tmp_path / "r.csv").write_bytes(csv())
-    content = write_oscillator(tmp_path / "mass.fmu").read_bytes()
-    (tmp_path / "fmu.toml").write_text('file = "mass.fmu"\n[parameters]\nk = { value = 150, fixed = true }\n')
-
-    def diagnose(argument: str) -> tuple[int, str, str]:
-        words = ("--simulation", argument, "--url", service.url, "--json")
-        return command_line("jobs", "diagnose", "r.csv", *COLUMNS, *words)
-
-    with serve(rate=0, allow_fmus=True) as service:
-        asked = []
-        for argument in ("fmu:mass.fmu?parameters=m,k=150", "fmu:fmu.toml"):
-            code, out, err = diagnose(argument)
-            assert (code, err) == (0, "")
-            asked.append(json.loads(out)["spec"]["simulation"])
-        (fmu,) = service.client.get("/v1/fmus").json()["items"]
-        code, _, err = diagnose("fmu:mass.fmu?parameters=mm")
-    assert fmu["sha256"] == hashlib.sha256(content).hexdigest()
-    assert asked == [
-        {"kind": "fmu", "file": fmu["id"], "parameters": {"m": {}, "k": {"value": 150.0}}},
-        {"kind": "fmu", "file": fmu["id"], "parameters": {"k": {"value": 150.0, "fixed": True}}},
-    ]
-    assert (code, "mass.fmu has no parameter 'mm'" in err) == (2, True)
-    with serve(rate=0, allow_fmus=False) as service:
-        code, _, err = diagnose("fmu:mass.fmu")
-    assert (code, "ISLANDS_ALLOW_FMUS=true" in err) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -38,15 +38,6 @@ def test_row_and_column_vectors_are_columns(save, version, shape):
     assert (record.dt, record.start) == (pytest.approx(0.01), 0.0)
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("kind", ["f4", "i2", "u1", "i4"])
-def test_every_class_of_numbers_becomes_double_precision(save, version, kind):
-    u = (np.arange(SAMPLES) % 3).astype(kind)
-    record = read_record(save(version, u=u, y=Y, Ts=0.1), ["u"], "y")
-    assert record.u.dtype == np.float64
-    assert record.u[:4, 0].tolist() == [0.0, 1.0, 2.0, 0.0]
-
-
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
 @pytest.mark.parametrize("kind", ["i1", "u2", "u4", "i8", "u8", "?"])
 def test_integers_of_all_widths_and_logicals_are_read(save, version, kind):
@@ -61,10 +52,6 @@ def test_a_file_may_state_its_sampling(save, version, name, value):
     record = read_record(save(version, u=U, y=Y, **{name: value}), ["u"], "y", rows=slice(10, None))
     assert record.dt == pytest.approx(0.004)
     assert record.start == pytest.approx(0.04)
-
-
-def test_a_sampling_time_that_is_not_a_positive_number_is_refused(save):
-    assert "array Ts states the sampling as 0.0" in refusal(save("7", u=U, y=Y, Ts=0.0))
 
 
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
@@ -101,19 +88,6 @@ def test_a_matrix_of_another_shape_is_refused_with_its_shape(save, version, shap
     assert "one array per channel" in message
 
 
-def test_a_cube_is_refused_with_its_shape(save):
-    for version in WITH_STRUCTURES:
-        assert "column u has the shape (2, 3, 40)" in refusal(
-            save(version, u=np.ones((2, 3, 40)), y=Y, Ts=0.1)
-        )
-
-
-def test_a_matrix_is_not_split_if_a_column_name_is_taken(save):
-    file = save("7", u=np.column_stack([U, Y]), u_1=Y, u_2=U, y=Y, Ts=0.1)
-    assert read_columns(file) == ("u", "u_1", "u_2", "y", "Ts")
-    assert read_record(file, ["u_1"], "u_2").u[:, 0].tolist() == Y.tolist()
-
-
 # Structures
 
 
@@ -127,11 +101,6 @@ def test_the_fields_of_a_structure_are_columns(save, version):
     assert record.u.tolist() == np.column_stack([U, Y]).tolist()
     assert record.y.tolist() == Y.tolist()
     assert (record.input_units[0], record.output_unit) == ("V", "um")
-
-
-def test_a_structure_name_is_not_a_unit_of_its_fields(save):
-    record = read_record(save("7", my_data={"u": U, "y": Y, "t": T}), ["my_data.u"], "my_data.y")
-    assert (record.input_units, record.output_unit) == (("",), "")
 
 
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
@@ -162,11 +131,6 @@ def test_a_field_that_may_be_a_time_in_an_unknown_unit_is_named(save):
     assert "if run.t_weeks is the time, end its name in one of the units s, ms" in message
 
 
-def test_a_structure_with_a_name_like_time_is_not_the_time(save):
-    file = save("7", time1={"u": U, "y": Y}, u=U, y=Y, t=T)
-    assert read_record(file, ["u"], "y").dt == pytest.approx(0.01)
-
-
 # Unsupported classes
 
 
@@ -191,13 +155,6 @@ def test_an_unsupported_class_is_refused_with_advice_only_when_read(save, versio
     assert refusal(file, [place]) == (
         f"r.mat: column {place} holds {kind} where real numbers are expected: {ADVICE[kind].format(x=place)}"
     )
-
-
-@pytest.mark.parametrize("kind", ["char", "complex", "sparse"])
-def test_unsupported_classes_of_version_4_are_refused_only_when_read(save, kind):
-    file = save("4", u=U, y=Y, odd=NO_CHANNELS[kind], Ts=0.1)
-    assert read_record(file, ["u"], "y").samples == SAMPLES
-    assert f"column odd holds {kind}" in refusal(file, ["odd"])
 
 
 @pytest.mark.parametrize("version", ["6", "7"])

@@ -73,15 +73,6 @@ def test_an_object_named_ts_is_refused_with_advice_only_when_read(write, kind, w
     assert ADVICE.get(kind, "one vector per channel").format(x="ts") in message
 
 
-def test_internal_variables_of_matlab_are_not_columns(write):
-    file = write(numbers("", U), numbers("__function_workspace__", U))
-    assert read_columns(file) == ("u", "y", "Ts")
-
-
-def test_a_function_handle_is_refused_with_advice(write, refusal):
-    assert "column x holds function_handle" in refusal(write(matrix("x", "function_handle", (1, 1))))
-
-
 # Other formats and truncated files
 
 
@@ -151,20 +142,6 @@ def test_numbers_of_an_unknown_type_are_refused(write, refusal):
     assert "column x cannot be read (its numbers have the unknown type 65535)" in refusal(file)
 
 
-def test_a_damaged_structure_does_no_harm(write, refusal):
-    corrupt = matrix("", "double", (60, 1), element(DOUBLE, U.tobytes()), size=8000)
-    file = write(packed(structure("s", a=numbers("", Y), b=corrupt)), structure("r", b=corrupt))
-    assert read_record(file, ["u"], "y").samples == len(U)
-    for name in "sr":
-        assert f"column {name} cannot be read (an element declares 8000 bytes" in refusal(file, [name])
-
-
-def test_an_empty_field_may_have_no_bytes(write, refusal):
-    file = write(structure("s", a=element(MATRIX, b""), b=numbers("", U)))
-    assert read_record(file, ["s.b"], "y").samples == len(U)
-    assert "column s.a has the shape (0, 0)" in refusal(file, ["s.a"])
-
-
 def test_a_damaged_field_does_no_harm(write, refusal):
     file = write(structure("s", a=numbers("", Y, shape=(61, 1)), b=numbers("", U)))
     assert read_record(file, ["s.b"], "y").samples == len(U)
@@ -187,12 +164,6 @@ def test_a_file_with_too_many_variables_is_refused(write, monkeypatch, refusal):
 
 
 # Wrong sizes
-
-
-def test_a_shape_with_too_few_numbers_is_refused(write, refusal):
-    for variable in (numbers("x", U, shape=(2**27, 1)), packed(numbers("x", U, shape=(2**27, 1)))):
-        message = refusal(write(variable))
-        assert "it declares the shape (134217728, 1) but has 60 numbers" in message
 
 
 @pytest.mark.parametrize("shape", [(2**28, 1), (2**31 - 1, 2**31 - 1)])

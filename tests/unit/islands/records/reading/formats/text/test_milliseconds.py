@@ -1,11 +1,10 @@
 """A column of milliseconds belongs to the time stamps next to it."""
 
-import numpy as np
 import pytest
 
 from islands.errors import RecordError
 from islands.records.reading import read_record
-from islands.records.reading.formats.text.milliseconds import append_milliseconds, find_milliseconds
+from islands.records.reading.formats.text.milliseconds import find_milliseconds
 
 
 def write(tmp_path, stamp, name="ms", last="200"):
@@ -37,8 +36,3 @@ def test_a_row_without_a_cell_of_each_column_is_refused_with_its_line(tmp_path):
     path.write_text(path.read_text() + "09:12:12,0,1\n")
     with pytest.raises(RecordError, match="line 62, column y: the line has 3 cells for 4 columns"):
         read_record(path, ["u"], "y")
-
-
-def test_milliseconds_are_padded_with_zeros():
-    assert append_milliseconds("09:12:30 AM", "7") == "09:12:30.007 AM"
-    assert np.isclose(float(append_milliseconds("00:00:05", "50")[6:]), 5.05)

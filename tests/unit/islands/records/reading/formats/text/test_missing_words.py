@@ -77,23 +77,6 @@ def test_words_of_the_user_are_missing_values(tmp_path):
     assert any("-9999" in note for note in record.reading)
 
 
-def test_a_word_of_the_user_may_fill_the_first_samples(tmp_path):
-    rows = [line.split(",") for line in lines()]
-    for row in rows[1:9]:
-        row[1] = row[2] = "Vorlauf"
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join(["Messung", "Versuch 3", *(",".join(row) for row in rows)]))
-    record = read_record(path, ["u_V"], "y_um", missing=["Vorlauf"], gaps="split")
-    assert record.samples == 52
-
-
-def test_a_number_of_the_user_is_missing_in_an_array(tmp_path):
-    u = np.random.default_rng(1).normal(size=60)
-    y = np.where(np.arange(60) == 7, -9999.0, u)
-    np.savez(tmp_path / "r.npz", u=u, y=y, dt=0.1)
-    assert np.isnan(read_record(tmp_path / "r.npz", ["u"], "y", missing="-9999").y[7])
-
-
 def test_an_empty_word_is_refused():
     with pytest.raises(SettingsError, match="empty"):
         ReadingOptions(missing=("OL", " "))

@@ -43,12 +43,6 @@ def test_separated_thousands_are_read(tmp_path, thousands, mark):
     assert "is read with thousands separated" in preview(path).warnings[-1]
 
 
-def test_a_number_with_two_readings_is_read_like_the_others(tmp_path):
-    cells = ["1,234,567.5", *(f"{k},{k:03d}" for k in range(1, 60))]
-    (tmp_path / "r.csv").write_text("\n".join(table(cells)))
-    assert read_record(tmp_path / "r.csv", ["u"], "y").y[:3].tolist() == [1234567.5, 1001.0, 2002.0]
-
-
 def test_numbers_with_two_readings_are_refused_unless_the_mark_is_given(tmp_path):
     rows = table([f"{k},{k:03d}" for k in range(1, 61)], "\t", "{:.0f}")
     message = refusal(tmp_path, rows, ["u"], "y", dt=0.01)

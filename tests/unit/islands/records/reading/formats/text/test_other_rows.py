@@ -62,37 +62,8 @@ def test_a_header_after_a_restart_begins_a_segment(tmp_path, between, seconds):
     assert any("2 segments" in note for note in record.reading)
 
 
-def test_the_header_of_each_page_does_not_interrupt_a_recording(tmp_path):
-    pages = [row for at in range(0, len(ROWS), 20) for row in (HEAD, *ROWS[at : at + 20])]
-    record = read_record(write(tmp_path, *pages), ["u_V"], "y_um")
-    assert record.segments == (len(ROWS),)
-    assert record.samples == len(ROWS)
-
-
 def test_gaps_are_repaired_within_each_recording(tmp_path):
     second = shift(ROWS[30:], 100.0)
     path = write(tmp_path, HEAD, *ROWS[:10], *ROWS[13:30], HEAD, *second)
     assert read_record(path, ["u_V"], "y_um", gaps="split").segments == (10, 17, len(second))
     assert read_record(path, ["u_V"], "y_um", gaps="interpolate").segments == (30, len(second))
-
-
-def test_recordings_of_different_steps_are_refused(tmp_path):
-    slow = [f"{float(row.split(',')[0]) * 3:.2f},{row.split(',', 1)[1]}" for row in ROWS[30:]]
-    path = write(tmp_path, HEAD, *ROWS[:30], HEAD, *slow)
-    with pytest.raises(RecordError, match="the rows from line 33"):
-        read_record(path, ["u_V"], "y_um")
-
-
-def test_properties_of_an_oscilloscope_are_left_out(tmp_path):
-    rows = [f"{k},{row.split(',')[1]},{row.split(',')[2]},," for k, row in enumerate(ROWS)]
-    path = write(tmp_path, "X,CH1,CH2,Start,Increment", "Sequence,Volt,Volt,-0.1,0.01", *rows)
-    record = read_record(path, ["CH1"], "CH2")
-    assert record.samples == len(ROWS)
-    assert (record.dt, record.output_unit, record.reading) == (0.01, "V", ())
-
-
-def test_keys_with_values_above_a_table_are_ignored(tmp_path):
-    keys = ["Trace_Name; Trace", "Version; 3.5.17", "Timeout; 5", "", "[Variables]", "0.Name; PLC.u"]
-    more = ["0.Color; 255", "1.Name; PLC.y", "1.Color; 128", "", "[Data]", "Time; PLC.u; PLC.y"]
-    path = write(tmp_path, *keys, *more, *(row.replace(",", "; ") for row in ROWS))
-    assert read_record(path, ["PLC.u"], "PLC.y").samples == len(ROWS)

@@ -54,12 +54,6 @@ def test_units_with_other_prefixes_are_converted(tmp_path):
     assert "converted to V" in record.reading[0]
 
 
-def test_a_time_in_milliseconds_has_its_unit_from_the_cells(tmp_path):
-    rows = [f"{100 * k} ms,{value} V,{2 * value}" for k, value in enumerate(U)]
-    (tmp_path / "r.csv").write_text("\n".join(["t,u,y", *rows]))
-    assert read_record(tmp_path / "r.csv", ["u"], "y").dt == pytest.approx(0.1)
-
-
 @pytest.mark.parametrize("cell", ["0.5 A", "0.5", "V"])
 def test_a_cell_with_another_unit_or_none_is_refused(tmp_path, cell):
     cells = [f"{value} V" for value in U]

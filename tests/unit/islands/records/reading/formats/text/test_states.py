@@ -33,12 +33,6 @@ def test_the_words_of_two_states_are_read_as_1_and_0(tmp_path, one, zero):
     assert note in preview(path).warnings
 
 
-def test_two_columns_of_states_are_found_in_a_table(tmp_path):
-    cells = ["ON,closed" if state else "OFF,open" for state in U]
-    record = read_record(write(tmp_path, cells, "t_s,heater,valve,y"), ["heater", "valve"], "y")
-    np.testing.assert_array_equal(record.u, np.column_stack([U, 1 - U]))
-
-
 def test_missing_cells_and_numbers_may_occur_among_states(tmp_path):
     cells = ["Bad", "0", *("ON" if state else "OFF" for state in U[2:])]
     record = read_record(write(tmp_path, cells), ["heater"], "y", gaps="split")

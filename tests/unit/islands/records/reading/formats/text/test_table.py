@@ -10,22 +10,11 @@ from islands.records.reading import read_columns, read_record
 from support.bad_records import changed, lines, refusal
 
 
-def test_a_header_without_names_is_refused(tmp_path):
-    assert refusal(tmp_path, b",,\n,,\n").startswith("bad.csv has a header in line 1 but no samples")
-    rows = [",,", *lines()[1:]]
-    assert "bad.csv has no column u_V; it has (none with a name)" in refusal(tmp_path, rows)
-
-
 @pytest.mark.parametrize("header", [[], [""]])
 def test_a_file_without_a_header_is_refused(tmp_path, header):
     message = refusal(tmp_path, [*header, *lines()[1:]])
     assert f"bad.csv, line {len(header) + 1} contains the number 0 instead of a name" in message
     assert "add a header line" in message
-
-
-def test_a_file_with_decimal_commas_and_no_header_is_refused(tmp_path):
-    rows = [f"0,{k:03d};1,5;2,5" for k in range(60)]
-    assert "line 1 contains the number 0,000" in refusal(tmp_path, rows)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xef\xbb\xbf", b"\n \n\r\n"])
@@ -63,12 +52,6 @@ def test_a_file_without_a_header_is_read_with_numbered_or_given_names(tmp_path):
     assert (named.dt, named.input_units) == (pytest.approx(0.01), ("V",))
 
 
-def test_names_replace_a_header(tmp_path):
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join(lines()))
-    assert read_record(path, ["in"], "out", names=["t", "in", "out"]).samples == 60
-
-
 def test_another_number_of_names_than_columns_is_refused(tmp_path):
     message = refusal(tmp_path, lines(), names=["t", "u"])
     assert "bad.csv, line 2 has 3 columns, and names= gives 2" in message
@@ -78,12 +61,6 @@ def test_options_of_tables_are_refused_for_arrays(tmp_path):
     np.savez(tmp_path / "r.npz", u=np.arange(60.0), y=np.arange(60.0))
     with pytest.raises(SettingsError, match=r"r\.npz is not a table of text: leave names out"):
         read_record(tmp_path / "r.npz", ["u"], "y", dt=1.0, names=["a", "b"])
-
-
-def test_a_comment_column_that_is_empty_in_all_samples_is_ignored(tmp_path):
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join([lines()[0] + ",Comment", *lines()[1:]]))
-    assert read_columns(path) == ("t_s", "u_V", "y_um")
 
 
 def test_a_description_with_numbers_is_not_a_table(tmp_path):
@@ -100,13 +77,6 @@ def test_a_description_with_numbers_is_not_a_table(tmp_path):
     assert read_columns(path) == ("TIME", "CH1")
 
 
-def test_a_channel_is_found_without_the_unit_of_the_row_of_units(tmp_path):
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join(["x-axis,1,2", "second,Volt,Volt", *lines()[1:]]))
-    record = read_record(path, ["1"], "2")
-    assert (record.dt, record.input_names, record.output_unit) == (pytest.approx(0.01), ("1 [V]",), "V")
-
-
 @pytest.mark.parametrize(
     "cell", ["1" * 32_768, "x" * 200_000, '"' + "1,\n" * 20_000 + '"', '"' + "a\n" * 90_000]
 )
@@ -118,23 +88,6 @@ def test_a_long_cell_is_refused_with_its_line_and_column(tmp_path, cell):
     assert "shorten it or leave the column out" in message
 
 
-def test_a_cell_at_the_limit_is_read(tmp_path):
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join(changed(40, 1, "1." + "0" * 32_765)))
-    assert read_record(path, ["u_V"], "y_um").u[38, 0] == 1.0
-
-
-def test_a_long_name_is_refused(tmp_path):
-    message = refusal(tmp_path, [f"t_s,u_V,y_um,{'n' * 1001}", *(f"{row},1" for row in lines()[1:])])
-    assert message.startswith("bad.csv, line 1: the column nnnn")
-    assert "has a name of 1001 characters, and at most 1000 are read: give it a shorter one" in message
-
-
 def test_a_long_line_is_refused(tmp_path):
     message = refusal(tmp_path, [*lines(), "1," * 500_001])
     assert "bad.csv, line 62 has 1000003 characters, and at most 1000000 are read" in message
-
-
-def test_too_many_columns_are_refused(tmp_path):
-    rows = [",".join(f"c{number}" for number in range(10_001)), *[",".join(["1"] * 10_001)] * 3]
-    assert "bad.csv has more than 10000 columns" in refusal(tmp_path, rows, ["c1"], "c2")

@@ -46,12 +46,6 @@ def test_a_row_of_units_belongs_to_the_names(above, units, names):
     assert found.first == len(above) + 2
 
 
-def test_samples_may_have_several_columns_that_repeat_a_word():
-    rows = [f"{k};{k / 100:.2f};{k % 7};LLLL;LL" for k in range(8)]
-    found = start("Vendor;Graph", "Channel;Name;Range", "CH1;Speed;10V", "", "No;t_s;u;Alarm;Out", *rows)
-    assert (found.header, found.names) == (4, ("No", "t_s", "u", "Alarm", "Out"))
-
-
 def test_descriptions_of_numbered_channels_are_no_samples():
     names = ("bias", "flow", "p1", "p2", "p3")
     channels = [f"{100 + k};{name};DC voltage;10" for k, name in enumerate(names)]
@@ -60,22 +54,9 @@ def test_descriptions_of_numbered_channels_are_no_samples():
     assert start(*above, "No;t_s;Alarm;Out", *rows).header == len(above)
 
 
-def test_units_in_names_take_precedence_over_the_row_of_units():
-    assert start("t_s;u (mV);y", "ms;V;m", *SAMPLES[:8]).names == ("t_s", "u (mV)", "y [m]")
-
-
-def test_a_quoted_name_may_contain_line_ends():
-    found = start('t,"u\nin","y ""x"""', "0,1,2", "1,2,3")
-    assert found.names == ("t", "u\nin", 'y "x"')
-
-
 def test_a_quote_in_the_header_that_is_never_closed_is_refused():
     with pytest.raises(RecordError, match=r"a\.csv, line 1: is a quote never closed\?"):
         start('t,"u,y', "0,1,2", "1,2,3")
-
-
-def test_quotes_in_the_description_are_ignored():
-    assert start('"Motor 5" disc', '"gain', "t,u,y", "0,1,2", "1,2,3").names == ("t", "u", "y")
 
 
 def test_samples_without_a_header_are_refused():
@@ -112,11 +93,6 @@ def test_a_row_of_units_may_precede_the_names(above, units):
     assert found.names[1:] == ("u [V]", "FI-2041.PV [m3/h]")
     assert (found.header, found.units) == (len(above) + 1, len(above))
     assert found.described == bool(above)
-
-
-def test_names_that_look_like_units_remain_names():
-    assert start("V;A;s", "1;2;3", *SAMPLES[:8]).names == ("V", "A", "s")
-    assert start("s;V;A", "[ms];[mV];[mA]", *SAMPLES[:8]).header == 0
 
 
 @pytest.mark.parametrize("units", [("(ms);(mV);(V)",), ()])

@@ -51,26 +51,9 @@ def test_a_common_form_gives_elapsed_seconds_across_midnight(tmp_path, form):
     assert (record.start, record.samples) == (0.0, SAMPLES)
 
 
-@pytest.mark.parametrize("header", ["Datum;Uhrzeit;u;y", "Date;Time;u;y"])
-def test_date_and_time_may_be_in_two_columns(tmp_path, header):
-    stamps = [moment.strftime("%d.%m.%Y;%H:%M:%S,%f") for moment in moments()]
-    assert read(tmp_path, table(stamps, header)).dt == pytest.approx(STEP)
-
-
 def test_nanoseconds_since_a_date_are_exact(tmp_path):
     stamps = [f"2026-11-22T14:05:03.{k * 100:09d}Z" for k in range(SAMPLES)]
     assert read(tmp_path, table(stamps)).dt == pytest.approx(1e-7, rel=1e-9)
-
-
-def test_stamps_with_different_offsets_are_compared_in_universal_time(tmp_path):
-    stamps = [f"2026-10-25T02:{k:02d}:00+02:00" for k in range(30)]
-    stamps += [f"2026-10-25T01:{k:02d}:00+01:00" for k in range(30, 60)]
-    assert read(tmp_path, table(stamps)).dt == 60.0
-
-
-def test_a_numeric_time_column_takes_precedence(tmp_path):
-    rows = [f"{moment:%Y-%m-%d %H:%M};{k / 100}" for k, moment in enumerate(moments())]
-    assert read(tmp_path, table(rows, "Timestamp;t_s;u;y")).dt == pytest.approx(0.01)
 
 
 def test_days_without_a_proof_of_their_order_are_refused_unless_it_is_given(tmp_path):
@@ -132,7 +115,3 @@ def test_a_missing_stamp_is_left_out_with_gaps(tmp_path):
     record = read(tmp_path, table(stamps), gaps="interpolate")
     assert (record.samples, record.u[20, 0]) == (SAMPLES, np.mean([19 % 7, 21 % 7]))
     assert record.reading[0] == "left out: 1 row without a time, the first is line 22"
-
-
-def test_milliseconds_since_1970_are_recognised_by_their_size(tmp_path):
-    assert read(tmp_path, table(1_764_000_000_000 + 250 * k for k in range(60))).dt == pytest.approx(0.25)

@@ -40,29 +40,6 @@ def test_lines_of_a_trace_that_are_not_samples_are_ignored(tmp_path):
     assert np.array_equal(read_record(file, ["u"], "y").u[:, 0], U)
 
 
-def test_truth_values_of_a_trace_are_numbers(tmp_path):
-    states = np.where(U > 0, "TRUE", "FALSE")
-    file = write(tmp_path / "r.csv", ("u", 20 * K, states), ("y", 20 * K, Y))
-    assert np.array_equal(read_record(file, ["u"], "y").u[:, 0], U > 0)
-
-
-def test_variables_of_a_trace_may_have_different_clocks(tmp_path):
-    rng = np.random.default_rng(0)
-    u, y = rng.normal(size=600), rng.normal(size=60)
-    file = write(tmp_path / "r.csv", ("u", 10 * np.arange(600), u), ("y", 100 * K, y))
-    record = read_record(file, ["u"], "y", rates="sample")
-    assert record.dt == pytest.approx(0.1)
-    assert np.array_equal(record.y, y)
-    assert np.array_equal(record.u[:, 0], u[::10])
-
-
-def test_a_problem_in_a_trace_is_reported_in_its_line(tmp_path):
-    times = [*20 * K[:30], *20 * K[29:-1]]
-    file = write(tmp_path / "r.csv", ("u", times, U), ("y", times, Y))
-    with pytest.raises(RecordError, match=r"r\.csv, line 39, column t_ms repeats the time stamp 580"):
-        read_record(file, ["u"], "y")
-
-
 def test_a_trace_without_samples_is_refused(tmp_path):
     with pytest.raises(RecordError, match=r"r\.csv is a trace without samples: export it again"):
         preview(write(tmp_path / "r.csv", ("u", [], []), ("y", [], [])))
