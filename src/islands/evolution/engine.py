@@ -178,8 +178,8 @@ def receive_migrants(island: Island, arriving: Sequence[AnyPopulation], evolutio
         rng,
     )
     population = list(island.population)
-    for place, each in zip(places, immigrants, strict=True):
-        population[place] = each
+    for place, immigrant in zip(places, immigrants, strict=True):
+        population[place] = immigrant
     elite = evolution.select_elite((*island.elite, *immigrants), island.index)
     return replace(island, population=tuple(population), elite=elite)
 

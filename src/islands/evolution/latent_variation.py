@@ -285,7 +285,7 @@ def _vary_function(function: str, rng: Generator) -> str:
     """Return another function, or a tree about the function or within it."""
     tree, argument = parse_unit(function), UnitFunction(ARGUMENT)
     drawn = UnitFunction(_draw_function(rng), (argument,))
-    parts = [each for each in tree.operands if each.operands]
+    parts = [operand for operand in tree.operands if operand.operands]
     larger = [
         UnitFunction(drawn.name, (tree,)),
         UnitFunction(PRODUCT, (tree, argument)),

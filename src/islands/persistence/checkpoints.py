@@ -185,7 +185,7 @@ def _island(island: Island) -> dict[str, Any]:
         "generation": island.generation,
         "population": [_individual(each, texts) for each in island.population],
         "elite": [_individual(each, texts) for each in island.elite],
-        "hall": [_individual(each, texts) for each in island.hall_of_fame.entries],
+        "hall": [_individual(entry, texts) for entry in island.hall_of_fame.entries],
         "bar": None if island.abandon_threshold == inf else island.abandon_threshold,
     }
 

@@ -106,9 +106,9 @@ def ensemble_from_document(
         return None
     try:
         structures = [StructureDocument.model_validate(each) for each in document]
-        if any(each.law is not None and each.law >= len(structures) for each in structures):
+        if any(structure.law is not None and structure.law >= len(structures) for structure in structures):
             raise ValueError("a structure has the law of one that is missing")
-        return Ensemble(tuple(_structure(each, model, primitives) for each in structures))
+        return Ensemble(tuple(_structure(structure, model, primitives) for structure in structures))
     except (ModelError, TypeError, ValueError) as error:
         raise ModelError(f"the ensemble of the result is damaged: {error}") from error
 

@@ -154,10 +154,10 @@ class _CProgram(EquationProgram):
 
     def wrap_signals(self, sources: Iterable[Symbol]) -> str:
         found = []
-        for each in sources:
-            value = self.read(each)
+        for source in sources:
+            value = self.read(source)
             unused = "".join(f"{line}\n    " for line in self.begin([value], "p"))
-            name = self.code.identifiers[each.name]
+            name = self.code.identifiers[source.name]
             found.append(SIGNAL.format(name=name, unused=unused, value=value))
         return "".join(found)
 

@@ -96,7 +96,7 @@ def read_model_description(path: str, most: int | None = None) -> ModelDescripti
         check(len(description.variables) + len(found.derivatives))
         states = [found.pointers.get(each) for each in found.derivatives]
         kept = _parse(path, (), frozenset(filter(None, states)), check).kept
-        description.states = [None if each is None else kept.get(each) for each in states]
+        description.states = [None if state is None else kept.get(state) for state in states]
     description.indicators = found.count_indicators()
     return description
 
@@ -375,8 +375,8 @@ def read_description(path: str, interface: str = "", most: int | None = None) ->
         # Not validated: many tools write descriptions that violate a rule but can be simulated.
         found = read_model_description(path, most)
         version = int(found.version.partition(".")[0])
-        variables = [(each["causality"], _make_variable(each)) for each in found.variables]
-        states = [None if each is None else _make_variable(each) for each in found.states]
+        variables = [(variable["causality"], _make_variable(variable)) for variable in found.variables]
+        states = [None if state is None else _make_variable(state) for state in found.states]
         with Path(path).open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
             files = zipfile.ZipFile(stream).namelist()
@@ -404,8 +404,8 @@ def read_description(path: str, interface: str = "", most: int | None = None) ->
         inputs=choose("input"),
         outputs=choose("output"),
         parameters=tuple(each for each in choose("parameter") if each.start is not None),
-        states=tuple(each for each in states if each is not None),
-        settable=tuple(each["name"] for each in found.states if each is not None and _is_settable(each)),
+        states=tuple(state for state in states if state is not None),
+        settable=tuple(state["name"] for state in found.states if state is not None and _is_settable(state)),
         fixed_step=None if fixed_step is None else float(fixed_step),
         has_variable_step=_is_true(offered, "canHandleVariableCommunicationStepSize"),
         indicators=found.indicators,

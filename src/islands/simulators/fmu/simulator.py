@@ -61,7 +61,7 @@ def simulate_fmu(
     list of FmuRun
         Outputs of the program at the start of each step.
     """
-    is_signal = [not (isinstance(each, Apply) and each.primitive == FMU) for each in program.signals]
+    is_signal = [not (isinstance(signal, Apply) and signal.primitive == FMU) for signal in program.signals]
     signals = _stack_signals(list(itertools.compress(program.signals, is_signal)), dt, lanes)
     values, pack = LaneValues(program, lanes), _make_packer(model, program, np.array(is_signal, dtype=bool))
     inputs = {each.reference: model.symbols[each.name] for each in (model.input, *model.channels)}
@@ -76,7 +76,10 @@ def simulate_fmu(
 
 def _find_start_values(model: FmuModel, lane: LaneInput) -> dict[int, float]:
     """Return the start values of variables by value reference."""
-    values = {each.variable.reference: lane.parameters[each.variable.name] for each in model.parameters}
+    values = {
+        parameter.variable.reference: lane.parameters[parameter.variable.name]
+        for parameter in model.parameters
+    }
     for each in model.initial:
         if each.place < 0:
             values[each.variable.reference] = lane.initial_states[each.variable.name]
@@ -163,7 +166,7 @@ class FmuSimulator(OdeSimulator):
     def run_nominal(self, context: SimulationContext, outputs: tuple[Expression, ...]) -> FmuRun:
         """Simulate expressions of the system at its nominal values; the result says why if it fails."""
         program = generate_program(self.system, outputs)
-        run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
+        run = SimulationRun(np.array([parameter.nominal for parameter in self.parameters]), context.u, {}, ())
         lanes = self._make_lanes(program, (), [run], context)
         dt = context.dt / self._steps
         fmu = self.source.load(self.model.description)
@@ -207,8 +210,8 @@ def make_fmu_simulator(
     _check_units(model, record)
     _check_sampling_time(model, record.dt)
     channels = {
-        symbols[each.name]: find_channel(each.name, record, f"{description.name} reads")
-        for each in model.channels
+        symbols[channel.name]: find_channel(channel.name, record, f"{description.name} reads")
+        for channel in model.channels
     }
     initial = _find_initial_values(model, record)
     is_integrated = description.interface == FmiInterface.MODEL_EXCHANGE

@@ -60,7 +60,7 @@ def find_effects(system: OdeSystem, sizes: Mapping[str, float]) -> tuple[frozens
         A listed effect does not exist.
     """
     supported, found = set(GAIN_EFFECTS), []
-    states = {each.name: each for each in system.states}
+    states = {state.name: state for state in system.states}
     for each in list_terms(system):
         cause, _, place = each.name.partition(":")
         unit = states[place].unit if place in states else ""
