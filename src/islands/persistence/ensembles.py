@@ -117,17 +117,17 @@ def _structure(
     document: StructureDocument, model: AnyModel, primitives: Mapping[str, Primitive]
 ) -> EnsembleStructure:
     parameters = np.array(document.parameters, dtype=np.float64)
-    found: AnyModel
+    structure: AnyModel
     if isinstance(model, Model):
         terms = tuple(_regressor(text, primitives) for text in document.regressors)
-        found = replace(model, regressors=terms, theta=None, standard_errors=None)
+        structure = replace(model, regressors=terms, theta=None, standard_errors=None)
     elif isinstance(model, CoupledModel):
-        found = read_coupled(document.model or {}, "the ensemble", primitives)
+        structure = read_coupled(document.model or {}, "the ensemble", primitives)
     else:
-        found = model_from_json(json.dumps(document.model), "the ensemble")
-    if parameters.shape[1] != found.size:
-        raise ValueError(f"{parameters.shape[1]} parameters for {found.size} terms")
-    return EnsembleStructure(found, document.weight, parameters, document.law)
+        structure = model_from_json(json.dumps(document.model), "the ensemble")
+    if parameters.shape[1] != structure.size:
+        raise ValueError(f"{parameters.shape[1]} parameters for {structure.size} terms")
+    return EnsembleStructure(structure, document.weight, parameters, document.law)
 
 
 def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:

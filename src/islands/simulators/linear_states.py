@@ -142,9 +142,9 @@ class Cascade(LinearStates):
     def values(self) -> dict[str, float]:
         """Values of the parameters by name."""
         numbers = [""] if self.times.size == 1 else [f"{place + 1}" for place in range(self.times.size)]
-        found = {f"K{number}": float(gain) for number, gain in zip(numbers, self.gains, strict=True)}
-        found |= {f"T{number}": float(time) for number, time in zip(numbers, self.times, strict=True)}
-        return found | self._own_values
+        values = {f"K{number}": float(gain) for number, gain in zip(numbers, self.gains, strict=True)}
+        values |= {f"T{number}": float(time) for number, time in zip(numbers, self.times, strict=True)}
+        return values | self._own_values
 
     @property
     def is_simple(self) -> bool:

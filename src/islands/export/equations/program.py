@@ -42,7 +42,7 @@ class EquationProgram(ABC):
     def write(self) -> str:
         """Return the program."""
         given, language = self.given, self.language
-        operators = {name for each in self.maps for name, _ in each.operators}
+        operators = {name for signal_map in self.maps for name, _ in signal_map.operators}
         has_slopes = not given.core or any(force.state for force in given.forces)
         text = language.program.format(
             **self.describe_data(),
@@ -51,7 +51,7 @@ class EquationProgram(ABC):
             output=self._indent(self._output()),
             move=self._fill(language.move, moves=self._moves()) if has_slopes else "",
             operators="".join(f"{text}\n" for name, text in language.operators.items() if name in operators),
-            maps="".join(self._map(each) for each in self.maps),
+            maps="".join(self._map(signal_map) for signal_map in self.maps),
             forces=self._forces() if given.forces else "",
         )
         return self.complete(text)

@@ -102,8 +102,8 @@ def _make_packer(
     model: FmuModel, program: OdeProgram, is_signal: NDArray[np.bool_]
 ) -> Callable[..., FmuEquations]:
     """Return a function that makes the equations of a lane of its values and signals."""
-    known = {model.symbols[each.variable.name]: each.place for each in model.initial if each.place >= 0}
-    references = {each.variable.name: each.variable.reference for each in model.initial}
+    known = {model.symbols[start.variable.name]: start.place for start in model.initial if start.place >= 0}
+    references = {start.variable.name: start.variable.reference for start in model.initial}
     references[model.symbols[model.output.name]] = model.output.reference
     derivatives, values = [], []
     for expression, row in zip(program.signals, program.instructions.signals, strict=True):
@@ -150,11 +150,11 @@ class FmuSimulator(OdeSimulator):
     source: FmuSource = field(default=LOCAL_FMUS, kw_only=True)
 
     def _list_initial_states(self) -> tuple[Parameter, ...]:
-        found = []
-        for (name, nominal), each in zip(self.initial.items(), self.model.initial, strict=True):
-            lower, upper = min(each.variable.lower, nominal), max(each.variable.upper, nominal)
-            found.append(self._make_initial(name, each.variable.unit, lower, upper))
-        return tuple(found)
+        parameters = []
+        for (name, nominal), start in zip(self.initial.items(), self.model.initial, strict=True):
+            lower, upper = min(start.variable.lower, nominal), max(start.variable.upper, nominal)
+            parameters.append(self._make_initial(name, start.variable.unit, lower, upper))
+        return tuple(parameters)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what the simulator is made of, since the functions of its effects cannot be pickled."""
@@ -182,8 +182,8 @@ class FmuSimulator(OdeSimulator):
         every: int,
     ) -> Signal:
         fmu = self.source.load(self.model.description)
-        found = simulate_fmu(fmu, self.model, program, start_time, dt, lanes)
-        return np.stack([each.y for each in found])[:, :, ::every]
+        runs = simulate_fmu(fmu, self.model, program, start_time, dt, lanes)
+        return np.stack([run.y for run in runs])[:, :, ::every]
 
 
 def make_fmu_simulator(
