@@ -380,10 +380,10 @@ def _find_claim(claims: Mapping[str, Any], name: str) -> Any:
     """Return a claim by its name, which may contain dots, or else by its path: ``realm_access.roles``."""
     if name in claims:
         return claims[name]
-    found: Any = claims
+    value: Any = claims
     for part in name.split("."):
-        found = found.get(part) if isinstance(found, dict) else None
-    return found
+        value = value.get(part) if isinstance(value, dict) else None
+    return value
 
 
 def _digest(text: str) -> str:

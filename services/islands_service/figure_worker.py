@@ -327,11 +327,11 @@ def _save_all(figures: Mapping[str, Callable[[], Figure]]) -> dict[str, bytes]:
     """
     made = dict[str, bytes]()
     for name, draw in figures.items():
-        found = attempt(partial(_save, draw))
-        if isinstance(found, Failure):
-            text = f"Not computed: {found.reason}."
-            found = write_text_figure(text), f"# {text}\n"
-        made |= {f"{name}.svg": found[0], f"{name}.csv": found[1].encode()}
+        saved = attempt(partial(_save, draw))
+        if isinstance(saved, Failure):
+            text = f"Not computed: {saved.reason}."
+            saved = write_text_figure(text), f"# {text}\n"
+        made |= {f"{name}.svg": saved[0], f"{name}.csv": saved[1].encode()}
     return made
 
 

@@ -381,19 +381,19 @@ def _check_extent(document: Any, max_elements: int) -> None:
     """Refuse a document whose validation would take long."""
     names = elements = 0
     level, depth = [document], 0
-    while level := [each for each in level if isinstance(each, dict | list)]:
+    while level := [node for node in level if isinstance(node, dict | list)]:
         depth += 1
         if depth > _MAX_DEPTH:
             raise _make_depth_error()
-        names += sum(len(each) for each in level if isinstance(each, dict))
-        elements += sum(len(each) for each in level if isinstance(each, list))
+        names += sum(len(node) for node in level if isinstance(node, dict))
+        elements += sum(len(node) for node in level if isinstance(node, list))
         for count, most, what in ((names, _MAX_NAMES, "names"), (elements, max_elements, "array elements")):
             if count > most:
                 raise PayloadTooLargeError(
                     f"the body has {count} {what} or more, and {most} is the most: send only the documented "
                     "fields, and upload data as a data set"
                 )
-        level = [value for each in level for value in (each.values() if isinstance(each, dict) else each)]
+        level = [value for node in level for value in (node.values() if isinstance(node, dict) else node)]
 
 
 def _make_depth_error() -> MalformedBodyError:

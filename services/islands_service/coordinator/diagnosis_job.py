@@ -207,13 +207,13 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         search = partial(explain_residual, diagnosed, spec.seed, on_epoch=count, stop=steps.stop, start=start)
         formula = steps.attempt(FORMULA, search)
         left_out.remove(FORMULA)
-        found = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
+        result = DiagnosisResult.from_diagnosis(diagnosed, formula, wall_s=report.spent)
         steps("writing the report", BEFORE_REPORT)
         names = ", ".join(datasets[part.dataset].name for part in spec.parts)
         origin = Origin.from_seconds(names, run.job.created, run.job.owner, run.job.id)
-        made = {REPORT: steps.attempt(REPORT, partial(found.write_report, origin))}
+        made = {REPORT: steps.attempt(REPORT, partial(result.write_report, origin))}
         left_out.remove(REPORT)
-        made |= _make_artefacts(found, steps)
+        made |= _make_artefacts(result, steps)
         for name, data in made.items():
             if data is not None:
                 artefacts[name] = _keep(data, run.blobs, run.check, run.pause)
@@ -222,18 +222,18 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         so_far = interim.make_diagnosis(spec.seed)
         if so_far is None:
             raise
-        found = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent)
+        result = DiagnosisResult.from_diagnosis(so_far, formula, wall_s=report.spent)
         steps = Steps()
         for each in left_out:
             steps.leave_out(each)
         ended = JobState.CANCELLED
-        for name, data in _make_artefacts(found, steps).items():
+        for name, data in _make_artefacts(result, steps).items():
             if data is not None and name not in artefacts:
                 artefacts[name] = run.blobs.write(data)
     model, last = None, Steps()
-    if found.gain is not None:
-        model = last.attempt("equation", lambda: find_closed_form(found.extension.spec))
-    complete = found.with_steps(steps).with_steps(last)
+    if result.gain is not None:
+        model = last.attempt("equation", lambda: find_closed_form(result.extension.spec))
+    complete = result.with_steps(steps).with_steps(last)
     summary = _make_summary(complete, simulator.name, model, state.note)
     return JobOutcome(ended, complete.document, summary=summary, artefacts=artefacts)
 

@@ -307,8 +307,8 @@ def restart_process(lifeline: int | None, *kept: int | None) -> NoReturn:
 
 
 def _find_children() -> list[int]:
-    found: list[int] = []
+    children: list[int] = []
     for task in Path("/proc/self/task").iterdir():
         with suppress(OSError):
-            found += map(int, (task / "children").read_text().split())
-    return found
+            children += map(int, (task / "children").read_text().split())
+    return children

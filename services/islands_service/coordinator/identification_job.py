@@ -202,13 +202,13 @@ def run_identification_job(run: JobRun) -> JobOutcome:
             outcome = _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
             return keep_free_runs(outcome, partial(write_coupled, coupled), run)
         on_models = _end_last_attempt if run.lease.is_last else ignore_result
-        found = _identify(record, validation, spec, start, engine, reporter, stop, on_models)
+        result = _identify(record, validation, spec, start, engine, reporter, stop, on_models)
     except ModelsFoundError as reached:
-        found = Result.from_search(reached.found).with_wall_time(reporter.spent).search_result
+        result = Result.from_search(reached.found).with_wall_time(reporter.spent).search_result
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
-    outcome = _end_job(partial(make_outcome, found), found.search.left_out, start.note, stop)
-    return keep_free_runs(outcome, partial(write_recommended, found), run)
+    outcome = _end_job(partial(make_outcome, result), result.search.left_out, start.note, stop)
+    return keep_free_runs(outcome, partial(write_recommended, result), run)
 
 
 def _end_job(

@@ -407,9 +407,9 @@ class Coordinator:
         from islands_service.coordinator.job_engine import expects_cluster  # noqa: PLC0415
 
         stored = self._store.datasets
-        datasets = [stored.get(job.owner, each, deleted=True, is_fmu=None) for each in job.datasets]
+        datasets = [stored.get(job.owner, dataset, deleted=True, is_fmu=None) for dataset in job.datasets]
         # An FMU has none.
-        samples = sum(each.preview.get("samples", 0) for each in datasets)
+        samples = sum(dataset.preview.get("samples", 0) for dataset in datasets)
         if expects_cluster(job, samples, self._settings.short_search):
             self._demand_ray()
 

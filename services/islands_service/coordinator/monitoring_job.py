@@ -140,14 +140,14 @@ def _describe_outcome(
 ) -> JobOutcome:
     state = after.state
     raised = state.alarms[len(before.state.alarms) :]
-    alarms = [describe_alarm(state, each) for each in raised]
+    alarms = [describe_alarm(state, alarm) for alarm in raised]
     record = state.records[-1]
     document = {"index": state.count - 1, **describe_record(state, record)}
     entry = RecordEntry(record.name, record.sha256, False, record_to_json(record), _dump(document))
     update = _make_update(monitor, after, [*_get_alarms(states), *alarms], entry)
     if alarms:
         update = replace(update, alarm=_dump(alarms[-1]))
-    words = "\n".join([describe_last_record(state), *(describe_alarm_text(state, each) for each in raised)])
+    words = "\n".join([describe_last_record(state), *(describe_alarm_text(state, alarm) for alarm in raised)])
     return JobOutcome(
         JobState.SUCCEEDED,
         _make_result(monitor, update.status, document, alarms),

@@ -93,8 +93,8 @@ class SearchFront:
 
 def _find_small(front: AnyPopulation) -> AnyIndividual:
     """Return the smallest model whose error is near the least one."""
-    most = _SHOWN_RATIO**2 * min(each.fitness for each in front)
-    return next(each for each in front if each.fitness <= most)
+    most = _SHOWN_RATIO**2 * min(model.fitness for model in front)
+    return next(model for model in front if model.fitness <= most)
 
 
 def _simulate(individual: AnyIndividual, problem: SearchProblem, generation: int) -> SearchFreeRun:

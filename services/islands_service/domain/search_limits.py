@@ -72,17 +72,17 @@ def resolve_job_settings(
     if any(shift > MAX_SHIFT for shift in changes.get("shifts", ())):
         raise SettingsError(f"back-shifts are at most {MAX_SHIFT} on this service, got {changes['shifts']}")
     if len(spec.outputs) > 1:
-        found: tuple[Settings, ...] = (resolve_coupled_settings(spec.preset, changes),)
+        resolved: tuple[Settings, ...] = (resolve_coupled_settings(spec.preset, changes),)
         # One search for each output.
         max_evaluations //= len(spec.outputs)
     elif spec.preset == AUTO:
-        found = tuple(resolve_kinds(changes).values())
+        resolved = tuple(resolve_kinds(changes).values())
     else:
-        found = (resolve_settings(spec.preset, changes),)
+        resolved = (resolve_settings(spec.preset, changes),)
     inputs, _ = spec.columns
-    for settings in found:
+    for settings in resolved:
         _check_settings(settings, len(inputs), max_evaluations)
-    return found
+    return resolved
 
 
 def _check_settings(settings: Settings, inputs: int, max_evaluations: int) -> None:
@@ -180,11 +180,11 @@ def estimate_memory(alternatives: Iterable[Settings]) -> JobMemory:
 
 def machine_memory() -> int:
     """Return the memory of this machine, or of the container of this process, in bytes."""
-    found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     # The file contains "max" if the container has no limit.
     with suppress(OSError, ValueError):
-        found = min(found, int(_CONTAINER_LIMIT.read_text()))
-    return found
+        size = min(size, int(_CONTAINER_LIMIT.read_text()))
+    return size
 
 
 def _format(count: float) -> str:

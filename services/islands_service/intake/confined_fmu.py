@@ -81,14 +81,14 @@ class ConfinedFmu:
             The process has ended, or takes too long.
         """
         together = max(1, _MAX_SAMPLES // lanes[0].shape[1])
-        found = []
+        runs = []
         for first in range(0, len(lanes), together):
             part = lanes[first : first + together]
             # Lanes have most signals in common, which a request contains once.
             request = pickle.dumps((part, start_time, dt))
             self._send(_REQUEST.pack(len(request)) + request)
-            found += [self._receive(*lane.shape) for lane in part]
-        return found
+            runs += [self._receive(*lane.shape) for lane in part]
+        return runs
 
     def _send(self, data: bytes) -> None:
         rest = memoryview(data)

@@ -149,9 +149,9 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
     # The file is parsed once, because parsing takes most of the time: all that follows reads this table.
     table, name = open_record(path, options), path.name
     _check_columns([column for column in table.names if column], name)
-    found = preview_table(table, name, options)
+    preview = preview_table(table, name, options)
     # Check this first: a message about missing columns lists the existing ones.
-    _check_readable(found, name)
+    _check_readable(preview, name)
     assumed: tuple[str, ...] = ()
     if request.inputs and request.output is not None:
         record = read_table(
@@ -166,16 +166,16 @@ def describe_file(path: Path, request: InspectionRequest) -> dict[str, Any]:
         )
         assumed = record.reading
     elif options.gaps is None:
-        _check_usable(table, {column.name: column.problem for column in found.columns}, request)
-    measured, inspected, noted = _measure(table, found, path, request, options)
+        _check_usable(table, {column.name: column.problem for column in preview.columns}, request)
+    measured, inspected, noted = _measure(table, preview, path, request, options)
     if measured is not None:
         stated = [note.text for note in noted]
-        solved = [text for text in found.problems if text not in stated]
-        found = replace(found, warnings=tuple(text for text in found.warnings if text not in solved))
-    notes = _merge_notes(merge_notes(found.warnings, assumed or inspected), found.problems, noted)
+        solved = [text for text in preview.problems if text not in stated]
+        preview = replace(preview, warnings=tuple(text for text in preview.warnings if text not in solved))
+    notes = _merge_notes(merge_notes(preview.warnings, assumed or inspected), preview.problems, noted)
     if options.resample is not None:
-        found = replace(found, dt=options.resample)
-    described = asdict(replace(found, warnings=tuple(note.text for note in notes)))
+        preview = replace(preview, dt=options.resample)
+    described = asdict(replace(preview, warnings=tuple(note.text for note in notes)))
     del described["problems"]
     return {
         **described,

@@ -66,12 +66,12 @@ def _check_sizes(path: str, most_bytes: int) -> None:
 
     with zipfile.ZipFile(path) as archive:
         files = archive.infolist()  # a name can appear twice
-    if len(files) > _MAX_FILES or sum(each.file_size for each in files) > most_bytes:
+    if len(files) > _MAX_FILES or sum(file.file_size for file in files) > most_bytes:
         raise ModelError(
             f"{path} unpacks to more than {most_bytes / 1e6:.0f} MB or {_MAX_FILES} files, the most of this "
             "service: export it without sources and documentation"
         )
-    if any(each.filename == DESCRIPTION and each.file_size > _MAX_DESCRIPTION_BYTES for each in files):
+    if any(file.filename == DESCRIPTION and file.file_size > _MAX_DESCRIPTION_BYTES for file in files):
         raise ModelError(
             f"the {DESCRIPTION} of {path} has more than {_MAX_DESCRIPTION_BYTES / 1e6:.0f} MB, the most of "
             "this service: export it with fewer variables"

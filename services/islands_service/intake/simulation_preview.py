@@ -124,7 +124,7 @@ def _describe(path: str, request: SimulationPreviewRequest, fmus: Any) -> dict[s
         "columns": described,
         "error_percent": found.error_percent,
         "parameters": [
-            {"name": each.name, "unit": each.unit, "value": float(value)}
-            for each, value in zip(found.fit.simulation.parameters, found.fit.values, strict=True)
+            {"name": parameter.name, "unit": parameter.unit, "value": float(value)}
+            for parameter, value in zip(found.fit.simulation.parameters, found.fit.values, strict=True)
         ],
     }

@@ -296,8 +296,8 @@ class RegionActor:
         self._pool.reset_losses()
         self._deadlines.reset()
         self._in_flight.drop_old_references()
-        leaving = {each.index: each.emigrants for each in reports if each.index in self._border}
-        steps = tuple(each.steps for each in reports)
+        leaving = {report.index: report.emigrants for report in reports if report.index in self._border}
+        steps = tuple(report.steps for report in reports)
         return RegionReport(steps, leaving, self._in_flight.memory), reports
 
 
@@ -430,8 +430,8 @@ class _Tree:
             if sum(generation > self._generation for generation in region.reports) >= MAX_EPOCHS_AHEAD:
                 continue
             neighbours = [self._regions[index] for index in self._neighbours[region.index]]
-            if all(region.generation in each.reports for each in neighbours):
-                arriving = [each.reports[region.generation].emigrants for each in neighbours]
+            if all(region.generation in neighbour.reports for neighbour in neighbours):
+                arriving = [neighbour.reports[region.generation].emigrants for neighbour in neighbours]
                 region.pending = tuple(actor.advance.remote(*arriving))
 
     def wait(self) -> None:

@@ -409,22 +409,22 @@ def claim_job(
     most_islands: int | None,
 ) -> Lease | None:
     """Claim a lost job, or the first queued job of the owner whose turn it is; see `Leases.claim`."""
-    while (found := _select_lost(connection, coordinator, seconds)) is not None:
-        if found.stalled < ATTEMPTS:
-            return _lease_job(connection, found.id, coordinator, seconds)
-        _give_up(connection, found)
+    while (row := _select_lost(connection, coordinator, seconds)) is not None:
+        if row.stalled < ATTEMPTS:
+            return _lease_job(connection, row.id, coordinator, seconds)
+        _give_up(connection, row)
     dialect.lock_claims(connection)
     with rank_owners(connection, most_running, most_islands) as turns:
         for turn in turns:
             if not _fits_first(connection, turn, version):
                 # Smaller jobs behind the first one wait too: otherwise they could delay it for ever.
                 continue
-            while (found := _select_queued(connection, turn.name, version)) is not None:
-                if found.stalled >= ATTEMPTS:
-                    _give_up(connection, found)
-                elif has_room(turn, found.islands):
+            while (row := _select_queued(connection, turn.name, version)) is not None:
+                if row.stalled >= ATTEMPTS:
+                    _give_up(connection, row)
+                elif has_room(turn, row.islands):
                     charge_owner(connection, turn)
-                    return _lease_job(connection, found.id, coordinator, seconds)
+                    return _lease_job(connection, row.id, coordinator, seconds)
                 else:
                     break
     return None

@@ -199,8 +199,8 @@ class Monitors:
             return None
         document = json.loads(row.state)
         document["schema"] = STATE_SCHEMA
-        document["state"]["records"] = [json.loads(each) for each in analysed]
-        document["rejected"] = [json.loads(each) for each in rejected]
+        document["state"]["records"] = [json.loads(record) for record in analysed]
+        document["rejected"] = [json.loads(record) for record in rejected]
         return json.dumps(document, allow_nan=False) + "\n"
 
     def records(

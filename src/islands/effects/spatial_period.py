@@ -128,7 +128,7 @@ def _list_starting_points(
                 spectrum[np.abs(frequencies - known) < LINE_WIDTH / span] = 0.0
             if spectrum.any():
                 found.append(float(frequencies[np.argmax(spectrum)]))
-    return tuple(point for each in found for point in ((size, 0.0, each), (0.0, size, each)))
+    return tuple(point for period in found for point in ((size, 0.0, period), (0.0, size, period)))
 
 
 def _cogging_force(x: float, _rate: float, _z: float, k: Any) -> float:

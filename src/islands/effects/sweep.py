@@ -79,20 +79,20 @@ def find_sweep(signal: Signal, response: Signal | None, min_change: float) -> Sw
     count = 1
     while signal.size > count * WINDOW:
         count *= 2
-    least, found = min_change / count**2, None
+    least, line = min_change / count**2, None
     length = signal.size // count
     step = min(STEP, LINE_STEP / count)
     most = int(length / (2 * count) / step)
     sweeps = step * np.arange(-most, most + 1)
     while True:
         sweeps = sweeps[np.abs(sweeps) >= least]
-        found = _find_line(signal, energy, count, sweeps)
-        if found is None or count == 1:
-            return found
+        line = _find_line(signal, energy, count, sweeps)
+        if line is None or count == 1:
+            return line
         count //= 2
         least *= 4.0
         length = signal.size // count
-        sweeps = found.rate * length**2 + min(STEP, LINE_STEP / count) * np.arange(-2, 3)
+        sweeps = line.rate * length**2 + min(STEP, LINE_STEP / count) * np.arange(-2, 3)
 
 
 def measure_line(signal: Signal) -> float:

@@ -165,8 +165,10 @@ def receive_migrants(island: Island, arriving: Sequence[AnyPopulation], evolutio
     Immigrants replace individuals chosen by the replacement policy and compete for the elite. The population
     keeps its size, and the elite never shrinks. Models that are already in the elite are ignored.
     """
-    known = {each.key for each in island.elite}
-    candidates = [each for each in unique_structures(chain(*arriving)) if each.key not in known]
+    known = {individual.key for individual in island.elite}
+    candidates = [
+        individual for individual in unique_structures(chain(*arriving)) if individual.key not in known
+    ]
     immigrants = candidates[: len(island.population)]
     if not immigrants:
         return island
@@ -178,8 +180,8 @@ def receive_migrants(island: Island, arriving: Sequence[AnyPopulation], evolutio
         rng,
     )
     population = list(island.population)
-    for place, each in zip(places, immigrants, strict=True):
-        population[place] = each
+    for place, immigrant in zip(places, immigrants, strict=True):
+        population[place] = immigrant
     elite = evolution.select_elite((*island.elite, *immigrants), island.index)
     return replace(island, population=tuple(population), elite=elite)
 

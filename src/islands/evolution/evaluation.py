@@ -260,14 +260,18 @@ class Evaluator:
         """Return evaluated individuals as arrays; valid until `prepare` is called."""
         if isinstance(individuals, Offspring) and individuals.structures is self._structures:
             return individuals.parents
-        genes = self._gene_index.number_genes([each.genes for each in individuals], self.settings.max_terms)
+        genes = self._gene_index.number_genes(
+            [individual.genes for individual in individuals], self.settings.max_terms
+        )
         terms = self._number_terms(genes.genes)
-        terms[[not each.regressors for each in individuals]] = ZERO
+        terms[[not individual.regressors for individual in individuals]] = ZERO
         return Parents(
             genes,
             np.array(self._structures.number(self._gene_index.sort_by_content(terms)), np.int64),
-            np.array([each.fitness for each in individuals], np.float64),
-            np.array([each.outcome.verdict is Status.ABANDONED for each in individuals], np.bool_),
+            np.array([individual.fitness for individual in individuals], np.float64),
+            np.array(
+                [individual.outcome.verdict is Status.ABANDONED for individual in individuals], np.bool_
+            ),
         )
 
     def _number_terms(self, genes: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -330,9 +334,9 @@ class Evaluator:
 
         def evaluate(part: int) -> None:
             rows = slice(count * part // parts, count * (part + 1) // parts)
-            some = kernel.SelectedTerms(*(each[rows] for each in given))
-            found = kernel.PopulationResults(results.theta[rows], results.error[rows], results.status[rows])
-            kernel.evaluate_individuals(some, limits, context, found)
+            some = kernel.SelectedTerms(*(array[rows] for array in given))
+            own = kernel.PopulationResults(results.theta[rows], results.error[rows], results.status[rows])
+            kernel.evaluate_individuals(some, limits, context, own)
 
         if parts == 1:
             evaluate(0)

@@ -233,7 +233,7 @@ def select_elite(
         return structures[:count]
     leading = unique_niches(structures)[:count]
     keys = {each.key for each in leading}
-    others = [each for each in structures if each.key not in keys]
+    others = [structure for structure in structures if structure.key not in keys]
     return tuple(sorted((*leading, *others[: count - len(leading)]), key=_elite_order))
 
 

@@ -69,11 +69,11 @@ def _with_canonical_genes(entry: AnyIndividual) -> AnyIndividual:
 
 def pareto_front(individuals: Iterable[_Kind]) -> tuple[_Kind, ...]:
     """Return the Pareto front of error and size, smallest first."""
-    found: list[_Kind] = []
-    for each in sorted(individuals, key=lambda each: (each.size, each.fitness)):
-        if not found or each.fitness < found[-1].fitness:
-            found.append(each)
-    return tuple(found)
+    front: list[_Kind] = []
+    for individual in sorted(individuals, key=lambda individual: (individual.size, individual.fitness)):
+        if not front or individual.fitness < front[-1].fitness:
+            front.append(individual)
+    return tuple(front)
 
 
 def merge(halls: Iterable[HallOfFame]) -> HallOfFame:

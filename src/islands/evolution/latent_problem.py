@@ -75,8 +75,8 @@ def select_latent_elite(
 
     ordered = unique_structures(sorted(systems, key=order))
     front = find_front(ordered)[-count:]
-    keys = {each.key for each in front}
-    others = [each for each in ordered if each.key not in keys][: count - len(front)]
+    keys = {individual.key for individual in front}
+    others = [individual for individual in ordered if individual.key not in keys][: count - len(front)]
     return tuple(sorted((*front, *others), key=order))
 
 
@@ -228,9 +228,9 @@ class LatentEvolution:
 
 def _keep_orders(linear: Sequence[FittedStateSpace]) -> list[FittedStateSpace]:
     """Return the linear systems whose error on the used or on the held-out rows is close to the least."""
-    used = _LARGEST_RATIO * min((each.mean_square for each in linear), default=0.0)
-    held_out = _LARGEST_RATIO * min((each.fitness for each in linear), default=0.0)
-    return [each for each in linear if each.mean_square <= used or each.fitness <= held_out]
+    used = _LARGEST_RATIO * min((model.mean_square for model in linear), default=0.0)
+    held_out = _LARGEST_RATIO * min((model.fitness for model in linear), default=0.0)
+    return [model for model in linear if model.mean_square <= used or model.fitness <= held_out]
 
 
 def _make_generator(seed: int, island: int, generation: int, place: int) -> Generator:

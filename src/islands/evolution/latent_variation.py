@@ -74,10 +74,10 @@ def cross(
         return None
     states, others = _simulate_states(system, data), _simulate_states(other, data)
     regressors = np.column_stack([states, np.ones(len(states))])
-    found = np.linalg.lstsq(regressors, others, rcond=None)[0]
-    to_other, shift = found[:-1].T, found[-1]
+    solution = np.linalg.lstsq(regressors, others, rcond=None)[0]
+    to_other, shift = solution[:-1].T, solution[-1]
     unit = int(rng.integers(len(other.units)))
-    blocks, free = (other.layout.split(each) for each in (np.array(other.theta), np.array(other.free)))
+    blocks, free = (other.layout.split(array) for array in (np.array(other.theta), np.array(other.free)))
     weights, used = blocks["W"][unit], free["W"][unit]
     of_states, of_inputs = weights[: other.order], weights[other.order :]
     effect = np.linalg.lstsq(to_other, blocks["E"][:, unit], rcond=None)[0]
@@ -285,7 +285,7 @@ def _vary_function(function: str, rng: Generator) -> str:
     """Return another function, or a tree about the function or within it."""
     tree, argument = parse_unit(function), UnitFunction(ARGUMENT)
     drawn = UnitFunction(_draw_function(rng), (argument,))
-    parts = [each for each in tree.operands if each.operands]
+    parts = [operand for operand in tree.operands if operand.operands]
     larger = [
         UnitFunction(drawn.name, (tree,)),
         UnitFunction(PRODUCT, (tree, argument)),

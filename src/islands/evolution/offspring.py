@@ -114,10 +114,10 @@ class Offspring(Sequence[Individual]):
         if isinstance(row, slice):
             return tuple(self)[row]
         row = range(len(self))[row]
-        found = self._made.get(row)
-        if found is None:
-            found = self._made[row] = self._make(row)
-        return found
+        individual = self._made.get(row)
+        if individual is None:
+            individual = self._made[row] = self._make(row)
+        return individual
 
     def _make(self, row: int) -> Individual:
         place, status = int(self.places[row]), int(self.status[row])

@@ -101,11 +101,13 @@ class GeneEvolution:
     def complete_fitness(self, population: Sequence[AnyIndividual]) -> list[float]:
         """Return the fitness of each individual; abandoned individuals are evaluated completely."""
         genes = cast("Sequence[Individual]", population)
-        fitness = [each.fitness for each in genes]
-        places = [place for place, each in enumerate(genes) if each.outcome.verdict is Status.ABANDONED]
+        fitness = [individual.fitness for individual in genes]
+        places = [
+            place for place, individual in enumerate(genes) if individual.outcome.verdict is Status.ABANDONED
+        ]
         evaluated = self.evaluator.evaluate_abandoned([genes[place] for place in places])
-        for place, each in zip(places, evaluated, strict=True):
-            fitness[place] = each.fitness
+        for place, individual in zip(places, evaluated, strict=True):
+            fitness[place] = individual.fitness
         return fitness
 
     def select_elite(self, contenders: Sequence[AnyIndividual], island: int) -> Population:

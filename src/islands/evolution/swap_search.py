@@ -73,9 +73,9 @@ def swap_search(
         if skip():
             break
         steps.report(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
-        found = search.extend(best)
+        extended = search.extend(best)
         known = search.best(len(best) + 1)
-        start = min((each for each in (found, known) if each), key=_order, default=None)
+        start = min((structure for structure in (extended, known) if structure), key=_order, default=None)
         if start is None or start.size <= len(best):
             break
         exchanged = search.exchange(start, skip)
@@ -157,8 +157,8 @@ class _SwapSearch:
 
     def best(self, size: int) -> Individual | None:
         """Return the best structure of a size."""
-        found = (_find_best(*each) for each in self._found.get(size, ()))
-        return min((each for each in found if each), key=_order, default=None)
+        candidates = (_find_best(*candidate) for candidate in self._found.get(size, ()))
+        return min((candidate for candidate in candidates if candidate), key=_order, default=None)
 
     def ranked(self, depth: int) -> tuple[Population, ...]:
         """Return the best structures of every size."""

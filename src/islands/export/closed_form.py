@@ -75,9 +75,9 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
         case ModelSpec():
             return measured_model(narx_from_json(json.dumps(spec.model), spec.name))
         case ExtendedSpec(core=LinearSpec(numerator=tuple()) as core):
-            found = _make_linear_model(core, spec.inputs[0])
+            model = _make_linear_model(core, spec.inputs[0])
         case ExtendedSpec():
-            found = closed_form(spec.core)
+            model = closed_form(spec.core)
         case FmuSpec() | ProgramSpec():
             raise _refuse(f"the simulation {spec.kind}", "plain, python or json")
         case _:
@@ -89,8 +89,8 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     # A map replaces the input inside the maps before it, so that the last one is applied first.
     before = [each for each in reversed(spec.effects) if each.name in _INPUT_MAPS]
     for effect in (*before, *(each for each in spec.effects if each.name not in _INPUT_MAPS)):
-        found = _apply_effect(found, effect, spec.scales)
-    return replace(found, output_name=spec.output, dt=spec.scales.dt)
+        model = _apply_effect(model, effect, spec.scales)
+    return replace(model, output_name=spec.output, dt=spec.scales.dt)
 
 
 def find_closed_form(spec: SimulationSpec | LocalSpec) -> Model | None:
@@ -114,11 +114,14 @@ def _make_linear_model(spec: LinearSpec, column: str) -> Model:
     assert spec.numerator is not None
     # Regressors read u(k-1) of the input that is read one sample early where the equation has u(k).
     lead = int(spec.delay == 0)
-    lagged = [(Lagged(0, lag), each) for lag, each in enumerate(spec.denominator, start=1)]
-    lagged += [(Lagged(1, lag), each) for lag, each in enumerate(spec.numerator, start=spec.delay + lead)]
+    lagged = [(Lagged(0, lag), coefficient) for lag, coefficient in enumerate(spec.denominator, start=1)]
+    lagged += [
+        (Lagged(1, lag), coefficient)
+        for lag, coefficient in enumerate(spec.numerator, start=spec.delay + lead)
+    ]
     terms: _Terms = list(lagged)
     if spec.reference_input is None:
-        terms += [(Lagged(leaf.channel, leaf.lag + 1), -each) for leaf, each in lagged]
+        terms += [(Lagged(leaf.channel, leaf.lag + 1), -coefficient) for leaf, coefficient in lagged]
         terms.append((Lagged(0, 1), 1.0))
     else:
         at_rest = spec.level * (1.0 - sum(spec.denominator)) - spec.reference_input * sum(spec.numerator)
@@ -127,20 +130,20 @@ def _make_linear_model(spec: LinearSpec, column: str) -> Model:
 
 
 def _apply_effect(model: Model, effect: EffectSpec, scales: ScalesSpec) -> Model:
-    values = {name: each.value for name, each in effect.parameters.items()}
+    values = {name: expression.value for name, expression in effect.parameters.items()}
     terms = zip([item.expression for item in model.regressors], model.parameters, strict=True)
-    found: _Terms
+    changed: _Terms
     if effect.name in _INPUT_MAPS:
         transform = _INPUT_MAPS[effect.name]
-        found = [
-            (_replace_channel(each, 1, lambda leaf: transform(leaf, values, scales)), parameter)
-            for each, parameter in terms
+        changed = [
+            (_replace_channel(expression, 1, lambda leaf: transform(leaf, values, scales)), parameter)
+            for expression, parameter in terms
         ]
     elif effect.name in _OUTPUT_LINES:
-        found = _move_output(list(terms), *_OUTPUT_LINES[effect.name](values))
+        changed = _move_output(list(terms), *_OUTPUT_LINES[effect.name](values))
     else:
         raise _refuse(f"the effect {effect.name}")
-    return make_model(found, model.input_names, model.output_name, model.dt)
+    return make_model(changed, model.input_names, model.output_name, model.dt)
 
 
 def _move_output(terms: _Terms, factor: float, constant: float) -> _Terms:
@@ -149,13 +152,13 @@ def _move_output(terms: _Terms, factor: float, constant: float) -> _Terms:
     def undo(leaf: Expression) -> Expression:
         return Apply(MUL, (Constant(1.0 / factor), Apply(SUB, (leaf, Constant(constant)))))
 
-    found: _Terms = [(Constant(1.0), constant)]
-    for each, parameter in terms:
-        if isinstance(each, Lagged) and each.channel == 0:
-            found += [(each, parameter), (Constant(1.0), -parameter * constant)]
+    moved: _Terms = [(Constant(1.0), constant)]
+    for expression, parameter in terms:
+        if isinstance(expression, Lagged) and expression.channel == 0:
+            moved += [(expression, parameter), (Constant(1.0), -parameter * constant)]
         else:
-            found.append((_replace_channel(each, 0, undo), factor * parameter))
-    return found
+            moved.append((_replace_channel(expression, 0, undo), factor * parameter))
+    return moved
 
 
 def _replace_channel(

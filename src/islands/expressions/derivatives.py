@@ -87,10 +87,10 @@ def differentiate(
             parts = [differentiate(argument, signal, rate) for argument in arguments]
     if len(parts) == 1:
         return _call(primitive, parts)
-    found = parts[0]
+    total = parts[0]
     for other in parts[1:]:
-        found = _call(primitive, [found, other])
-    return found
+        total = _call(primitive, [total, other])
+    return total
 
 
 def _call(primitive: Primitive, parts: list[tuple[float, float]]) -> tuple[float, float]:

@@ -106,9 +106,9 @@ def ensemble_from_document(
         return None
     try:
         structures = [StructureDocument.model_validate(each) for each in document]
-        if any(each.law is not None and each.law >= len(structures) for each in structures):
+        if any(structure.law is not None and structure.law >= len(structures) for structure in structures):
             raise ValueError("a structure has the law of one that is missing")
-        return Ensemble(tuple(_structure(each, model, primitives) for each in structures))
+        return Ensemble(tuple(_structure(structure, model, primitives) for structure in structures))
     except (ModelError, TypeError, ValueError) as error:
         raise ModelError(f"the ensemble of the result is damaged: {error}") from error
 
@@ -117,17 +117,17 @@ def _structure(
     document: StructureDocument, model: AnyModel, primitives: Mapping[str, Primitive]
 ) -> EnsembleStructure:
     parameters = np.array(document.parameters, dtype=np.float64)
-    found: AnyModel
+    structure: AnyModel
     if isinstance(model, Model):
         terms = tuple(_regressor(text, primitives) for text in document.regressors)
-        found = replace(model, regressors=terms, theta=None, standard_errors=None)
+        structure = replace(model, regressors=terms, theta=None, standard_errors=None)
     elif isinstance(model, CoupledModel):
-        found = read_coupled(document.model or {}, "the ensemble", primitives)
+        structure = read_coupled(document.model or {}, "the ensemble", primitives)
     else:
-        found = model_from_json(json.dumps(document.model), "the ensemble")
-    if parameters.shape[1] != found.size:
-        raise ValueError(f"{parameters.shape[1]} parameters for {found.size} terms")
-    return EnsembleStructure(found, document.weight, parameters, document.law)
+        structure = model_from_json(json.dumps(document.model), "the ensemble")
+    if parameters.shape[1] != structure.size:
+        raise ValueError(f"{parameters.shape[1]} parameters for {structure.size} terms")
+    return EnsembleStructure(structure, document.weight, parameters, document.law)
 
 
 def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:

@@ -28,16 +28,16 @@ class SegmentLanes(Sequence[Segment]):
 
     def __init__(self, segments: Iterable[Segment]) -> None:
         self._segments = tuple(segments)
-        self.counts = np.array([np.count_nonzero(~np.isnan(each.y)) for each in self])
+        self.counts = np.array([np.count_nonzero(~np.isnan(segment.y)) for segment in self])
         # The lanes of one segment would take eight times its memory.
         lanes = 0 if len(self) == 1 else -(-len(self) // VECTOR) * VECTOR
         self._lengths = np.zeros(lanes, np.int64)
         if lanes:
-            self._lengths[: len(self)] = [len(each.y) for each in self]
+            self._lengths[: len(self)] = [len(segment.y) for segment in self]
             self._u = np.zeros((max(self._lengths), self[0].u.shape[1], lanes))
             self._y = np.full((max(self._lengths), lanes), np.nan)
-            for lane, each in enumerate(self):
-                self._u[: len(each.y), :, lane], self._y[: len(each.y), lane] = each.u, each.y
+            for lane, segment in enumerate(self):
+                self._u[: len(segment.y), :, lane], self._y[: len(segment.y), lane] = segment.u, segment.y
 
     def __len__(self) -> int:
         """Return the number of segments."""

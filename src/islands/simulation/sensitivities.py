@@ -40,10 +40,12 @@ class Sensitivities:
     ) -> None:
         # One-step-ahead predictions read measured outputs, which do not depend on the parameters.
         products = [] if interval == 1 else sorted(products, key=lambda product: product[1].lag)
-        self._program = link([*regressors, *(_multiply(each.factors) for _, each in products)])
+        self._program = link([*regressors, *(_multiply(derivative.factors) for _, derivative in products)])
         self._terms = np.array([term for term, _ in products], np.int64)
-        self._weights = np.array([each.weight for _, each in products])
-        lags, counts = np.unique(np.array([each.lag for _, each in products], np.int64), return_counts=True)
+        self._weights = np.array([derivative.weight for _, derivative in products])
+        lags, counts = np.unique(
+            np.array([derivative.lag for _, derivative in products], np.int64), return_counts=True
+        )
         self._lags, self._ends = lags, np.cumsum(counts, dtype=np.int64)
         self._cut = layout(record, warm_up, interval, WIDTHS)
         starts = np.argsort(self._cut.start)
@@ -88,10 +90,10 @@ def make_sensitivities(
     """Return the `Sensitivities` of a model; None if a regressor has no known derivative."""
     products: list[tuple[int, OutputDerivative]] = []
     for term, regressor in enumerate(regressors):
-        found = differentiate_by_outputs(regressor.expression)
-        if found is None:
+        derivatives = differentiate_by_outputs(regressor.expression)
+        if derivatives is None:
             return None
-        products += [(term, each) for each in found]
+        products += [(term, derivative) for derivative in derivatives]
     return Sensitivities(regressors, products, record, warm_up, interval)
 
 

@@ -121,8 +121,8 @@ class LinearSimulator(Simulator):
         """Simulate several runs; those with the same input share its delay, and equal forces."""
         inputs = {run.input_key: run.apply_characteristic(run.x, context.dt) for run in runs}
         deviations = {key: delay_samples(x, self.delay) - self.reference_input for key, x in inputs.items()}
-        found = np.empty((len(runs), runs[0].x.size))
-        for row, run in zip(found, runs, strict=True):
+        outputs = np.empty((len(runs), runs[0].x.size))
+        for row, run in zip(outputs, runs, strict=True):
             numerator, denominator, level, state = self.split_values(run.values)
             # The input is constant before the first sample; the state is a deviation from that equilibrium.
             state = state + (inputs[run.input_key][0] - self.reference_input) * self.state_at_rest
@@ -130,8 +130,8 @@ class LinearSimulator(Simulator):
             row[:] = level + filter_linearly(numerator, poles, deviations[run.input_key], state)
         if runs[0].forces:
             coordinates = [inputs[run.input_key] for run in runs]
-            found += sum_output_forces(coordinates, context, [run.forces for run in runs])
-        return found[:, ::every]
+            outputs += sum_output_forces(coordinates, context, [run.forces for run in runs])
+        return outputs[:, ::every]
 
     def simulate_at_rest(self, u: Signal) -> Signal:
         """Simulate the output of the nominal values, from the rest at the reference input."""
@@ -169,7 +169,7 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
             "order or a longer record"
         )
     delayed = delay_samples(u, delay) - u[0]
-    found, smallest = None, np.inf
+    best, smallest = None, np.inf
     denominator = np.zeros(order)
     for _ in range(_ITERATIONS):
         prefilter = np.concatenate([[1.0], -denominator])
@@ -179,10 +179,10 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
         simulated = level + filter_linearly(numerator, np.concatenate([[1.0], -denominator]), delayed)
         mean_square = float(np.mean((y - simulated)[order + delay :] ** 2))
         if mean_square < smallest:
-            found, smallest = (numerator, denominator, level), mean_square
-    if found is None:  # no iteration gave a stable model: use a static gain
-        found = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
-    return LinearSimulator(*found, float(u[0]), delay, record.output_unit or "1")
+            best, smallest = (numerator, denominator, level), mean_square
+    if best is None:  # no iteration gave a stable model: use a static gain
+        best = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
+    return LinearSimulator(*best, float(u[0]), delay, record.output_unit or "1")
 
 
 def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:

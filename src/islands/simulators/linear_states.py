@@ -142,9 +142,9 @@ class Cascade(LinearStates):
     def values(self) -> dict[str, float]:
         """Values of the parameters by name."""
         numbers = [""] if self.times.size == 1 else [f"{place + 1}" for place in range(self.times.size)]
-        found = {f"K{number}": float(gain) for number, gain in zip(numbers, self.gains, strict=True)}
-        found |= {f"T{number}": float(time) for number, time in zip(numbers, self.times, strict=True)}
-        return found | self._own_values
+        values = {f"K{number}": float(gain) for number, gain in zip(numbers, self.gains, strict=True)}
+        values |= {f"T{number}": float(time) for number, time in zip(numbers, self.times, strict=True)}
+        return values | self._own_values
 
     @property
     def is_simple(self) -> bool:
@@ -182,13 +182,13 @@ class Cascade(LinearStates):
                 OdeParameter(each, value, units[each], None, *bounds[each], positive=each in times)
                 for each, value in self.values.items()
             ),
-            states=tuple(OdeState(each, output_unit, self.level) for each in self.states),
+            states=tuple(OdeState(state, output_unit, self.level) for state in self.states),
             force=OdeForce("u", "", output_unit, Symbol("u")),
             contains=("offset",),
             # The level is an offset of each state.
             effects=tuple(
-                OdeEffect(f"{limit}:{each}")
-                for each in self.states
+                OdeEffect(f"{limit}:{state}")
+                for state in self.states
                 for limit in ("state-clip", "state-range")
             ),
         )
@@ -357,7 +357,7 @@ def approximate_cascade(
         process.
     """
     cascades = [each for each in known if isinstance(each, Cascade)]
-    if linear.denominator.size != MAX_ORDER or any(each.is_simple for each in cascades):
+    if linear.denominator.size != MAX_ORDER or any(cascade.is_simple for cascade in cascades):
         return None
     pole = float(single.denominator[0])
     if not 0.0 < pole < 1.0:

@@ -167,7 +167,7 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         own, added = simulator.parameters, parameters(context)[:-1]
         recordings = split_recordings(simulator, context)
 
-        moved = np.vstack([np.zeros(len(own)), _STEP * np.diag([each.scale for each in own])])
+        moved = np.vstack([np.zeros(len(own)), _STEP * np.diag([parameter.scale for parameter in own])])
         at_rest, *changed = _simulate_shapes(recordings, moved, [{}] * len(moved))[:, :fitted]
         known = [(output - at_rest) / _STEP for output in changed]
         u = context.u[:fitted]
@@ -175,17 +175,17 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         trials: list[tuple[float, tuple[float, ...]]] = []
         for factor in _SLOPES:
             slope = factor * regression_slope
-            shapes = [{SLOPE: slope, each.name: _STEP * each.scale} for each in added]
+            shapes = [{SLOPE: slope, parameter.name: _STEP * parameter.scale} for parameter in added]
             outputs = _simulate_shapes(recordings, np.zeros((len(shapes), len(own))), shapes)[:, :fitted]
             columns = known + [(output - at_rest) / _STEP for output in outputs]
             design = np.column_stack(columns)
             if not np.isfinite(design).all():
                 continue
             sizes = np.linalg.norm(design, axis=0) + 1e-300
-            found = np.linalg.lstsq(design / sizes, residual[:fitted], rcond=_CUTOFF)[0] / sizes
-            remaining = float(np.sum((residual[:fitted] - design @ found) ** 2))
-            scales = [each.scale for each in added]
-            trials.append((remaining, (*(found[len(own) :] * scales).tolist(), slope)))
+            solution = np.linalg.lstsq(design / sizes, residual[:fitted], rcond=_CUTOFF)[0] / sizes
+            remaining = float(np.sum((residual[:fitted] - design @ solution) ** 2))
+            scales = [parameter.scale for parameter in added]
+            trials.append((remaining, (*(solution[len(own) :] * scales).tolist(), slope)))
         return tuple(point for _, point in sorted(trials)[:_STARTING_POINTS])
 
     return Effect(

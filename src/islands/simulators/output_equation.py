@@ -68,7 +68,7 @@ class OutputEquation(SimulatorWrapper, BatchSimulator):
             keys.append(key)
         outputs = self.simulator.simulate_batch(list(distinct.values()), context)
         simulated = dict(zip(distinct, outputs, strict=True))
-        names = [each.name for each in self.system.parameters]
+        names = [parameter.name for parameter in self.system.parameters]
         signals: dict[tuple[int, int], dict[str, Signal]] = {}
         found = []
         for run, key in zip(runs, keys, strict=True):

@@ -106,9 +106,9 @@ def _describe(stored: StoredDataset) -> dict[str, Any]:
     document = stored.preview["fmu"]
     parameters, initial = list_calibrated(read_fmu(document, stored.name))
     variables = {
-        each["name"]: {key: each[key] for key in ("name", "unit", "start", "lower", "upper")}
+        variable["name"]: {key: variable[key] for key in ("name", "unit", "start", "lower", "upper")}
         for kind in ("states", "parameters", "inputs", "outputs")
-        for each in document[kind]
+        for variable in document[kind]
     }
 
     def choose(names: Any) -> list[dict[str, Any]]:
@@ -118,8 +118,8 @@ def _describe(stored: StoredDataset) -> dict[str, Any]:
         **_summarise(stored),
         "fmi": document["version"],
         "interface": document["interface"],
-        "inputs": choose(each["name"] for each in document["inputs"]),
-        "outputs": choose(each["name"] for each in document["outputs"]),
+        "inputs": choose(variable["name"] for variable in document["inputs"]),
+        "outputs": choose(variable["name"] for variable in document["outputs"]),
         "parameters": choose(parameters),
         "initial": choose(initial),
         "most_parameters": MAX_DEFAULT_PARAMETERS,

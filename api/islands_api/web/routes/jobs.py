@@ -152,15 +152,15 @@ async def job(
 
     `progress.position` of a queued job changes with other jobs: read it without `If-None-Match`.
     """
-    found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
-    if wait and matches_etag(if_none_match, etag(found)) and found.state not in TERMINAL:
-        found = await _wait_for_change(state, found, wait)
-    headers = {"ETag": etag(found), "Cache-Control": REVALIDATE}
-    if found.state not in TERMINAL:
+    current = await state.run_blocking(state.store.jobs.get, caller.owner, job)
+    if wait and matches_etag(if_none_match, etag(current)) and current.state not in TERMINAL:
+        current = await _wait_for_change(state, current, wait)
+    headers = {"ETag": etag(current), "Cache-Control": REVALIDATE}
+    if current.state not in TERMINAL:
         headers["Retry-After"] = "1"
-    if matches_etag(if_none_match, etag(found)):
+    if matches_etag(if_none_match, etag(current)):
         return Response(status_code=304, headers=headers)
-    return JSONDocument(await describe_job(state, found), headers=headers)
+    return JSONDocument(await describe_job(state, current), headers=headers)
 
 
 @router.patch("/{job}", response_model=JobView, responses={200: {"headers": {"ETag": ETAG}}})

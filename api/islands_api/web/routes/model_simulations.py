@@ -83,13 +83,13 @@ async def _get_simulated_model(state: AppState, caller: Principal, entry: Job, r
         As `get_model`, or the model has several outputs.
     """
     key = entry.id, entry.version, rank
-    found = state.simulated_models.get(key)
-    if found is None:
+    model = state.simulated_models.get(key)
+    if model is None:
         stored = await get_model(state, caller, entry.id, rank)
         document = await get_result(state, entry)
-        found = await state.run_blocking(read_simulated_model, entry.id, stored, document)
-        state.simulated_models.store(key, found)
-    return found
+        model = await state.run_blocking(read_simulated_model, entry.id, stored, document)
+        state.simulated_models.store(key, model)
+    return model
 
 
 async def _get_beginning(

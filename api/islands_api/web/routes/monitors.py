@@ -110,12 +110,12 @@ async def monitor(monitor: Id, caller: Reader, state: AppStateDep, if_none_match
 
     With `If-None-Match`, the status is 304 if the monitor has not changed.
     """
-    found = await state.run_blocking(state.store.monitors.get, caller.owner, monitor)
-    if matches_etag(if_none_match, tag := _make_etag(found)):
+    stored = await state.run_blocking(state.store.monitors.get, caller.owner, monitor)
+    if matches_etag(if_none_match, tag := _make_etag(stored)):
         return Response(status_code=304, headers={"ETag": tag, "Cache-Control": REVALIDATE})
-    found, document = await state.run_blocking(state.store.monitors.result, caller.owner, monitor)
-    headers = {"ETag": _make_etag(found), "Cache-Control": REVALIDATE}
-    return Response(_render(found, document), headers=headers, media_type="application/json")
+    stored, document = await state.run_blocking(state.store.monitors.result, caller.owner, monitor)
+    headers = {"ETag": _make_etag(stored), "Cache-Control": REVALIDATE}
+    return Response(_render(stored, document), headers=headers, media_type="application/json")
 
 
 @router.get("/{monitor}/state", response_model=SavedMonitorState)

@@ -108,9 +108,9 @@ class Formula:
         if self.quantities is not None:
             return tuple(self.quantities(values, context))
         given = [
-            (each, float(value))
-            for each, value in zip(parameters, values, strict=False)  # copies of initial states follow
-            if not each.initial
+            (parameter, float(value))
+            for parameter, value in zip(parameters, values, strict=False)  # copies of initial states follow
+            if not parameter.initial
         ]
         symbols = self.symbols or tuple(each.name for each, _ in given)
         return tuple(

@@ -95,7 +95,7 @@ class _CProgram(EquationProgram):
         if given.hold == "band-limited":
             lines.append("if (samples > 0 && samples <= REACH + 1) return -1; /* too short for the filter */")
         maps = [*given.input_maps, *given.output_maps]
-        rows = max((len(each.operators) for each in maps), default=0)
+        rows = max((len(signal_map.operators) for signal_map in maps), default=0)
         if maps:
             count = max(rows + bool(given.input_maps), 1)
             lines += [
@@ -106,7 +106,10 @@ class _CProgram(EquationProgram):
             lines += [
                 f"double *const x = rows + {rows}*samples;",
                 f"for (size_t k = 0; k < samples; ++k) x[k] = record->{self.input}[k];",
-                *(f"if (samples > 0) {map_function(each)}(p, record, x, rows);" for each in given.input_maps),
+                *(
+                    f"if (samples > 0) {map_function(signal_map)}(p, record, x, rows);"
+                    for signal_map in given.input_maps
+                ),
                 f"mapped.{self.input} = x;",
             ]
         return lines + self._map_moments(has_rows=bool(maps))
@@ -117,7 +120,7 @@ class _CProgram(EquationProgram):
         if not given.moment_maps:
             return []
         value = self.interpolate(given.system.input)
-        rows = max(len(each.operators) for each in given.moment_maps)
+        rows = max(len(signal_map.operators) for signal_map in given.moment_maps)
         failure = "{ free(rows); return -1; }" if has_rows else "return -1;"
         return [
             "struct record fine = mapped;",
@@ -131,8 +134,8 @@ class _CProgram(EquationProgram):
             f"    moments[j] = {value};",
             "}",
             *(
-                f"if (samples > 0) {map_function(each)}(p, &fine, moments, moments + fine.samples);"
-                for each in given.moment_maps
+                f"if (samples > 0) {map_function(signal_map)}(p, &fine, moments, moments + fine.samples);"
+                for signal_map in given.moment_maps
             ),
             f"mapped.{self.moments} = moments;",
         ]
@@ -154,10 +157,10 @@ class _CProgram(EquationProgram):
 
     def wrap_signals(self, sources: Iterable[Symbol]) -> str:
         found = []
-        for each in sources:
-            value = self.read(each)
+        for source in sources:
+            value = self.read(source)
             unused = "".join(f"{line}\n    " for line in self.begin([value], "p"))
-            name = self.code.identifiers[each.name]
+            name = self.code.identifiers[source.name]
             found.append(SIGNAL.format(name=name, unused=unused, value=value))
         return "".join(found)
 

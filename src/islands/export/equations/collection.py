@@ -86,7 +86,9 @@ class _Collection:
 
     def collect(self) -> ExtendedEquations:
         core, system = self.levels[-1], self.system
-        self.values |= {each.name: NamedValue(each.value, each.unit) for each in system.parameters}
+        self.values |= {
+            parameter.name: NamedValue(parameter.value, parameter.unit) for parameter in system.parameters
+        }
         self.columns[system.input] = core.inputs[0]
         if self.core is None:
             self.columns |= {name: self._find_column(name) for name in system.channels}
@@ -125,7 +127,7 @@ class _Collection:
             output_maps=tuple(output_maps),
             characteristic=self.characteristic,
             moment_maps=tuple(self.moment_maps),
-            forces=() if has_equation else tuple(self._make_force(*each) for each in self.laws),
+            forces=() if has_equation else tuple(self._make_force(*law) for law in self.laws),
             gain=self.gain,
             gain_signal=factor,
             core=self.core,
@@ -136,7 +138,7 @@ class _Collection:
 
     def _find_column(self, name: str) -> str:
         columns = self.levels[-1].inputs[1:]
-        found = [each for each in columns if name in (each, parse_channel_name(each).stem)]
+        found = [column for column in columns if name in (column, parse_channel_name(column).stem)]
         if len(found) != 1:
             raise refuse(f"an extended simulation without one column of the channel {name}")
         return found[0]
@@ -197,22 +199,22 @@ class _Collection:
 
     def _take_characteristic(self, maps: list[SignalMap]) -> list[SignalMap]:
         """Take the last maps if they act between samples; return the others."""
-        last = count_sampled_maps([CATALOGUE[each.effect] for each in maps])
-        if any(each.operators for each in maps[last:]):
+        last = count_sampled_maps([CATALOGUE[signal_map.effect] for signal_map in maps])
+        if any(signal_map.operators for signal_map in maps[last:]):
             self.moment_maps = maps[last:]
             return maps[:last]
-        for each in maps[last:]:
+        for signal_map in maps[last:]:
             before = self.characteristic or Symbol("x")
-            self.characteristic = substitute(each.equation, {"x": before})
+            self.characteristic = substitute(signal_map.equation, {"x": before})
         return maps[:last]
 
     def _find_channel(self, effect: str, thermal: bool) -> str:
         """Return the name of the channel of an effect, which is found by its unit."""
         columns = self.levels[-1].inputs[1:]
-        found = [each for each in columns if (parse_channel_name(each).unit in TEMPERATURES) == thermal]
-        if len(found) != 1 and len(columns) != 1:
+        channels = [each for each in columns if (parse_channel_name(each).unit in TEMPERATURES) == thermal]
+        if len(channels) != 1 and len(columns) != 1:
             raise refuse(f"the effect {effect}, since several channels or none may be meant,")
-        column = (found or columns)[0]
+        column = (channels or columns)[0]
         name = next((name for name, own in self.columns.items() if own == column), column)
         self.columns[name] = column
         return name

@@ -54,7 +54,10 @@ class _MatlabProgram(EquationProgram):
 
     def map_input(self) -> list[str]:
         column = f"r.{self.input}"
-        lines = [f"{column} = {map_function(each)}(p, r, {column}, c);" for each in self.given.input_maps]
+        lines = [
+            f"{column} = {map_function(signal_map)}(p, r, {column}, c);"
+            for signal_map in self.given.input_maps
+        ]
         if not self.given.moment_maps:
             return lines
         moments = f"r.{self.moments}"
@@ -69,7 +72,8 @@ class _MatlabProgram(EquationProgram):
             f"fine.samples = numel({moments});",
         ]
         return lines + [
-            f"{moments} = {map_function(each)}(p, fine, {moments}, c);" for each in self.given.moment_maps
+            f"{moments} = {map_function(signal_map)}(p, fine, {moments}, c);"
+            for signal_map in self.given.moment_maps
         ]
 
     def map_output(self) -> list[str]:

@@ -42,8 +42,8 @@ class EquationProgram(ABC):
     def write(self) -> str:
         """Return the program."""
         given, language = self.given, self.language
-        operators = {name for each in self.maps for name, _ in each.operators}
-        has_slopes = not given.core or any(each.state for each in given.forces)
+        operators = {name for signal_map in self.maps for name, _ in signal_map.operators}
+        has_slopes = not given.core or any(force.state for force in given.forces)
         text = language.program.format(
             **self.describe_data(),
             **self._reading(),
@@ -51,7 +51,7 @@ class EquationProgram(ABC):
             output=self._indent(self._output()),
             move=self._fill(language.move, moves=self._moves()) if has_slopes else "",
             operators="".join(f"{text}\n" for name, text in language.operators.items() if name in operators),
-            maps="".join(self._map(each) for each in self.maps),
+            maps="".join(self._map(signal_map) for signal_map in self.maps),
             forces=self._forces() if given.forces else "",
         )
         return self.complete(text)
@@ -267,12 +267,12 @@ class EquationProgram(ABC):
         targets = [f"force_{place}" for place in range(len(given.forces))]
         forces = self.code.assign(
             [
-                (f"{language.declare}{name}", each.force)
-                for name, each in zip(targets, given.forces, strict=True)
+                (f"{language.declare}{name}", force.force)
+                for name, force in zip(targets, given.forces, strict=True)
             ],
             local,
         )
-        slopes = {each.state: each.slope for each in given.forces if each.slope is not None}
+        slopes = {force.state: force.slope for force in given.forces if force.slope is not None}
         changes = self._assign_slopes(slopes, local)
         changes = [
             *self.begin(changes, *arguments),
@@ -293,11 +293,15 @@ class EquationProgram(ABC):
     def _reading(self) -> dict[str, str]:
         """Return the functions that read the signals of the equations, and those that they call."""
         given, code, language = self.given, self.code, self.language
-        lines = [f"in.{code.identifiers[render(each)]} = {self.read(each)};" for each in code.read_signals]
+        lines = [
+            f"in.{code.identifiers[render(signal)]} = {self.read(signal)};" for signal in code.read_signals
+        ]
         lines = [*self.begin(lines, "p", "r", "step", "part"), *lines]
         signals = self._fill(language.signals, lines=lines)
         sources = {
-            str(each.arguments[0]): each.arguments[0] for each in code.signals if isinstance(each, Apply)
+            str(signal.arguments[0]): signal.arguments[0]
+            for signal in code.signals
+            if isinstance(signal, Apply)
         }
         read = [name for name in given.columns if Symbol(name) in {*code.signals, *sources.values()}]
         if given.forces and given.system.input not in read:
@@ -368,7 +372,7 @@ class EquationProgram(ABC):
         return self._fill(
             language.core,
             lines=[*self.begin(lines, "p", "s"), *lines],
-            functions="".join(f"{language.define(each)}\n" for each in primitives),
+            functions="".join(f"{language.define(primitive)}\n" for primitive in primitives),
         )
 
     def _model(self, block: Block, u: str, measured: str) -> list[str]:

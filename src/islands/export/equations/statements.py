@@ -138,11 +138,11 @@ class EquationCode:
         """Signals that the equations read: input, channels, time, gain, their rates and delays."""
         system = self.equations.system
         needed = [right for _, right in (*system.derivatives, *system.variables)]
-        found: dict[str, Expression] = {}
+        read: dict[str, Expression] = {}
         for right in (*needed, system.output):
-            for each in _find_signals(right, {*system.signals, TIME}):
-                found.setdefault(render(each), each)
-        return tuple(found.values())
+            for signal in _find_signals(right, {*system.signals, TIME}):
+                read.setdefault(render(signal), signal)
+        return tuple(read.values())
 
     @property
     def read_signals(self) -> tuple[Expression, ...]:
@@ -192,10 +192,10 @@ class EquationCode:
 
     def wrap(self, line: str) -> list[str]:
         """Break a long statement between its operations."""
-        found = textwrap.wrap(
+        lines = textwrap.wrap(
             line, _WIDTH - 12, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
         )
-        return [f"{each}{self.language.continuation}" for each in found[:-1]] + found[-1:]
+        return [f"{each}{self.language.continuation}" for each in lines[:-1]] + lines[-1:]
 
     def assign_variables(self, readers: Iterable[Expression]) -> list[str]:
         """Write the variables that expressions read, each after those that it reads."""

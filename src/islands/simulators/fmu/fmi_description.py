@@ -90,14 +90,14 @@ def read_model_description(path: str, most: int | None = None) -> ModelDescripti
                 "states, the most of this service: export it with fewer parameters"
             )
 
-    found = _parse(path, _INTERFACE, (), check)
-    description = ModelDescription(found.root, found.interfaces, [*found.kept.values(), *found.aliases])
-    if found.derivatives:
-        check(len(description.variables) + len(found.derivatives))
-        states = [found.pointers.get(each) for each in found.derivatives]
+    read = _parse(path, _INTERFACE, (), check)
+    description = ModelDescription(read.root, read.interfaces, [*read.kept.values(), *read.aliases])
+    if read.derivatives:
+        check(len(description.variables) + len(read.derivatives))
+        states = [read.pointers.get(pointer) for pointer in read.derivatives]
         kept = _parse(path, (), frozenset(filter(None, states)), check).kept
-        description.states = [None if each is None else kept.get(each) for each in states]
-    description.indicators = found.count_indicators()
+        description.states = [None if state is None else kept.get(state) for state in states]
+    description.indicators = read.count_indicators()
     return description
 
 
@@ -373,10 +373,10 @@ def read_description(path: str, interface: str = "", most: int | None = None) ->
     fmpy = import_fmpy()
     try:
         # Not validated: many tools write descriptions that violate a rule but can be simulated.
-        found = read_model_description(path, most)
-        version = int(found.version.partition(".")[0])
-        variables = [(each["causality"], _make_variable(each)) for each in found.variables]
-        states = [None if each is None else _make_variable(each) for each in found.states]
+        read = read_model_description(path, most)
+        version = int(read.version.partition(".")[0])
+        variables = [(variable["causality"], _make_variable(variable)) for variable in read.variables]
+        states = [None if state is None else _make_variable(state) for state in read.states]
         with Path(path).open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
             files = zipfile.ZipFile(stream).namelist()
@@ -385,9 +385,9 @@ def read_description(path: str, interface: str = "", most: int | None = None) ->
     except Exception as error:  # those of the parser, of the archive and of numbers that are none
         raise ModelError(f"{path} cannot be read as an FMU ({error}): write fmu:FILE.fmu") from error
     if version not in (2, 3):
-        raise ModelError(f"{path} is of FMI {found.version}: export it for FMI 2.0 or 3.0")
-    chosen = _choose_interface(path, found, interface)
-    offered = found.interfaces[_ELEMENTS[chosen]]
+        raise ModelError(f"{path} is of FMI {read.version}: export it for FMI 2.0 or 3.0")
+    chosen = _choose_interface(path, read, interface)
+    offered = read.interfaces[_ELEMENTS[chosen]]
     _check_platform(path, files, fmpy.platform_tuple if version == 3 else fmpy.platform)
     if chosen == FmiInterface.MODEL_EXCHANGE and None in states:
         raise ModelError(f"{path} has states that are not scalars of type real: export them as scalars")
@@ -404,11 +404,11 @@ def read_description(path: str, interface: str = "", most: int | None = None) ->
         inputs=choose("input"),
         outputs=choose("output"),
         parameters=tuple(each for each in choose("parameter") if each.start is not None),
-        states=tuple(each for each in states if each is not None),
-        settable=tuple(each["name"] for each in found.states if each is not None and _is_settable(each)),
+        states=tuple(state for state in states if state is not None),
+        settable=tuple(state["name"] for state in read.states if state is not None and _is_settable(state)),
         fixed_step=None if fixed_step is None else float(fixed_step),
         has_variable_step=_is_true(offered, "canHandleVariableCommunicationStepSize"),
-        indicators=found.indicators,
+        indicators=read.indicators,
         completes=(
             not _is_true(offered, "completedIntegratorStepNotNeeded")
             if version == 2

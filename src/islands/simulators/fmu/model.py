@@ -102,7 +102,7 @@ class FmuModel:
     symbols: Mapping[str, str] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        taken = {OUTPUT, *(each.variable.name for each in self.parameters)}
+        taken = {OUTPUT, *(parameter.variable.name for parameter in self.parameters)}
         symbols: dict[str, str] = {}
         states = (each.variable for each in self.initial if each.place >= 0)
         for variable in (self.input, *self.channels, *states, self.output):
@@ -174,7 +174,7 @@ def choose_variables(
         description,
         chosen_input,
         chosen_output,
-        tuple(_find(name, "input", inputs, each) for each in channels),
+        tuple(_find(name, "input", inputs, channel) for channel in channels),
         tuple(
             _make_parameter(name, _find(name, "parameter", known, each), choice)
             for each, choice in parameters.items()

@@ -61,7 +61,7 @@ def simulate_fmu(
     list of FmuRun
         Outputs of the program at the start of each step.
     """
-    is_signal = [not (isinstance(each, Apply) and each.primitive == FMU) for each in program.signals]
+    is_signal = [not (isinstance(signal, Apply) and signal.primitive == FMU) for signal in program.signals]
     signals = _stack_signals(list(itertools.compress(program.signals, is_signal)), dt, lanes)
     values, pack = LaneValues(program, lanes), _make_packer(model, program, np.array(is_signal, dtype=bool))
     inputs = {each.reference: model.symbols[each.name] for each in (model.input, *model.channels)}
@@ -76,7 +76,10 @@ def simulate_fmu(
 
 def _find_start_values(model: FmuModel, lane: LaneInput) -> dict[int, float]:
     """Return the start values of variables by value reference."""
-    values = {each.variable.reference: lane.parameters[each.variable.name] for each in model.parameters}
+    values = {
+        parameter.variable.reference: lane.parameters[parameter.variable.name]
+        for parameter in model.parameters
+    }
     for each in model.initial:
         if each.place < 0:
             values[each.variable.reference] = lane.initial_states[each.variable.name]
@@ -99,8 +102,8 @@ def _make_packer(
     model: FmuModel, program: OdeProgram, is_signal: NDArray[np.bool_]
 ) -> Callable[..., FmuEquations]:
     """Return a function that makes the equations of a lane of its values and signals."""
-    known = {model.symbols[each.variable.name]: each.place for each in model.initial if each.place >= 0}
-    references = {each.variable.name: each.variable.reference for each in model.initial}
+    known = {model.symbols[start.variable.name]: start.place for start in model.initial if start.place >= 0}
+    references = {start.variable.name: start.variable.reference for start in model.initial}
     references[model.symbols[model.output.name]] = model.output.reference
     derivatives, values = [], []
     for expression, row in zip(program.signals, program.instructions.signals, strict=True):
@@ -147,11 +150,11 @@ class FmuSimulator(OdeSimulator):
     source: FmuSource = field(default=LOCAL_FMUS, kw_only=True)
 
     def _list_initial_states(self) -> tuple[Parameter, ...]:
-        found = []
-        for (name, nominal), each in zip(self.initial.items(), self.model.initial, strict=True):
-            lower, upper = min(each.variable.lower, nominal), max(each.variable.upper, nominal)
-            found.append(self._make_initial(name, each.variable.unit, lower, upper))
-        return tuple(found)
+        parameters = []
+        for (name, nominal), start in zip(self.initial.items(), self.model.initial, strict=True):
+            lower, upper = min(start.variable.lower, nominal), max(start.variable.upper, nominal)
+            parameters.append(self._make_initial(name, start.variable.unit, lower, upper))
+        return tuple(parameters)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what the simulator is made of, since the functions of its effects cannot be pickled."""
@@ -163,7 +166,7 @@ class FmuSimulator(OdeSimulator):
     def run_nominal(self, context: SimulationContext, outputs: tuple[Expression, ...]) -> FmuRun:
         """Simulate expressions of the system at its nominal values; the result says why if it fails."""
         program = generate_program(self.system, outputs)
-        run = SimulationRun(np.array([each.nominal for each in self.parameters]), context.u, {}, ())
+        run = SimulationRun(np.array([parameter.nominal for parameter in self.parameters]), context.u, {}, ())
         lanes = self._make_lanes(program, (), [run], context)
         dt = context.dt / self._steps
         fmu = self.source.load(self.model.description)
@@ -179,8 +182,8 @@ class FmuSimulator(OdeSimulator):
         every: int,
     ) -> Signal:
         fmu = self.source.load(self.model.description)
-        found = simulate_fmu(fmu, self.model, program, start_time, dt, lanes)
-        return np.stack([each.y for each in found])[:, :, ::every]
+        runs = simulate_fmu(fmu, self.model, program, start_time, dt, lanes)
+        return np.stack([run.y for run in runs])[:, :, ::every]
 
 
 def make_fmu_simulator(
@@ -207,8 +210,8 @@ def make_fmu_simulator(
     _check_units(model, record)
     _check_sampling_time(model, record.dt)
     channels = {
-        symbols[each.name]: find_channel(each.name, record, f"{description.name} reads")
-        for each in model.channels
+        symbols[channel.name]: find_channel(channel.name, record, f"{description.name} reads")
+        for channel in model.channels
     }
     initial = _find_initial_values(model, record)
     is_integrated = description.interface == FmiInterface.MODEL_EXCHANGE

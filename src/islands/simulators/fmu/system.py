@@ -49,8 +49,8 @@ def make_fmu_system(
     symbols = model.symbols
     system = _make_plain_system(model, symbols)
     parsed = parse_equations(equations)
-    for each in parsed:
-        _check_target(each, system)
+    for equation in parsed:
+        _check_target(equation, system)
     given = {each.target: each.expression for each in parsed}
     states = {name for name, _ in system.derivatives}
     system = replace(
@@ -78,16 +78,16 @@ def _make_plain_system(model: FmuModel, symbols: Mapping[str, str]) -> OdeSystem
     return OdeSystem(
         name=model.description.name,
         input=driving,
-        channels=tuple(symbols[each.name] for each in model.channels),
+        channels=tuple(symbols[channel.name] for channel in model.channels),
         derivatives=tuple((name, _call_fmu(name)) for name in names),
         variables=(),
         output=Symbol(output) if is_state else _call_fmu(output),
         parameters=tuple(
             OdeParameter(
-                *(each.variable.name, each.value, each.variable.unit, each.tolerance),
-                *(each.lower, each.upper, each.fixed),
+                *(parameter.variable.name, parameter.value, parameter.variable.unit, parameter.tolerance),
+                *(parameter.lower, parameter.upper, parameter.fixed),
             )
-            for each in model.parameters
+            for parameter in model.parameters
         ),
         states=tuple(OdeState(name, variable.unit) for name, variable in states),
         force=OdeForce(driving, "", "", Symbol(driving)),
@@ -128,18 +128,18 @@ def _check_names(
 ) -> None:
     """Check that every name has one meaning, and that the equations read the coefficients."""
     names = [*system.signals, *(name for name, _ in system.derivatives)]
-    names += [name for name, _ in system.variables] + [each.name for each in system.parameters]
-    targets = [each.target for each in equations]
+    names += [name for name, _ in system.variables] + [parameter.name for parameter in system.parameters]
+    targets = [equation.target for equation in equations]
     for name in (*targets, *names):
         if targets.count(name) > 1 or names.count(name) > 1:
             raise ModelError(f"the equations of {system.name}: {name!r} is defined twice: rename one")
-    read = {name for each in equations for name in find_symbols(each.expression)}
+    read = {name for equation in equations for name in find_symbols(equation.expression)}
     if system.force and system.force.rate and FORCE not in read:
         raise ModelError(
             f"no equation of {system.name} reads {FORCE}: subtract it in that of a state, as in "
             "dv/dt = fmu(v) - force/m"
         )
-    if unused := [each.name for each in coefficients if each.name not in read]:
+    if unused := [coefficient.name for coefficient in coefficients if coefficient.name not in read]:
         raise ModelError(f"no equation of {system.name} reads the coefficient {', '.join(unused)}: remove it")
 
 

@@ -59,33 +59,33 @@ def find_effects(system: OdeSystem, sizes: Mapping[str, float]) -> tuple[frozens
     ModelError
         A listed effect does not exist.
     """
-    supported, found = set(GAIN_EFFECTS), []
-    states = {each.name: each for each in system.states}
-    for each in list_terms(system):
-        cause, _, place = each.name.partition(":")
+    supported, effects = set(GAIN_EFFECTS), []
+    states = {state.name: state for state in system.states}
+    for term in list_terms(system):
+        cause, _, place = term.name.partition(":")
         unit = states[place].unit if place in states else ""
-        if each.name in _SUPPORTED:
-            supported.add(each.name)
-        elif cause == "input-offset" and place and each.term:
+        if term.name in _SUPPORTED:
+            supported.add(term.name)
+        elif cause == "input-offset" and place and term.term:
             # A listed offset has the unit of the input, which its term converts.
             own = () if system.effects else (f"{unit or '1'}/s", sizes[f"d{place}/dt"])
-            found.append(input_offset(place, *own))
-        elif cause == "outflow-law" and place and each.term:
-            found.append(outflow_law(place))
-        elif cause == "state-clip" and place in states and not each.term:
+            effects.append(input_offset(place, *own))
+        elif cause == "outflow-law" and place and term.term:
+            effects.append(outflow_law(place))
+        elif cause == "state-clip" and place in states and not term.term:
             # A listed limit has the size of the output: that of a state which is not measured is uncertain.
             size = 0.0 if system.effects else sizes[place]
-            found.append(state_clip(place, unit or "1", size, spills=bool(states[place].spills_into)))
-        elif cause == "state-range" and place in states and not each.term:
-            found.append(state_range(place, unit or "1"))
+            effects.append(state_clip(place, unit or "1", size, spills=bool(states[place].spills_into)))
+        elif cause == "state-range" and place in states and not term.term:
+            effects.append(state_range(place, unit or "1"))
         else:
             raise ModelError(
-                f"[effects] {each.name}: there is no such effect: take input-offset:NAME, outflow-law:NAME, "
-                f"{', '.join(sorted(_SUPPORTED))}, each with equation and term, or state-clip:STATE or "
+                f"[effects] {term.name}: there is no such effect: take input-offset:NAME, outflow-law:NAME, "
+                f"{', '.join(sorted(_SUPPORTED))}, term with equation and term, or state-clip:STATE or "
                 f"state-range:STATE without them"
                 f"{suggest(cause, ('input-offset', 'outflow-law', 'state-clip', 'state-range', *_SUPPORTED))}"
             )
-    return frozenset(supported), tuple(found)
+    return frozenset(supported), tuple(effects)
 
 
 def find_limits(

@@ -120,10 +120,10 @@ def list_signals(
 ) -> tuple[list[SampledSignal], NDArray[np.int64]]:
     """Return the signals of all lanes once each, and their indices, shape (lanes, expressions)."""
     made: dict[tuple[object, ...], SampledSignal] = {}
-    found = [[make_signal(expression, dt, lane, made) for expression in expressions] for lane in lanes]
-    signals = {id(each): each for row in found for each in row}
+    rows = [[make_signal(expression, dt, lane, made) for expression in expressions] for lane in lanes]
+    signals = {id(signal): signal for row in rows for signal in row}
     places = {key: index for index, key in enumerate(signals)}
-    indices = [[places[id(each)] for each in row] for row in found]
+    indices = [[places[id(signal)] for signal in row] for row in rows]
     return list(signals.values()), np.array(indices, dtype=np.int64).reshape(len(lanes), -1)
 
 

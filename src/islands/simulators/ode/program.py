@@ -277,8 +277,8 @@ class _Generator:
         """Give each leaf its row, in the order of `OdeProgram`; return their number."""
         leaves = [
             *(self._known["number", value] for value in self.constants),
-            *(self._named[each.name] for each in self.system.parameters),
-            *(self._known["signal", render(each)] for each in self.signals),
+            *(self._named[parameter.name] for parameter in self.system.parameters),
+            *(self._known["signal", render(signal)] for signal in self.signals),
             *(self._named[name] for name, _ in self.system.derivatives),
         ]
         for row, node in enumerate(leaves):
@@ -372,14 +372,14 @@ class _Generator:
         while stack:
             node = self.nodes[stack[-1]]
             operation, operands = self._fuse(node)
-            missing = [each for each in operands if self.nodes[each].row < 0]
+            missing = [operand for operand in operands if self.nodes[operand].row < 0]
             if node.row < 0 and missing:
                 stack += reversed(missing)
                 continue
             stack.pop()
             if node.row < 0:
                 node.row, self._rows = self._rows, self._rows + 1
-                rows = [self.nodes[each].row for each in operands]
+                rows = [self.nodes[operand].row for operand in operands]
                 padded = (rows * 3)[:3] if rows else [0, 0, 0]
                 section = _OUTPUTS if outputs_only and node.level > _PARAMETERS else node.level
                 self._sections[section].append((operation, node.row, *rows, *padded[len(rows) :]))

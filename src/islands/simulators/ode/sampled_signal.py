@@ -164,15 +164,19 @@ def find_channel(name: str, record: Dataset, reader: str) -> str:
     RecordError
         There is no such channel, or several.
     """
-    found = [each for each in record.input_names[1:] if each == name or parse_channel_name(each).stem == name]
-    if len(found) != 1:
+    channels = [
+        column
+        for column in record.input_names[1:]
+        if column == name or parse_channel_name(column).stem == name
+    ]
+    if len(channels) != 1:
         others = ", ".join(record.input_names[1:]) or "none"
         raise RecordError(
             f"{reader} the channel {name}, and the channels of the record are {others}: give its column as "
             f"a channel, and name it {name} there"
             f"{suggest(name, record.input_names[1:])}"
         )
-    return found[0]
+    return channels[0]
 
 
 def sample_channels(

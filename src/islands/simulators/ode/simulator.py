@@ -116,7 +116,7 @@ class OdeSimulator(BatchSimulator):
     @property
     def tolerances(self) -> Mapping[str, float]:
         """Tolerances of the parameters that have one."""
-        free = (each for each in self.system.parameters if not each.fixed)
+        free = (parameter for parameter in self.system.parameters if not parameter.fixed)
         return {each.name: each.tolerance for each in free if each.tolerance is not None}
 
     @property
@@ -264,8 +264,8 @@ class OdeSimulator(BatchSimulator):
         common = {name: signal.refine(steps) for name, signal in common.items()}
         refined: dict[int, SampledSignal] = {}
         made: dict[tuple[int, int], SampledSignal] = {}
-        names = [each.name for each in self.parameters]
-        fixed = {each.name: each.value for each in self.system.parameters}
+        names = [parameter.name for parameter in self.parameters]
+        fixed = {parameter.name: parameter.value for parameter in self.system.parameters}
         lanes = []
         for run in runs:
             effects = run.effect_parameters
@@ -287,7 +287,7 @@ class OdeSimulator(BatchSimulator):
             given = dict(zip(names, run.values.tolist(), strict=True))
             laws = list(enumerate(run.forces)) if self._has_force_equation else []
             calls = [law for _, law in laws if not is_term(law[0])]
-            numbers, states = list_values([each for each in laws if is_term(each[1][0])], context)
+            numbers, states = list_values([law for law in laws if is_term(law[1][0])], context)
             lanes.append(
                 LaneInput(
                     {**fixed, **given, **{each.name: effects[each.name] for each in active}, **numbers},
@@ -342,13 +342,15 @@ def make_ode_simulator(
     system = fill_units(system, record.input_units[0], record.output_unit)
     channels = {name: find_channel(name, record, "the equations read") for name in system.channels}
     first = float(np.nan_to_num(record.y[0]))
-    initial = {each.name: _find_initial(each, system, first) for each in system.states}
+    initial = {state.name: _find_initial(state, system, first) for state in system.states}
     initial |= estimated
     # Extended equations start from the estimates on other records, except the state that is measured.
     hidden = {name: value for name, value in estimated.items() if system.output != Symbol(name)}
     system = replace(
         system,
-        states=tuple(replace(each, initial=hidden.get(each.name, each.initial)) for each in system.states),
+        states=tuple(
+            replace(state, initial=hidden.get(state.name, state.initial)) for state in system.states
+        ),
     )
     sized = [*initial, *(f"d{name}/dt" for name in initial)]
     shots = make_shots(system, record) if system.shooting else None
@@ -401,6 +403,6 @@ def fill_units(system: OdeSystem, input_unit: str, output_unit: str) -> OdeSyste
 
     return replace(
         system,
-        parameters=tuple(replace(each, unit=fill(each.unit)) for each in system.parameters),
-        states=tuple(replace(each, unit=fill(each.unit)) for each in system.states),
+        parameters=tuple(replace(parameter, unit=fill(parameter.unit)) for parameter in system.parameters),
+        states=tuple(replace(state, unit=fill(state.unit)) for state in system.states),
     )

@@ -204,8 +204,8 @@ class OdeSystem:
 
     def write_equations(self) -> str:
         """Write the equations in one line, as ``dx/dt = v; dv/dt = (u - k*x)/m; output = x``."""
-        parts = [f"{name} = {render(each)}" for name, each in self.variables]
-        parts += [f"d{name}/dt = {render(each)}" for name, each in self.derivatives]
+        parts = [f"{name} = {render(right)}" for name, right in self.variables]
+        parts += [f"d{name}/dt = {render(right)}" for name, right in self.derivatives]
         return "; ".join([*parts, f"output = {render(self.output)}"])
 
     @property

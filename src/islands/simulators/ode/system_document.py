@@ -81,8 +81,8 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
     )
     _check_sizes(system)
     _check_unique(system, equations)
-    for each in equations:
-        check_symbols(each.expression, system, each.place)
+    for equation in equations:
+        check_symbols(equation.expression, system, equation.place)
     check_symbols(system.output, system, f"output, {document['output']!r}")
     if system.force is not None:
         check_symbols(system.force.drive, system, "[force] drive")
@@ -163,11 +163,15 @@ def _check_sizes(system: OdeSystem) -> None:
 
 def _check_unique(system: OdeSystem, equations: Sequence[Equation]) -> None:
     """Check that each name is legal and has one meaning."""
-    places = {each.target: each.place for each in equations}
-    for name in (*system.signals, *(each.name for each in system.parameters)):
+    places = {equation.target: equation.place for equation in equations}
+    for name in (*system.signals, *(parameter.name for parameter in system.parameters)):
         check_name(name, f"name {name!r}")
     counted = Counter(
-        [*system.signals, *(each.target for each in equations), *(each.name for each in system.parameters)]
+        [
+            *system.signals,
+            *(equation.target for equation in equations),
+            *(parameter.name for parameter in system.parameters),
+        ]
     )
     for name, count in counted.items():
         if count > 1:
@@ -183,7 +187,7 @@ def _check_used(system: OdeSystem) -> None:
     """Check that the output can depend on the parameters: one that no equation reads cannot be calibrated."""
     read = {name for _, each in (*system.derivatives, *system.variables) for name in find_symbols(each)}
     read |= set(find_symbols(system.output))
-    unused = [each.name for each in system.parameters if each.name not in read]
+    unused = [parameter.name for parameter in system.parameters if parameter.name not in read]
     if unused:
         raise ModelError(
             f"no equation reads the parameter {', '.join(unused)}: correct its name or remove it"
@@ -195,7 +199,7 @@ def _check_used(system: OdeSystem) -> None:
 def _check_effects(system: OdeSystem) -> None:
     """Check effects, the parameter that is the gain, and the states that others spill into."""
     names = [each.name for each in system.states]
-    parameters = [each.name for each in system.parameters]
+    parameters = [parameter.name for parameter in system.parameters]
     if system.gain and system.gain not in parameters:
         raise ModelError(
             f"gain: there is no parameter {system.gain!r}: take one of [parameters]"
@@ -234,17 +238,17 @@ def describe_system(system: OdeSystem) -> dict[str, Any]:
         "parameters": {
             each.name: _given(each, OdeParameter(each.name, each.value)) for each in system.parameters
         },
-        "states": {each.name: _given(each, OdeState(each.name)) for each in system.states},
+        "states": {state.name: _given(state, OdeState(state.name)) for state in system.states},
         "input_unit": system.input_unit,
         "output_unit": system.output_unit,
         "steps": system.steps,
         "gain": system.gain,
         "shooting": system.shooting,
         "contains": list(system.contains),
-        "effects": {each.name: _describe_effect(each) for each in system.effects},
+        "effects": {effect.name: _describe_effect(effect) for effect in system.effects},
     }
-    for each in system.parameters:
-        document["parameters"][each.name]["value"] = each.value
+    for parameter in system.parameters:
+        document["parameters"][parameter.name]["value"] = parameter.value
     if system.force is not None:
         document["force"] = {
             "coordinate": system.force.coordinate,

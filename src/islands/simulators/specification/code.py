@@ -133,8 +133,8 @@ class FmuSpec(SimulatorSpec):
     @classmethod
     def from_system(cls, model: FmuModel, system: OdeSystem) -> "FmuSpec":
         """Return the specification of an FMU with its variables and the equations around it."""
-        values = {each.name: each.value for each in system.parameters}
-        own = {each.variable.name for each in model.parameters}
+        values = {parameter.name: parameter.value for parameter in system.parameters}
+        own = {parameter.variable.name for parameter in model.parameters}
         described = describe_system(system)
         return cls(
             kind="fmu",
@@ -142,16 +142,16 @@ class FmuSpec(SimulatorSpec):
             interface=model.description.interface.value,
             input=model.input.name,
             output=model.output.name,
-            channels=tuple(each.name for each in model.channels),
+            channels=tuple(channel.name for channel in model.channels),
             parameters={
-                each.variable.name: FmuParameterSpec(
-                    value=values[each.variable.name],
-                    tolerance=each.tolerance,
-                    lower=None if isinf(each.lower) else each.lower,
-                    upper=None if isinf(each.upper) else each.upper,
-                    fixed=each.fixed,
+                parameter.variable.name: FmuParameterSpec(
+                    value=values[parameter.variable.name],
+                    tolerance=parameter.tolerance,
+                    lower=None if isinf(parameter.lower) else parameter.lower,
+                    upper=None if isinf(parameter.upper) else parameter.upper,
+                    fixed=parameter.fixed,
                 )
-                for each in model.parameters
+                for parameter in model.parameters
             },
             initial=tuple(each.variable.name for each in model.initial),
             steps=system.steps,
