@@ -158,13 +158,30 @@ def settings_class(cls: type[T]) -> type[T]:
     return cast("type[T]", made)
 
 
-def document_settings(cls: type, name: str) -> Callable[[F], F]:
-    """Let the signature and the docstring of a function list settings in place of ``**name``."""
+class _OfPreset:
+    """Default that a preset has."""
+
+    def __repr__(self) -> str:
+        return "..."
+
+
+_OF_PRESET = _OfPreset()
+
+
+def document_settings(cls: type, name: str, *, of_preset: bool = False) -> Callable[[F], F]:
+    """Let the signature and the docstring of a function list settings in place of ``**name``.
+
+    Parameters
+    ----------
+    of_preset : bool
+        Whether the defaults are those of a preset, which the signature does not state.
+    """
 
     def decorate(function: F) -> F:
         declared = signature(function)
         own = [each for each in declared.parameters.values() if each.name != name]
-        function.__signature__ = declared.replace(parameters=[*own, *_parameters(cls)])  # type: ignore[attr-defined]
+        listed = [each.replace(default=_OF_PRESET) if of_preset else each for each in _parameters(cls)]
+        function.__signature__ = declared.replace(parameters=[*own, *listed])  # type: ignore[attr-defined]
         function.__doc__ = str(function.__doc__).replace(
             f"**{name}\n", _describe(cls, "    ").lstrip() + "\n"
         )

@@ -1,9 +1,7 @@
 """Choice of an engine by name."""
 
 from contextlib import contextmanager
-from dataclasses import fields
 from importlib.metadata import EntryPoint
-from typing import get_type_hints
 
 import pytest
 
@@ -11,7 +9,6 @@ import islands
 from islands.evolution.engine import SerialEngine
 from islands.facade import engine_choice
 from islands.facade.engine_choice import open_engine
-from islands.facade.setting_changes import SettingChanges
 from support.searches import record
 
 OPENED = []
@@ -95,7 +92,3 @@ def test_impossible_cores_of_ray_are_refused(arguments):
 def test_ray_is_installed_under_its_name():
     (entry,) = engine_choice.entry_points(group=engine_choice.GROUP)
     assert (entry.name, entry.value) == ("ray", "islands_service.engines:ray_engine")
-
-
-def test_the_typed_changes_of_a_preset_are_the_settings():
-    assert [*get_type_hints(SettingChanges)] == [each.name for each in fields(islands.Settings)]
