@@ -12,7 +12,7 @@ import reference_api
 import reference_cli
 import reference_discrepancy
 import reference_rest
-from tables import attributes, code, codes, entries, escape, page, section, summarise, table
+from tables import code, codes, entries, escape, page, section, summarise, table
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.gene_structure import STRUCTURES
@@ -162,7 +162,7 @@ def systems() -> str:
     )
     return page(
         "Systems and published models",
-        "Simulated systems of `islands systems`, and models that the paper publishes.",
+        "Simulated systems of `islands examples --system`, and models that the paper publishes.",
         section("Systems", table(("System", "Meaning", "Variants", "Parts"), rows)),
         section(
             "Published models",
@@ -186,17 +186,16 @@ def output_formats() -> str:
 
 def service_settings() -> str:
     """Return the page of the service's settings."""
-    described = attributes(ServiceSettings)
     prefix = ServiceSettings.model_config["env_prefix"]
     rows = (
-        (code(f"{prefix}{name.upper()}"), _default(field), escape(described.get(name, "")))
-        for name, field in ServiceSettings.model_fields.items()
+        (code(f"{prefix}{name.upper()}"), values, _default(info), escape(str(info.description)))
+        for name, info, values in list_settings(ServiceSettings)
     )
     return page(
         "Settings of the service",
         "Environment variables that all roles of the service read; `islands serve` has options for the most "
-        "common ones. Units are bytes, seconds and counts.",
-        table(("Variable", "Default", "Meaning"), rows),
+        "common ones, and `--set` for all. Units are bytes, seconds and counts.",
+        table(("Variable", "Values", "Default", "Meaning"), rows),
     )
 
 

@@ -127,5 +127,5 @@ def test_errors_say_what_to_do_and_keep_existing_results(folder: Path) -> None:
     (folder / "other.json").write_text("{}")
     assert "holds no model, result or simulation" in fail("show", folder / "other.json")
     assert "unknown system 'pendulum': take one of bouc-wen-piezo" in fail(
-        "systems", "pendulum", "--out", folder / "p.csv"
+        "examples", folder / "p.csv", "--system", "pendulum"
     )

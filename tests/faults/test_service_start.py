@@ -79,8 +79,8 @@ def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     said = refused("--data-dir", folder, "--host", "0.0.0.0", "--port", free_port())
     assert "0.0.0.0 can be reached by other machines, and there is no key" in said
-    assert "create one with 'islands keys create --scope read --scope write'" in said
-    secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()[0]
+    assert "create one with 'islands admin keys --scope read --scope write'" in said
+    secret = succeed("admin", "keys", "--scope", "read", "--data-dir", folder).split()[0]
     with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
         assert service.client.get("/v1/jobs").status_code == 401
         answer = service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {secret}"})
@@ -103,14 +103,14 @@ def test_key_in_a_file_is_enough_for_the_first_start(tmp_path: Path) -> None:
 def test_api_without_a_valid_key_starts_when_a_key_is_created(tmp_path: Path) -> None:
     """No other role ends, so that jobs continue to run."""
     folder = tmp_path / "data"
-    secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder)
+    secret = succeed("admin", "keys", "--scope", "read", "--data-dir", folder)
     key = secret.removeprefix("islands_").partition("_")[0]
     with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
-        succeed("keys", "revoke", key, "--data-dir", folder)
+        succeed("admin", "keys", "--revoke", key, "--data-dir", folder)
         kill(service.one("api"))
         eventually(lambda: "api ended (2): it is started again" in service.log.read_text())
         assert "there is no key: create one" in " ".join(service.log.read_text().split())
-        succeed("keys", "create", "--scope", "read", "--data-dir", folder)
+        succeed("admin", "keys", "--scope", "read", "--data-dir", folder)
         service.ready()
 
 

@@ -76,7 +76,7 @@ def test_missing_or_unknown_key_is_rejected(
     "key", ["", "  ", f"{SECRET}\nX-Other: 1", f"{SECRET} {SECRET}", f"{SECRET}ü", f"\0{SECRET}"]
 )
 def test_malformed_key_is_rejected_without_showing_the_key(connect: Any, key: str) -> None:
-    with pytest.raises(SettingsError, match="give it as 'islands keys create' printed it") as caught:
+    with pytest.raises(SettingsError, match="give it as 'islands admin keys' printed it") as caught:
         connect("http://127.0.0.1:9", key)
     assert SECRET not in format_error(caught.value)
 

@@ -21,7 +21,7 @@ from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
 
-CREATE = ("create", "--simulation", "bouc-wen-piezo", "--input", "u_V", "--output", "y_um")
+CREATE = ("add", "--simulation", "bouc-wen-piezo", "--input", "u_V", "--output", "y_um")
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +40,10 @@ def run(service: Service, monkeypatch: pytest.MonkeyPatch, command_line: Run) ->
 
 @pytest.mark.ci
 def test_a_monitor_is_created_listed_shown_and_deleted(run: Run) -> None:
-    code, shown, _ = run(*CREATE, "--false-alarms", "1 per 720 records", "--name", "press 4", "--json")
-    made = json.loads(shown)
-    assert (code, made["spec"]["false_alarms"]) == (0, "1 per 720 records")
+    code, shown, _ = run(*CREATE, "--false-alarms", "1 per 720 records", "--name", "press 4")
+    assert (code, shown.endswith(" (press 4): waiting, records 0, alarms 0\n")) == (0, True)
+    made = json.loads(run("show", shown.split()[1], "--json")[1])
+    assert made["spec"]["false_alarms"] == "1 per 720 records"
     assert made["id"] in run("show")[1]
     assert run("show", made["id"])[1] == f"monitor {made['id']} (press 4): waiting, records 0, alarms 0\n"
     code, _, complaint = run("show", made["id"], "--out", "states")
@@ -58,7 +59,7 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(
     run: Run, command_line: Run, service: Service, tmp_path: Path
 ) -> None:
     saved = reject_record(follow(make_records(1)), "short.csv", "", "it is too short")
-    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
+    monitor = run(*CREATE)[1].split()[1].rstrip(":")
     submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
     job, _ = service.store.jobs.submit(submission)
     texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
@@ -73,7 +74,7 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(
     assert rejected == "short.csv: rejected: it is too short"
     assert (tmp_path / "states" / "state.json").read_text() == texts[0]
     assert json.loads((tmp_path / "states" / "monitor.json").read_text()) == json.loads(texts[1])
-    code, shown, _ = command_line("jobs", "result", job.id, "--out", "record")
-    assert (code, shown) == (0, "record 0: normal\nrecord/: record.json\n")
+    code, shown, _ = command_line("jobs", "show", job.id, "--out", "record")
+    assert (code, shown) == (0, f"job {job.id}: succeeded\nrecord 0: normal\nrecord/: record.json\n")
     assert json.loads((tmp_path / "record" / "record.json").read_text()) == {"record": {}}
     assert "<svg" in (tmp_path / "states" / "monitor.svg").read_text()
