@@ -44,6 +44,7 @@ def search_settings() -> str:
         *(
             section(_title(cls), f"Of {codes(names)}.", _settings(cls))
             for cls, names in reference_cli.settings().items()
+            if cls is not ServiceSettings  # which have a page
         ),
         section("Gene structures", "Values of `structure`.", entries("Structure", STRUCTURES)),
         section(
@@ -207,7 +208,7 @@ def _default(field: Any) -> str:
 
 def _shown(value: object) -> str:
     match value:
-        case tuple():
+        case tuple() | dict():
             return ",".join(map(str, value)) or "none"
         case "":
             return "none"

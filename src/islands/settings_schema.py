@@ -23,6 +23,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
+    WithJsonSchema,
     WrapValidator,
     create_model,
 )
@@ -87,8 +88,8 @@ def setting(
     **bounds
         ``ge``, ``gt``, ``le``, ``lt``, ``max_length`` of pydantic.
     """
-    names = list(choices)
-    extra: dict[str, Any] = {"daily": daily, "unit": unit, "choices": names}
+    choice = _Choice(default, choices) if choices else None
+    extra = {"daily": daily, "unit": unit}
     made = {"default": default} if default_factory is None else {"default_factory": default_factory}
     info = Field(
         **made,
@@ -96,8 +97,10 @@ def setting(
         json_schema_extra={name: value for name, value in extra.items() if value},
         **bounds,
     )
-    if names:
-        info.metadata.append(AfterValidator(_Choice(default, choices)))
+    if choice:
+        names = {"enum": list(choice.names)}
+        schema = names if None in choice.names else {"type": "string", **names}
+        info.metadata += [AfterValidator(choice), WithJsonSchema(schema)]
     if isinstance(default, tuple):
         info.metadata.append(AS_TUPLE)
     return info

@@ -63,7 +63,7 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         assert (done.progress["generation"], done.progress["generations"]) == (5, 5)
         generations = [point.generation for point in client.history(job).items]
         assert generations == sorted(set(generations))
-        succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
+        succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "result")
         assert "y1(k) =" in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
         names = [name_free_run(1, number) for number in (1, 2)]
         stored = [service.store.results.artefact(job.id, name) for name in names]
@@ -103,7 +103,7 @@ def test_a_job_has_the_latent_models_of_the_library(service, dataset, tmp_path):
         run(service, job)
         assert client.models(job)[0].kind == "coupled-latent"
         assert client.report(job).count(b"<img") == 2
-        succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
+        succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "result")
         assert "y1(k) =" in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
     files = CoupledRecord(
         tuple(islands.read_record(tmp_path / "masses.csv", "u", name) for name in ("y1", "y2"))

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from islands.diagnosis.monitoring.alarm_rate import parse_alarm_rate
+from islands.errors import SettingsError
 from islands.settings_schema import Integer, setting, setting_of, settings_class
 
 #: Interval at which every rate per time is below one per record.
@@ -13,7 +14,10 @@ _SHORT_INTERVAL = 1e-9
 
 def _check_rate(text: str) -> str:
     # It is checked again with the interval between the records, which may be that of the first one.
-    parse_alarm_rate(text, _SHORT_INTERVAL)
+    try:
+        parse_alarm_rate(text, _SHORT_INTERVAL)
+    except SettingsError as error:
+        raise ValueError(str(error)) from error
     return text
 
 
