@@ -164,8 +164,8 @@ class Checkout:
 
 def prepare(checkout: Checkout) -> None:
     """Make the records of simulated systems, and a model."""
-    checkout.run("systems", "bouc-wen-piezo", "--out", "piezo.csv")
-    checkout.run("systems", "s1", "--out", "s1.csv")
+    checkout.run("examples", "piezo.csv", "--system", "bouc-wen-piezo")
+    checkout.run("examples", "s1.csv", "--system", "s1")
     checkout.run("fit", "piezo.csv", *COLUMNS, "--out", "fit")
     checkout.run("fit", "piezo.csv", *COLUMNS, "--max-terms", "2", "--out", "small")
 
@@ -307,14 +307,12 @@ def interfaces(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
             ["demo"],
             ["bench"],
             ["trials"],
-            ["systems"],
-            ["systems"],
-            ["systems"],
+            ["examples"],
             ["serve"],
             ["jobs"],
-            ["keys"],
+            ["admin"],
         ]
-        for group in ("jobs", "keys"):
+        for group in ("jobs", "admin"):
             text = checkout.run(group, "--help")
             table = text[text.index("Commands") :]
             commands += [[group, name] for name in re.findall(r"^│ ([a-z-]+) ", table, re.MULTILINE)]

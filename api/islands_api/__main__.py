@@ -81,7 +81,7 @@ def check_safe(settings: ServiceSettings, store: Store) -> None:
         if settings.on_loopback:
             needs, other = "every request needs a key (require_keys)", "serve without --require-keys"
         raise SettingsError(
-            f"{needs}, and there is no key: create one with 'islands keys create --scope read --scope "
+            f"{needs}, and there is no key: create one with 'islands admin keys --scope read --scope "
             f"write', name a file with one in ISLANDS_ADMIN_KEY_FILE, or {other}"
         )
     if (settings.tls_certificate is None) != (settings.tls_key is None):

@@ -3,22 +3,13 @@
 from datetime import datetime
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
+from islands.settings_schema import setting_of
 from islands.simulators.specification.table import SimulationSpec
-from islands_api.schemas import DATASET_ID, ResponseModel
-from islands_service.domain.job import PRIORITIES
+from islands_api.schemas import DATASET_ID, ResponseModel, SubmissionSettings
 from islands_service.domain.job_spec import Name, Seconds, check_single
-from islands_service.domain.monitor_spec import (
-    DEFAULT_RATE,
-    TRAINING,
-    AlarmRate,
-    Interval,
-    Line,
-    RecordSpec,
-    Tolerances,
-    Training,
-)
+from islands_service.domain.monitor_spec import Line, Monitoring, RecordSpec
 from islands_service.domain.monitoring import MonitorStatus
 
 _JOB_ID = "5d1b0a7e9c3f4e52a1f60c7b8d9e0f12"
@@ -27,7 +18,7 @@ _JOB_ID = "5d1b0a7e9c3f4e52a1f60c7b8d9e0f12"
 _SIMULATION = ("simulation", "input", "output", "channels", "dt")
 
 
-class MonitorRequest(BaseModel):
+class MonitorRequest(Monitoring):
     """Request to follow a simulation from record to record: that of a diagnosis, or a given one."""
 
     model_config = ConfigDict(
@@ -67,21 +58,8 @@ class MonitorRequest(BaseModel):
     dt: Seconds | None = Field(
         default=None, description="Sampling time in seconds, if the records do not contain it."
     )
-    tolerance: Tolerances = Field(default_factory=dict)
-    false_alarms: Annotated[
-        AlarmRate, Field(description="Rate of false alarms of all monitored values together.")
-    ] = DEFAULT_RATE
-    interval: Interval = None
-    training: Training = TRAINING
     name: Annotated[Line, Field(description="Human-readable name; one line.")] = ""
-    priority: Annotated[
-        int,
-        Field(
-            ge=PRIORITIES.start,
-            le=PRIORITIES.stop - 1,
-            description="Priority of the jobs that analyse the records, among your own jobs.",
-        ),
-    ] = 0
+    priority: int = setting_of(SubmissionSettings, "priority")
 
     @model_validator(mode="after")
     def _check_simulation(self) -> Self:

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from islands.persistence.models import NARX
+from islands.settings_schema import setting, setting_of, settings_class
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -80,19 +81,22 @@ class JobLabels(BaseModel):
     tags: Tags | None = None
 
 
+@settings_class
+class SubmissionSettings:
+    """Settings of the submission of a job."""
+
+    priority: int = setting(
+        0, "Of your own jobs, higher ones run first.", ge=PRIORITIES.start, le=PRIORITIES.stop - 1
+    )
+    idempotency_key: str | None = setting(None, "Submitting again with the same key returns the same job.")
+
+
 class JobMetadata(BaseModel):
     """Fields of a job that do not influence its result."""
 
     name: JobName = ""
     tags: Tags = ()
-    priority: Annotated[
-        int,
-        Field(
-            ge=PRIORITIES.start,
-            le=PRIORITIES.stop - 1,
-            description="Of your own jobs, those with a higher priority run first.",
-        ),
-    ] = 0
+    priority: int = setting_of(SubmissionSettings, "priority")
 
     @property
     def spec(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import reference_api
 import reference_cli
 import reference_discrepancy
 import reference_rest
-from tables import attributes, code, codes, entries, escape, page, section, summarise, table
+from tables import code, codes, entries, escape, page, section, summarise, table
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.gene_structure import STRUCTURES
@@ -44,6 +44,7 @@ def search_settings() -> str:
         *(
             section(_title(cls), f"Of {codes(names)}.", _settings(cls))
             for cls, names in reference_cli.settings().items()
+            if cls is not ServiceSettings  # which have a page
         ),
         section("Gene structures", "Values of `structure`.", entries("Structure", STRUCTURES)),
         section(
@@ -162,7 +163,7 @@ def systems() -> str:
     )
     return page(
         "Systems and published models",
-        "Simulated systems of `islands systems`, and models that the paper publishes.",
+        "Simulated systems of `islands examples --system`, and models that the paper publishes.",
         section("Systems", table(("System", "Meaning", "Variants", "Parts"), rows)),
         section(
             "Published models",
@@ -186,17 +187,16 @@ def output_formats() -> str:
 
 def service_settings() -> str:
     """Return the page of the service's settings."""
-    described = attributes(ServiceSettings)
     prefix = ServiceSettings.model_config["env_prefix"]
     rows = (
-        (code(f"{prefix}{name.upper()}"), _default(field), escape(described.get(name, "")))
-        for name, field in ServiceSettings.model_fields.items()
+        (code(f"{prefix}{name.upper()}"), values, _default(info), escape(str(info.description)))
+        for name, info, values in list_settings(ServiceSettings)
     )
     return page(
         "Settings of the service",
         "Environment variables that all roles of the service read; `islands serve` has options for the most "
-        "common ones. Units are bytes, seconds and counts.",
-        table(("Variable", "Default", "Meaning"), rows),
+        "common ones, and `--set` for all. Units are bytes, seconds and counts.",
+        table(("Variable", "Values", "Default", "Meaning"), rows),
     )
 
 
@@ -208,7 +208,7 @@ def _default(field: Any) -> str:
 
 def _shown(value: object) -> str:
     match value:
-        case tuple():
+        case tuple() | dict():
             return ",".join(map(str, value)) or "none"
         case "":
             return "none"

@@ -51,17 +51,6 @@ def entries(header: str, found: Mapping[str, Any]) -> str:
     )
 
 
-def attributes(documented: type) -> dict[str, str]:
-    """Return the descriptions of a class's attributes, as its NumPy docstring has them."""
-    _, _, section = (inspect.getdoc(documented) or "").partition("Attributes\n----------\n")
-    described: dict[str, str] = {}
-    for match in re.finditer(r"^(\S[^\n]*)\n((?:[ ]+[^\n]*\n?|\n(?= ))*)", section, re.MULTILINE):
-        names = match[1].partition(" : ")[0]
-        for name in names.split(","):
-            described[name.strip()] = " ".join(match[2].split()).replace("``", "`").rstrip(".")
-    return described
-
-
 def page(title: str, introduction: str, *sections: str) -> str:
     """Return a page from its title, its first paragraph and its sections."""
     return "\n".join((f"# {title}\n", f"{' '.join(introduction.split())}\n", *sections))

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from islands.evolution.presets import PRESETS
 from islands.facade.identify import identify_record
-from islands.facade.setting_changes import SettingChanges
 from islands.models.narx import Model, require_narx
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
@@ -55,8 +55,8 @@ _DRAWS, _QUICK_DRAWS = 200, 20
 _QUICK_SAMPLES = (20_000, 5_000)
 
 #: Changes of our preset: two islands as in the demo, and those of the short form.
-_OURS: SettingChanges = {"islands": 2}
-_QUICK_OURS: SettingChanges = {"population": 60, "generations": 5, "islands": 1, "swap_search": False}
+_OURS: Mapping[str, Any] = {"islands": 2}
+_QUICK_OURS: Mapping[str, Any] = {"population": 60, "generations": 5, "islands": 1, "swap_search": False}
 
 #: Largest numbers of terms for which our preset is compared.
 _SIZES = (6, 9)

@@ -4,7 +4,7 @@ import os
 import re
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from platformdirs import user_data_path
 from pydantic import AfterValidator, Field, ValidationError, model_validator
@@ -12,6 +12,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.available_cpus import count_cpus
 from islands.errors import SettingsError
+from islands.settings_schema import setting
 
 #: Roles by the values of the claim of roles, if an issuer is given.
 DEFAULT_ROLES = (
@@ -136,217 +137,258 @@ def _is_for_one_user(given: dict[str, Any]) -> bool:
 
 
 class ServiceSettings(BaseSettings):
-    """Settings of all roles. Sizes are in bytes, times in seconds.
-
-    Attributes
-    ----------
-    data_dir
-        Folder of uploads and results, and of the database unless ``database`` is given.
-    database
-        ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
-    database_file
-        File that contains the ``database`` instead, for example a mounted secret.
-    blob_store
-        ``s3://BUCKET/PREFIX`` of an S3-compatible store for uploads, checkpoints, reports and figures, which
-        all machines share; by default the data folder. Needs the extra ``s3``. Endpoint and credentials are
-        those of AWS' environment variables and files, for example ``AWS_ENDPOINT_URL`` and
-        ``AWS_SHARED_CREDENTIALS_FILE``. No other service may use the prefix: what no row of the database
-        names is deleted.
-    blob_cache
-        Size of the local copies of what is in the ``blob_store``.
-    dataset_hosts
-        Hosts from which clients may let the service download data sets over HTTPS, separated by commas, each
-        with an optional port: ``data.example.org``. None by default. A host with a private address also has
-        to be one of ``private_hosts``.
-    dataset_buckets
-        Buckets, with optional prefixes, from which clients may do the same: ``s3://measurements/lab``. None
-        by default. The service reads them with its own credentials: every owner can read what is listed.
-    dataset_seconds
-        Longest time of such a download.
-    host, port
-        Address that the service listens on.
-    trusted_proxies
-        Addresses and networks of reverse proxies, separated by commas, whose headers ``X-Forwarded-For`` and
-        ``X-Forwarded-Proto`` are believed: ``127.0.0.1, 10.0.0.0/8``. None by default.
-    root_path
-        Path under which a proxy offers the service, for example ``/islands``; it precedes the path of every
-        ``Location``.
-    ray_address
-        ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine when a job needs it.
-    autoscaling
-        Whether the cluster starts machines for islands that wait for a CPU, such as one of KubeRay with an
-        autoscaler. A job then requests a CPU for each island, even if the cluster has fewer.
-    coordinators
-        Number of jobs that run at the same time: by default one for each core, at most four. They share the
-        cores of this machine, so that a long job does not keep the others waiting.
-    lease
-        Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
-        one second.
-    turn
-        Time from the first checkpoint of a running job after which it lets those of other owners pass, if
-        they have fewer running jobs: it returns to the queue at its next checkpoint, and continues from there
-        at the next turn of its owner.
-    short_search
-        Estimated time on one core up to which a search runs in the process of its coordinator, instead of on
-        Ray. With 0 every search runs on Ray.
-    checkpoint_every
-        Least time between two checkpoints: about the work that a crash can lose.
-    max_upload, max_unpacked
-        Largest upload, and largest size that it may unpack to: 100 times its own, at least 64 MB.
-    max_uploads, max_uploads_per_owner
-        Uploads in progress, of all owners and of one. The data folder needs room for ``max_uploads`` files of
-        ``max_upload`` bytes and three of ``max_unpacked`` bytes.
-    body_timeout, body_rate
-        Longest time without a byte of a request's body, and least bytes per second after that time; a rate of
-        0 disables the latter.
-    inspection_memory, inspection_seconds
-        Memory and time budget of the process that reads an uploaded file; a small file has less memory.
-    allow_fmus
-        Whether clients may upload FMUs, and simulate them in previews and diagnoses: by default those of a
-        service for one user, which needs no key. An FMU is native code; it runs in a process that can do
-        nothing but read the FMU and the installed software, as Linux 5.13 and later enforce.
-    max_stored
-        Largest total size of the data sets of one owner.
-    max_active
-        Queued and running jobs of one owner.
-    max_running, max_running_islands
-        Running jobs of one owner, and the sum of their islands, which is unlimited by default. Further jobs
-        stay in the queue.
-    max_run_seconds
-        Run time of one job, without its time in the queue. A search then ends with its best models so far, a
-        diagnosis fails.
-    max_streams
-        Open event streams of one owner, of each API process.
-    max_drawings
-        Requests of one owner whose figures are being drawn or wait for it, of each API process.
-    max_evaluations
-        Individuals that one job may evaluate.
-    max_islands
-        Islands of one job.
-    max_job_memory
-        Estimated memory of the individuals of one job: 11.4 kB for each. 0 means half of the memory of
-        the machine of the API; set it if the islands run on other machines.
-    retention
-        Time after which a finished job is deleted; 0 keeps it for ever. An idempotency key is valid as long.
-    dataset_retention
-        Time after which a data set that no job names is deleted; 0 keeps it for ever.
-    audit_retention
-        Time after which an entry of the audit trail is deleted; 0 keeps it for ever.
-    rate, burst
-        Requests per second of one key, and requests that it may send at once; a rate of 0 disables the limit.
-    admin_key_file
-        File with a key of at least 32 characters that has the scope ``admin``, for example a mounted secret.
-        With it the first keys can be created over REST. Without it that key is revoked.
-    oidc_issuer
-        URL of an OpenID Connect provider whose tokens are accepted in addition to keys. Then every request
-        needs a key or a token.
-    oidc_audience
-        Value that the claim ``aud`` of a token contains. Required with an issuer.
-    oidc_owner_claim
-        Claim that names the owner. It must be unique, and users must not be able to choose it.
-    oidc_role_claim
-        Claim with the roles: a list, or text with spaces. A path such as ``realm_access.roles`` is possible.
-    oidc_roles
-        Roles by the values of that claim, ``VALUE=ROLE``, separated by commas. The roles are ``reader``,
-        ``submitter``, ``monitor`` and ``administrator``.
-    oidc_algorithms
-        Accepted algorithms of signatures, separated by commas. All are asymmetric.
-    oidc_leeway
-        Tolerated difference of the clocks of the issuer and of this machine.
-    tls_certificate, tls_key
-        PEM files for HTTPS.
-    max_webhooks, max_monitors
-        Webhooks and monitors of one owner. 0 disables them.
-    private_hosts
-        Hosts to which the service may send requests for its clients though their addresses are private,
-        separated by commas, each with an optional port: ``hooks.lan:8443, 10.0.0.7``. None by default.
-    http_hosts
-        Hosts to which such requests may be sent without TLS, in the same form. None by default.
-    metrics_host, metrics_port
-        Address at which a coordinator serves its metrics to Prometheus, without a key; no metrics with
-        port 0. The coordinators of ``islands serve`` use this port and the following ones.
-    log_format
-        Format of log messages: ``text`` or ``json``.
-    telemetry
-        OTLP endpoint over HTTP for traces: ``http://collector:4318/v1/traces``. Needs the extra
-        ``telemetry``.
-    lifeline
-        File descriptor of the heartbeat pipe to ``islands serve``, set for its children.
-    readers
-        File descriptor of the socket to the process of ``islands serve`` that forks readers of files, set for
-        its children. Without it a process starts its own.
-    require_keys
-        Require a key on a loopback address too, for example behind a proxy.
-    """
+    """Settings of all roles. Sizes are in bytes, times in seconds."""
 
     model_config = SettingsConfigDict(env_prefix="ISLANDS_", frozen=True, extra="ignore")
 
-    data_dir: Path = Field(default_factory=lambda: user_data_path("islands"))
-    database: str = ""
-    database_file: Path | None = None
-    blob_store: BlobStore = ""
-    blob_cache: Count = 10_000_000_000
-    dataset_hosts: Hosts = ""
-    dataset_buckets: Buckets = ""
-    dataset_seconds: Positive = 300.0
-    host: str = "127.0.0.1"
-    port: Annotated[int, Field(ge=0, le=65535)] = 8000
-    trusted_proxies: Networks = ""
-    root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = ""
-    ray_address: str | None = None
-    autoscaling: bool = False
-    coordinators: Annotated[int, Field(ge=0, le=64)] = Field(
-        default_factory=lambda: min(count_cpus(), DEFAULT_COORDINATORS)
+    data_dir: Path = setting(
+        None,
+        "Folder of uploads and results, and of the database unless `database` is given.",
+        default_factory=lambda: user_data_path("islands"),
+        daily=True,
     )
-    lease: Annotated[float, Field(ge=1.0)] = 5.0
-    turn: Positive = 30.0
-    short_search: Annotated[float, Field(ge=0.0)] = 5.0
-    checkpoint_every: Positive = 5.0
-    max_upload: Count = 256_000_000
-    max_unpacked: Count = 1_000_000_000
-    max_uploads: Count = 32
-    max_uploads_per_owner: Count = 4
-    body_timeout: Positive = 30.0
-    body_rate: Annotated[float, Field(ge=0.0)] = 20_000.0
-    inspection_memory: Count = 6_000_000_000
-    inspection_seconds: Positive = 120.0
-    max_stored: Count = 5_000_000_000
-    max_active: Count = 10_000
-    max_running: Count = 1000
-    max_running_islands: Count | None = None
-    max_run_seconds: Count = 3600
-    max_streams: Count = 1000
-    max_drawings: Count = 100
-    max_evaluations: Count = 10_000_000_000
-    max_islands: Count = 256
-    max_job_memory: Annotated[int, Field(ge=0)] = 0
-    retention: Annotated[float, Field(ge=0.0)] = 90 * 86_400.0
-    dataset_retention: Annotated[int, Field(ge=0)] = 0
-    audit_retention: Annotated[float, Field(ge=0.0)] = 365 * 86_400.0
-    rate: Annotated[float, Field(ge=0.0)] = 50.0
-    burst: Count = 200
-    require_keys: bool = False
-    admin_key_file: Path | None = None
-    oidc_issuer: str = ""
-    oidc_audience: str = ""
-    oidc_owner_claim: Annotated[str, Field(min_length=1)] = "sub"
-    oidc_role_claim: Annotated[str, Field(min_length=1)] = "roles"
-    oidc_roles: str = DEFAULT_ROLES
-    oidc_algorithms: str = "RS256,PS256,ES256,Ed25519"
-    oidc_leeway: Annotated[float, Field(ge=0.0, le=300.0)] = 30.0
-    allow_fmus: bool = Field(default_factory=_is_for_one_user)
-    tls_certificate: Path | None = None
-    tls_key: Path | None = None
-    max_webhooks: Annotated[int, Field(ge=0)] = 10
-    max_monitors: Annotated[int, Field(ge=0)] = 100
-    private_hosts: Hosts = ""
-    http_hosts: Hosts = ""
-    metrics_host: str = "127.0.0.1"
-    metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
-    log_format: Literal["text", "json"] = "text"
-    telemetry: str = ""
-    lifeline: int | None = None
-    readers: int | None = None
+    database: str = setting(
+        "",
+        "`postgresql+psycopg://USER:PASSWORD@HOST/NAME`; by default SQLite in the data folder.",
+        daily=True,
+    )
+    database_file: Path | None = setting(
+        None, "File that contains the `database` instead, for example a mounted secret."
+    )
+    blob_store: BlobStore = setting(
+        "",
+        "`s3://BUCKET/PREFIX` of an S3-compatible store for uploads, checkpoints, reports and "
+        "figures, which all machines share; by default the data folder. Needs the extra `s3`. "
+        "Endpoint and credentials are those of AWS' environment variables and files, for example "
+        "`AWS_ENDPOINT_URL` and `AWS_SHARED_CREDENTIALS_FILE`. No other service may use the prefix: "
+        "what no row of the database names is deleted.",
+    )
+    blob_cache: Count = setting(10_000_000_000, "Size of the local copies of what is in the `blob_store`.")
+    dataset_hosts: Hosts = setting(
+        "",
+        "Hosts from which clients may let the service download data sets over HTTPS, separated by "
+        "commas, each with an optional port: `data.example.org`. None by default. A host with a "
+        "private address also has to be one of `private_hosts`.",
+    )
+    dataset_buckets: Buckets = setting(
+        "",
+        "Buckets, with optional prefixes, from which clients may do the same: "
+        "`s3://measurements/lab`. None by default. The service reads them with its own credentials: "
+        "every owner can read what is listed.",
+    )
+    dataset_seconds: Positive = setting(300.0, "Longest time of such a download.")
+    host: str = setting(
+        "127.0.0.1",
+        "Address that the service listens on; one that other machines can reach requires keys.",
+        daily=True,
+    )
+    port: Annotated[int, Field(ge=0, le=65535)] = setting(
+        8000, "Port that the service listens on.", daily=True
+    )
+    trusted_proxies: Networks = setting(
+        "",
+        "Addresses and networks of reverse proxies, separated by commas, whose headers "
+        "`X-Forwarded-For` and `X-Forwarded-Proto` are believed: `127.0.0.1, 10.0.0.0/8`. None "
+        "by default.",
+    )
+    root_path: Annotated[str, Field(pattern=r"^(/[A-Za-z0-9._~-]+)*$")] = setting(
+        "",
+        "Path under which a proxy offers the service, for example `/islands`; it precedes the path of "
+        "every `Location`.",
+    )
+    ray_address: str | None = setting(
+        None,
+        "`HOST:PORT` of a Ray cluster; by default a Ray head is started on this machine when a job needs it.",
+        daily=True,
+    )
+    autoscaling: bool = setting(
+        False,
+        "Whether the cluster starts machines for islands that wait for a CPU, such as one of KubeRay "
+        "with an autoscaler. A job then requests a CPU for each island, even if the cluster has "
+        "fewer.",
+    )
+    coordinators: Annotated[int, Field(ge=0, le=64)] = setting(
+        None,
+        "Number of jobs that run at the same time: by default one for each core, at most four. They "
+        "share the cores of this machine, so that a long job does not keep the others waiting.",
+        default_factory=lambda: min(count_cpus(), DEFAULT_COORDINATORS),
+        daily=True,
+    )
+    lease: Annotated[float, Field(ge=1.0)] = setting(
+        5.0,
+        "Duration of a lease without a heartbeat, after which another coordinator may claim the job; "
+        "at least one second.",
+    )
+    turn: Positive = setting(
+        30.0,
+        "Time from the first checkpoint of a running job after which it lets those of other owners "
+        "pass, if they have fewer running jobs: it returns to the queue at its next checkpoint, and "
+        "continues from there at the next turn of its owner.",
+    )
+    short_search: Annotated[float, Field(ge=0.0)] = setting(
+        5.0,
+        "Estimated time on one core up to which a search runs in the process of its coordinator, "
+        "instead of on Ray. With 0 every search runs on Ray.",
+    )
+    checkpoint_every: Positive = setting(
+        5.0, "Least time between two checkpoints: about the work that a crash can lose."
+    )
+    max_upload: Count = setting(
+        256_000_000,
+        "Largest upload.",
+    )
+    max_unpacked: Count = setting(
+        1_000_000_000,
+        "Largest size that an upload may unpack to: 100 times its own, at least 64 MB.",
+    )
+    max_uploads: Count = setting(
+        32,
+        "Uploads in progress. The data folder needs room for as many files of `max_upload` bytes "
+        "and three of `max_unpacked` bytes.",
+    )
+    max_uploads_per_owner: Count = setting(
+        4,
+        "Uploads in progress of one owner.",
+    )
+    body_timeout: Positive = setting(
+        30.0,
+        "Longest time without a byte of a request's body.",
+    )
+    body_rate: Annotated[float, Field(ge=0.0)] = setting(
+        20_000.0,
+        "Least bytes per second of a request's body after `body_timeout`; 0 for no limit.",
+    )
+    inspection_memory: Count = setting(
+        6_000_000_000,
+        "Memory of the process that reads an uploaded file; a small file has less.",
+    )
+    inspection_seconds: Positive = setting(
+        120.0,
+        "Time of the process that reads an uploaded file.",
+    )
+    max_stored: Count = setting(5_000_000_000, "Largest total size of the data sets of one owner.")
+    max_active: Count = setting(10_000, "Queued and running jobs of one owner.")
+    max_running: Count = setting(
+        1000,
+        "Running jobs of one owner. Further jobs stay in the queue.",
+    )
+    max_running_islands: Count | None = setting(
+        None,
+        "Sum of the islands of the running jobs of one owner, unlimited by default.",
+    )
+    max_run_seconds: Count = setting(
+        3600,
+        "Run time of one job, without its time in the queue. A search then ends with its best models "
+        "so far, a diagnosis fails.",
+    )
+    max_streams: Count = setting(1000, "Open event streams of one owner, of each API process.")
+    max_drawings: Count = setting(
+        100, "Requests of one owner whose figures are being drawn or wait for it, of each API process."
+    )
+    max_evaluations: Count = setting(10_000_000_000, "Individuals that one job may evaluate.")
+    max_islands: Count = setting(256, "Islands of one job.")
+    max_job_memory: Annotated[int, Field(ge=0)] = setting(
+        0,
+        "Estimated memory of the individuals of one job: 11.4 kB for each. 0 means half of the memory "
+        "of the machine of the API; set it if the islands run on other machines.",
+    )
+    retention: Annotated[float, Field(ge=0.0)] = setting(
+        90 * 86_400.0,
+        "Time after which a finished job is deleted; 0 keeps it for ever. An idempotency key is valid "
+        "as long.",
+    )
+    dataset_retention: Annotated[int, Field(ge=0)] = setting(
+        0, "Time after which a data set that no job names is deleted; 0 keeps it for ever."
+    )
+    audit_retention: Annotated[float, Field(ge=0.0)] = setting(
+        365 * 86_400.0, "Time after which an entry of the audit trail is deleted; 0 keeps it for ever."
+    )
+    rate: Annotated[float, Field(ge=0.0)] = setting(
+        50.0,
+        "Requests per second of one key; 0 for no limit.",
+    )
+    burst: Count = setting(
+        200,
+        "Requests that a key may send at once.",
+    )
+    require_keys: bool = setting(
+        False, "Require a key on a loopback address too, for example behind a proxy.", daily=True
+    )
+    admin_key_file: Path | None = setting(
+        None,
+        "File with a key of at least 32 characters that has the scope `admin`, for example a mounted "
+        "secret. With it the first keys can be created over REST. Without it that key is revoked.",
+    )
+    oidc_issuer: str = setting(
+        "",
+        "URL of an OpenID Connect provider whose tokens are accepted in addition to keys. Then every "
+        "request needs a key or a token.",
+    )
+    oidc_audience: str = setting(
+        "", "Value that the claim `aud` of a token contains. Required with an issuer."
+    )
+    oidc_owner_claim: Annotated[str, Field(min_length=1)] = setting(
+        "sub", "Claim that names the owner. It must be unique, and users must not be able to choose it."
+    )
+    oidc_role_claim: Annotated[str, Field(min_length=1)] = setting(
+        "roles",
+        "Claim with the roles: a list, or text with spaces. A path such as `realm_access.roles` is possible.",
+    )
+    oidc_roles: str = setting(
+        DEFAULT_ROLES,
+        "Roles by the values of that claim, `VALUE=ROLE`, separated by commas. The roles are "
+        "`reader`, `submitter`, `monitor` and `administrator`.",
+    )
+    oidc_algorithms: str = setting(
+        "RS256,PS256,ES256,Ed25519",
+        "Accepted algorithms of signatures, separated by commas. All are asymmetric.",
+    )
+    oidc_leeway: Annotated[float, Field(ge=0.0, le=300.0)] = setting(
+        30.0, "Tolerated difference of the clocks of the issuer and of this machine."
+    )
+    allow_fmus: bool = setting(
+        None,
+        "Whether clients may upload FMUs, and simulate them in previews and diagnoses: by default "
+        "those of a service for one user, which needs no key. An FMU is native code; it runs in a "
+        "process that can do nothing but read the FMU and the installed software, as Linux 5.13 and "
+        "later enforce.",
+        default_factory=_is_for_one_user,
+    )
+    tls_certificate: Path | None = setting(None, "PEM file of the certificate for HTTPS.", daily=True)
+    tls_key: Path | None = setting(None, "PEM file of the key for HTTPS.", daily=True)
+    max_webhooks: Annotated[int, Field(ge=0)] = setting(10, "Webhooks of one owner; 0 for none.")
+    max_monitors: Annotated[int, Field(ge=0)] = setting(100, "Monitors of one owner; 0 for none.")
+    private_hosts: Hosts = setting(
+        "",
+        "Hosts to which the service may send requests for its clients though their addresses are "
+        "private, separated by commas, each with an optional port: `hooks.lan:8443, 10.0.0.7`. None "
+        "by default.",
+    )
+    http_hosts: Hosts = setting(
+        "", "Hosts to which such requests may be sent without TLS, in the same form. None by default."
+    )
+    metrics_host: str = setting(
+        "127.0.0.1",
+        "Address at which a coordinator serves its metrics to Prometheus, without a key.",
+    )
+    metrics_port: Annotated[int, Field(ge=0, le=65535)] = setting(
+        0,
+        "Port of the metrics; 0 for none. The coordinators of `islands serve` use this port and "
+        "the following ones.",
+    )
+    log_format: str = setting("text", "Format of log messages: `text` or `json`.", choices=("text", "json"))
+    telemetry: str = setting(
+        "",
+        "OTLP endpoint over HTTP for traces: `http://collector:4318/v1/traces`. Needs the extra `telemetry`.",
+    )
+    lifeline: int | None = setting(
+        None, "File descriptor of the heartbeat pipe to `islands serve`, set for its children."
+    )
+    readers: int | None = setting(
+        None,
+        "File descriptor of the socket to the process of `islands serve` that forks readers of files, "
+        "set for its children. Without it a process starts its own.",
+    )
 
     @model_validator(mode="before")
     @classmethod

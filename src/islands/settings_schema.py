@@ -8,6 +8,7 @@ from copy import copy
 from functools import wraps
 from inspect import Parameter, Signature, cleandoc, signature
 from numbers import Integral
+from pathlib import Path
 from reprlib import repr as abbreviate
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, cast, dataclass_transform, get_args, get_origin
@@ -22,6 +23,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
+    WithJsonSchema,
     WrapValidator,
     create_model,
 )
@@ -53,6 +55,7 @@ _NOUNS = {
     float: ("a number", "numbers"),
     str: ("a text", "texts"),
     bool: ("true or false", ""),
+    Path: ("a path", "paths"),
 }
 
 
@@ -63,6 +66,7 @@ def setting(
     choices: Iterable[str] = (),
     unit: str = "",
     daily: bool | str = False,
+    default_factory: Callable[..., Any] | None = None,
     **bounds: Any,
 ) -> Any:
     """Declare a setting: a field of a class of settings.
@@ -79,19 +83,24 @@ def setting(
     daily : bool or str
         Whether commands have an option for it, or what its help states as the default. All settings can be
         given by ``--set NAME=VALUE``.
+    default_factory : callable, optional
+        Makes the default.
     **bounds
-        ``ge``, ``gt``, ``le``, ``lt`` of pydantic.
+        ``ge``, ``gt``, ``le``, ``lt``, ``max_length`` of pydantic.
     """
-    names = list(choices)
-    extra: dict[str, Any] = {"daily": daily, "unit": unit, "choices": names}
+    choice = _Choice(default, choices) if choices else None
+    extra = {"daily": daily, "unit": unit}
+    made = {"default": default} if default_factory is None else {"default_factory": default_factory}
     info = Field(
-        default,
+        **made,
         description=meaning,
         json_schema_extra={name: value for name, value in extra.items() if value},
         **bounds,
     )
-    if names:
-        info.metadata.append(AfterValidator(_Choice(default, choices)))
+    if choice:
+        names = {"enum": list(choice.names)}
+        schema = names if None in choice.names else {"type": "string", **names}
+        info.metadata += [AfterValidator(choice), WithJsonSchema(schema)]
     if isinstance(default, tuple):
         info.metadata.append(AS_TUPLE)
     return info
@@ -125,11 +134,15 @@ class _Choice:
         return f"one of {', '.join(str(name) for name in self.names if name)}"
 
 
-def setting_of(cls: type, name: str, default: Any, daily: bool | str = False) -> Any:
-    """Declare a setting that another class declares, with another default."""
+def setting_of(cls: type, name: str, default: Any = ..., daily: bool | str = False) -> Any:
+    """Declare a setting that another class declares, possibly with another default."""
     info = copy(_fields(cls)[name])
     assert isinstance(info.json_schema_extra, dict)
-    info.default, info.json_schema_extra = default, {**info.json_schema_extra, "daily": daily}
+    info.json_schema_extra = {**info.json_schema_extra, "daily": daily}
+    if not daily:
+        del info.json_schema_extra["daily"]
+    if default is not ...:
+        info.default = default
     return info
 
 
@@ -158,13 +171,30 @@ def settings_class(cls: type[T]) -> type[T]:
     return cast("type[T]", made)
 
 
-def document_settings(cls: type, name: str) -> Callable[[F], F]:
-    """Let the signature and the docstring of a function list settings in place of ``**name``."""
+class _OfPreset:
+    """Default that a preset has."""
+
+    def __repr__(self) -> str:
+        return "..."
+
+
+_OF_PRESET = _OfPreset()
+
+
+def document_settings(cls: type, name: str, *, of_preset: bool = False) -> Callable[[F], F]:
+    """Let the signature and the docstring of a function list settings in place of ``**name``.
+
+    Parameters
+    ----------
+    of_preset : bool
+        Whether the defaults are those of a preset, which the signature does not state.
+    """
 
     def decorate(function: F) -> F:
         declared = signature(function)
         own = [each for each in declared.parameters.values() if each.name != name]
-        function.__signature__ = declared.replace(parameters=[*own, *_parameters(cls)])  # type: ignore[attr-defined]
+        listed = [each.replace(default=_OF_PRESET) if of_preset else each for each in _parameters(cls)]
+        function.__signature__ = declared.replace(parameters=[*own, *listed])  # type: ignore[attr-defined]
         function.__doc__ = str(function.__doc__).replace(
             f"**{name}\n", _describe(cls, "    ").lstrip() + "\n"
         )
@@ -208,7 +238,7 @@ def state_default(info: FieldInfo) -> bool | str:
     stated = info.json_schema_extra.get("daily")
     if isinstance(stated, str):
         return stated
-    return False if info.default in (None, False, "") else str(info.default)
+    return False if info.default_factory or not info.default else str(info.default)
 
 
 def is_daily(info: FieldInfo) -> bool:
@@ -241,6 +271,8 @@ def _describe_type(kind: Any, metadata: Iterable[Any] = (), place: int = 0) -> s
         return " or ".join(_describe_type(each, metadata, place) for each in args if each is not type(None))
     if origin is tuple:
         return f"a list of {_describe_type(args[0], metadata, 1)}"
+    if origin is dict:
+        return f"NAME=VALUE, several with commas between them, each value {_describe_type(args[1])}"
     bounds = {
         name: getattr(each, name)
         for each in metadata
@@ -253,6 +285,8 @@ def _describe_type(kind: Any, metadata: Iterable[Any] = (), place: int = 0) -> s
             return f"{noun} from {low:g} to {high:g}"
         case {"ge": low}:
             return f"{noun} of at least {low:g}"
+        case {"gt": low, "lt": high}:
+            return f"{noun} above {low:g} and below {high:g}"
         case {"gt": low}:
             return f"{noun} above {low:g}"
     return noun
@@ -267,10 +301,15 @@ def _explain(error: ValidationError, cls: type) -> str:
     name = list(_fields(cls))[place] if isinstance(place, int) else place
     if unknown:
         return f"there is no setting {name!r}{suggest(name, _fields(cls))}"
-    if problem["type"] == "value_error":
-        return problem["msg"].removeprefix("Value error, ")
     advice = f": write [{abbreviate(problem['input'])}]" if problem["type"] == "tuple_type" else ""
-    return _refuse(cls, name, problem["input"]) + advice
+    return _explain_value(cls, name, problem["input"], problem) + advice
+
+
+def _explain_value(cls: type, name: str, value: object, problem: Any) -> str:
+    """Return what is wrong with a value: the message of its own check, or which values the setting takes."""
+    if problem["type"] == "value_error" and _find_choice(_fields(cls)[name]) is None:
+        return f"{name}: {str(problem['msg']).removeprefix('Value error, ')}"
+    return _refuse(cls, name, value)
 
 
 def _refuse(cls: type, name: str, value: object) -> str:
@@ -281,7 +320,9 @@ def _refuse(cls: type, name: str, value: object) -> str:
 
 
 def parse_setting(cls: type, name: str, value: object) -> Any:
-    """Return the value of a setting from a text or from a value of TOML; a text has commas between items.
+    """Return the value of a setting from a text or from a value of TOML.
+
+    A text has commas between the items of a list; those of a mapping are ``NAME=VALUE``.
 
     Raises
     ------
@@ -290,16 +331,23 @@ def parse_setting(cls: type, name: str, value: object) -> Any:
     """
     info = _fields(cls)[name]
     given: Any = value
-    if isinstance(value, str) and _has_list(info.annotation):
+    if isinstance(value, str) and has_items(info):
         given = [word.strip() for word in value.split(",")]
+    if isinstance(given, list) and has_items(info, dict):
+        given = {key.strip(): text for key, _, text in (str(each).partition("=") for each in given)}
     try:
         return TypeAdapter(_type(info)).validate_python(given)
-    except ValidationError:
-        raise SettingsError(_refuse(cls, name, value)) from None
+    except ValidationError as error:
+        raise SettingsError(_explain_value(cls, name, value, error.errors()[0])) from None
 
 
-def _has_list(kind: Any) -> bool:
-    return get_origin(kind) is tuple or any(_has_list(each) for each in get_args(kind))
+def has_items(info: FieldInfo, *kinds: type) -> bool:
+    """Return whether the values of a setting are lists or mappings, or one of the given kinds of them."""
+    return _has_items(info.annotation, kinds or (tuple, dict))
+
+
+def _has_items(kind: Any, kinds: tuple[type, ...]) -> bool:
+    return get_origin(kind) in kinds or any(_has_items(each, kinds) for each in get_args(kind))
 
 
 def _type(info: FieldInfo) -> Any:

@@ -70,7 +70,7 @@ def succeed(folder, *arguments):
 
 def test_the_help_lists_commands_of_all_extras(folder):
     printed = succeed(folder, "--help").stdout
-    for command in ("identify", "fit", "diagnose", "simulate", "show", "systems", "serve", "jobs", "keys"):
+    for command in ("identify", "fit", "diagnose", "simulate", "show", "examples", "serve", "jobs", "admin"):
         assert f" {command} " in printed
 
 
@@ -102,7 +102,7 @@ def test_a_simulation_is_diagnosed(folder):
     ("arguments", "message"),
     [
         (("serve",), "islands serve needs the extra 'service'"),
-        (("keys", "list"), "islands keys needs the extra 'service'"),
+        (("admin", "keys"), "islands admin needs the extra 'service'"),
         (
             ("identify", "record.csv", *COLUMNS, *SEARCH, "--engine", "ray", "--out", "never"),
             "the engine ray needs the extra 'ray'",

@@ -42,7 +42,7 @@ def succeed(*arguments: object, folder: Path) -> str:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with a record of an actuator (5 s) and one of a hysteresis (1000 samples)."""
     base = tmp_path_factory.mktemp("user")
-    succeed("systems", "bouc-wen-piezo", "--part", "validation", "--out", "long.csv", folder=base)
+    succeed("examples", "long.csv", "--system", "bouc-wen-piezo", "--set", "part=validation", folder=base)
     lines = (base / "long.csv").read_text().splitlines(keepends=True)
     (base / "piezo.csv").write_text("".join(lines[:5001]))
     lines = write_hysteresis(base / "hysteresis.csv").read_text().splitlines(keepends=True)

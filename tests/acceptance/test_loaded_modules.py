@@ -25,7 +25,7 @@ LIMITS = {
     "fit --help": (715, ""),
     "inspect {record}": (615, ""),
     "jobs --help": (900, ""),
-    "jobs list --url http://127.0.0.1:9": (850, ""),
+    "jobs show --url http://127.0.0.1:9": (850, ""),
     "show {model}": (610, ""),
     "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1340, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),

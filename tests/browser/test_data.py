@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from islands.evolution.settings import FITNESSES
 
+from islands.evolution.settings import MOST_ISLANDS
 from support.canvas import DRAWN
 from support.command_line import write_hysteresis
 from support.processes import eventually
@@ -160,6 +162,11 @@ def test_only_changed_settings_are_sent_and_a_job_can_be_run_again(
     looked.get_by_text("Advanced settings").click()
     expect(looked.locator("#meaning-max_terms")).to_contain_text("Default: 9.")
     looked.get_by_label("generations", exact=True).fill("7")
+    expect(looked.get_by_label("islands", exact=True)).to_have_attribute("max", str(MOST_ISLANDS))
+    assert {*looked.get_by_label("fitness", exact=True).locator("option").all_inner_texts()} == {
+        "",
+        *FITNESSES,
+    }
     looked.get_by_label("shifts", exact=True).fill("1, 2")
     settings = {"generations": 7, "shifts": [1, 2]}
     spec = submit(looked, desk)

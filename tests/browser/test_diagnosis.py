@@ -101,6 +101,10 @@ def test_the_page_of_a_diagnosis_shows_progress_and_result(
     expect(findings.locator(":scope > p")).to_have_text(HEADLINE.replace("`", "").split("\n"))
     expect(page.locator(".sentences p")).to_have_text("The RMSE falls.")
     assert page.locator(".findings b, .sentences b").count() == 0
+    page.get_by_text("Monitor later records").click()
+    training = page.get_by_label("Records of the training")
+    expect(training).to_have_value("24")
+    expect(training).to_have_attribute("min", "12")
     facts = page.locator(".about .facts").first
     expect(facts).to_contain_text("bouc-wen-piezo: dp = 1.5")
     expect(facts).to_contain_text("Tolerance of dp1 %")

@@ -247,7 +247,7 @@ import json
 _check_spec(DiscrepancyRequest.model_validate(json.loads(sys.argv[1])), ServiceSettings())
 heavy = {"numba", "llvmlite", "scipy", "matplotlib", "h5py", "ray"}
 print(sorted(heavy & {name.partition(".")[0] for name in sys.modules}))
-unused = ("islands.kernels", "islands.diagnosis", "islands.effects")
+unused = ("islands.kernels", "islands.diagnosis.calibration", "islands.effects")
 print([name for name in sys.modules if name.startswith(unused)])
 """
 

@@ -4,10 +4,8 @@ import json
 
 import pytest
 
-from islands.diagnosis.monitoring import alarm_rate, record_follower
 from islands.report.documents import monitor_state
 from islands_api.client import Client
-from islands_service.domain import monitor_spec
 from islands_service.domain.job import DISCREPANCY, EXTENDED, JobOutcome, JobState
 from islands_service.store import monitors
 from islands_service.store.blobs import Blobs
@@ -50,12 +48,7 @@ def add(service, monitor, dataset, headers=None, **changes):
     return service.client.post(f"/v1/monitors/{monitor['id']}/records", json=body, headers=headers)
 
 
-def test_the_defaults_of_the_service_are_those_of_the_library():
-    assert monitor_spec.DEFAULT_RATE == alarm_rate.DEFAULT_RATE
-    assert (monitor_spec.TRAINING, monitor_spec.MIN_TRAINING) == (
-        record_follower.TRAINING,
-        record_follower.MIN_TRAINING,
-    )
+def test_the_service_reads_the_states_of_the_library():
     assert monitors.STATE_SCHEMA == monitor_state.SCHEMA
 
 

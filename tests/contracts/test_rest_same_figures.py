@@ -126,5 +126,7 @@ def test_a_model_of_deviations_has_the_same_figures_in_a_monitor(service, client
 def monitored(path: Path, file: Path, out: Path, run) -> str:
     """Return what ``islands monitor`` prints about the folder of a record."""
     simulation = ("--simulation", f"model:{file}", "--input", "u_V", "--output", "y_um")
-    printed = run("monitor", path.parent, *simulation, "--training", 12, "--settle", 0, "--out", out)
+    printed = run(
+        "monitor", path.parent, *simulation, "--set", "training=12", "--set", "settle=0", "--out", out
+    )
     return " ".join(printed.split())

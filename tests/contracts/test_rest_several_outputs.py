@@ -63,7 +63,7 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         assert (done.progress["generation"], done.progress["generations"]) == (5, 5)
         generations = [point.generation for point in client.history(job).items]
         assert generations == sorted(set(generations))
-        succeed("jobs", "result", job.id, "--url", service.url, "--out", tmp_path / "result")
+        succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "result")
         assert "y1(k) =" in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
         names = [name_free_run(1, number) for number in (1, 2)]
         stored = [service.store.results.artefact(job.id, name) for name in names]

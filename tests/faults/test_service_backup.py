@@ -36,7 +36,7 @@ def test_a_destroyed_service_continues_from_its_backup(tmp_path: Path) -> None:
         eventually(lambda: not alive(children), seconds=60.0)
     shutil.rmtree(tmp_path / "first")
     assert "is complete: 2 jobs" in admin("backup", "--verify", tmp_path / "backup")
-    admin("restore", tmp_path / "backup", "--data-dir", tmp_path / "second")
+    admin("backup", "--restore", tmp_path / "backup", "--data-dir", tmp_path / "second")
     with serving(tmp_path / "second") as service:
         assert service.models(finished) == models
         again = service.job(running)

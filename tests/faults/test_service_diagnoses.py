@@ -53,13 +53,13 @@ def found(service: Service, job: str) -> tuple[dict[str, Any], bytes, bytes]:
 def test_injected_effect_is_found_as_by_the_command_line(service: Service, tmp_path: Path) -> None:
     hidden(tmp_path)
     where = ("--url", service.url)
-    others = {each["id"] for each in json.loads(succeed("jobs", "list", "--json", *where))["items"]}
+    others = {each["id"] for each in json.loads(succeed("jobs", "show", "--json", *where))["items"]}
     said = succeed("jobs", "diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--watch", *where)
     assert f"{HIDDEN}: k = " in said
-    listed = json.loads(succeed("jobs", "list", "--json", *where))["items"]
+    listed = json.loads(succeed("jobs", "show", "--json", *where))["items"]
     (job,) = [each for each in listed if each["id"] not in others]
     assert (job["kind"], job["summary"]["effects"]) == ("discrepancy", [HIDDEN])
-    succeed("jobs", "result", job["id"], "--out", tmp_path / "there", *where)
+    succeed("jobs", "show", job["id"], "--out", tmp_path / "there", *where)
     succeed("diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--out", tmp_path / "here")
     results = [json.loads((tmp_path / each / "discrepancy.json").read_text()) for each in ("there", "here")]
     assert [result.pop("wall_s") > 0 for result in results] == [True, True]

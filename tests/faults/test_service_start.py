@@ -84,14 +84,14 @@ def test_key_in_a_file_is_enough_for_the_first_start(tmp_path: Path) -> None:
 def test_api_without_a_valid_key_starts_when_a_key_is_created(tmp_path: Path) -> None:
     """No other role ends, so that jobs continue to run."""
     folder = tmp_path / "data"
-    secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder)
+    secret = succeed("admin", "keys", "--scope", "read", "--data-dir", folder)
     key = secret.removeprefix("islands_").partition("_")[0]
     with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
-        succeed("keys", "revoke", key, "--data-dir", folder)
+        succeed("admin", "keys", "--revoke", key, "--data-dir", folder)
         kill(service.one("api"))
         eventually(lambda: "api ended (2): it is started again" in service.log.read_text())
         assert "there is no key: create one" in " ".join(service.log.read_text().split())
-        succeed("keys", "create", "--scope", "read", "--data-dir", folder)
+        succeed("admin", "keys", "--scope", "read", "--data-dir", folder)
         service.ready()
 
 

@@ -51,7 +51,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "demo": ("demo", *OUT),
     "monitor": (
         *("monitor", "records", "--input", "u_V", "--output", "y_um"),
-        *("--simulation", "column:theirs_um", "--settle", "0", *OUT),
+        *("--simulation", "column:theirs_um", "--set", "settle=0", *OUT),
     ),
 }
 

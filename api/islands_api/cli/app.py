@@ -10,12 +10,9 @@ SERVICE_COMMANDS = core.make_commands(
     {
         "serve": "Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next "
         "start.",
-        "jobs": "Jobs of a service: submit, diagnose, list, show, label, stop, resume, result.",
-        "report": "Write the report of a result folder, of a job, or of a comparison of jobs as one HTML "
-        "file.",
-        "monitors": "Monitors of a service: create, add records, show, delete.",
-        "keys": "API keys of a service: create, list, revoke.",
-        "admin": "Operation of a service: audit, owners, jobs, backup, restore.",
+        "jobs": "Jobs of a service: submit, diagnose, show, change.",
+        "monitors": "Monitors of a service: add, show, delete.",
+        "admin": "Operation of a service: keys, owners, jobs, audit, backup.",
     },
 )
 

@@ -29,7 +29,7 @@ class Client(BaseClient[httpx.Client]):
     url : str
         Address of the service, for example ``http://127.0.0.1:8000``.
     key : str, optional
-        API key, as ``islands keys create`` prints it. Not needed on the service's own machine.
+        API key, as ``islands admin keys`` prints it. Not needed on the service's own machine.
     timeout : float
         Seconds to wait for an answer.
     retry : float

@@ -57,7 +57,7 @@ def make_headers(key: str | None) -> dict[str, str]:
     key = key.strip()
     if not key or not all("!" <= letter <= "~" for letter in key):
         raise SettingsError(
-            "the key is empty, or has characters that no key has: give it as 'islands keys create' printed it"
+            "the key is empty, or has characters that no key has: give it as 'islands admin keys' printed it"
         )
     return {**headers, "Authorization": f"Bearer {key}"}
 

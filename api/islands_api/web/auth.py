@@ -34,7 +34,7 @@ _INVALID_KEY_COST = 10.0
 
 _bearer = HTTPBearer(
     auto_error=False,
-    description="A key of `islands keys create`, or a token (JWT) of the identity provider of this service.",
+    description="A key of `islands admin keys`, or a token (JWT) of the identity provider of this service.",
     scheme_name="key",
 )
 
@@ -130,7 +130,7 @@ async def _check_key(
             state.rate_limiter.acquire(f"address {address}")
             raise AuthenticationError(
                 "this service needs a key: send 'Authorization: Bearer islands_...'; its operator creates "
-                "one with 'islands keys create'"
+                "one with 'islands admin keys'"
                 + (f"; or send a token of {state.settings.oidc_issuer}" if state.tokens is not None else "")
             )
         return Principal(LOCAL_OWNER, frozenset(SCOPES), Requester(address))

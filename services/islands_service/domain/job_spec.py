@@ -14,12 +14,13 @@ from pydantic import (
     ValidationError,
 )
 
+from islands.diagnosis.settings import DiagnosisSettings, Tolerances
 from islands.document_problems import find_problem
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO, PRESET_NAMES
 from islands.evolution.settings import Settings
 from islands.persistence.models import MODEL_CLASSES, NARX
-from islands.settings_schema import make_changes_model
+from islands.settings_schema import make_changes_model, setting_of
 from islands.simulators.specification.table import ColumnSpec, SimulationSpec, innermost
 from islands_service.domain.uploaded_fmu import UploadedFmuSpec
 
@@ -173,11 +174,7 @@ class SimulatedRecord(BaseModel):
     simulation: Annotated[SimulationSpec | UploadedFmuSpec, Field(discriminator="kind")] = Field(
         description="Simulation to compare with the record."
     )
-    tolerance: Annotated[dict[Name, Fraction], Field(max_length=100)] = Field(
-        default_factory=dict,
-        description="Relative standard deviations of the known parameters, by name.",
-        examples=[{"dp": 0.01}],
-    )
+    tolerance: Tolerances = setting_of(DiagnosisSettings, "tolerance")
 
     @property
     def fmu(self) -> UploadedFmuSpec | None:
@@ -208,12 +205,7 @@ class Discrepancy(SimulatedRecord):
         default=None,
         description="A recording that is held out as a whole, instead of the last quarter of the record.",
     )
-    noise_level: Annotated[FiniteFloat, Field(gt=0.0)] | None = Field(
-        default=None,
-        description="Standard deviation of the noise of the output, in its unit. A residual far above it is "
-        "no noise.",
-        examples=[0.02],
-    )
+    noise_level: FiniteFloat | None = setting_of(DiagnosisSettings, "noise_level")
     seed: Seed = 0
 
     @property

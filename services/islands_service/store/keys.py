@@ -197,7 +197,7 @@ class Keys:
             )
             row = connection.execute(_query().where(keys.c.id == key)).one_or_none()
             if row is None:
-                raise KeyNotFoundError(f"there is no key {key!r}: list them with 'islands keys list'")
+                raise KeyNotFoundError(f"there is no key {key!r}: list them with 'islands admin keys'")
             record_change(connection, Action.REVOKE_KEY, row.owner, key, by)
             return _make_key(row)
 

@@ -60,11 +60,11 @@ COMMANDS = make_commands(
         "monitor": "Follow a simulation over the records of a folder, and raise an alarm when an effect has "
         "changed.",
         "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
-        "show": "Show or write a model as an equation, a program, a block for a simulator, or JSON.",
+        "show": "Show or write a model as an equation, a program, a block for a simulator, JSON, or a "
+        "report.",
         "settings": "List the settings that --set changes: name, default, values, meaning.",
-        "examples": "Records to try the commands on: list them, copy them.",
+        "examples": "Records to try the commands on, and of simulated systems: list them, write them.",
         "demo": "Identify the record of the paper's case 1 and compare the models with those of the paper.",
-        "systems": "Simulated systems: list them, make records of them.",
     },
 )
 
@@ -156,6 +156,7 @@ class Commands(TyperGroup):
             group.command(name=cmd_name)(function)
         command = typer.main.get_command(group)
         command.name = cmd_name
+        command.help = command.help or description
         for each in getattr(command, "commands", {cmd_name: command}).values():
             for parameter in each.params:
                 # Statements such as [u(k-1)] >= 0 are not markup.

@@ -57,7 +57,8 @@ def match_options(command: Any, table: Any, path: Path, title: str) -> dict[str,
         if given in commands:
             found[given] = match_options(commands[given], value, path, f"{title}.{given}")
         elif name in settings:
-            text = ",".join(map(str, value)) if isinstance(value, list) else value
+            items = [f"{key}={each}" for key, each in value.items()] if isinstance(value, dict) else value
+            text = ",".join(map(str, items)) if isinstance(items, list) else items
             found.setdefault(GIVEN, []).append(f"{name}={text}")
         elif name in options:
             found[options[name].name] = _convert(options[name], value)

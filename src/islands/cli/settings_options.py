@@ -10,7 +10,7 @@ import typer
 from pydantic.fields import FieldInfo
 
 from islands.errors import SettingsError, suggest
-from islands.settings_schema import is_daily, list_settings, parse_setting, state_default
+from islands.settings_schema import has_items, is_daily, list_settings, parse_setting, state_default
 
 #: Parameter with the values of ``--set``.
 GIVEN = "given_settings"
@@ -43,7 +43,7 @@ def with_settings(**groups: type) -> Callable[[Callable[..., None]], Callable[..
             texts = given.pop(GIVEN) or []
             from_file = context.lookup_default(GIVEN) or []
             values: dict[str, Any] = {**split_settings(from_file)}
-            values |= {name: given[name] for name in daily if given[name] not in (None, False)}
+            values |= {name: given[name] for name in daily if given[name]}
             values |= split_settings(() if texts == from_file else texts)
             found: dict[str, dict[str, Any]] = {group: {} for group in groups}
             for name, value in values.items():
@@ -106,16 +106,16 @@ def split_settings(texts: Iterable[str]) -> dict[str, str]:
 
 
 def _make_option(name: str, info: FieldInfo, values: str) -> Parameter:
-    """Return the option of a setting: a flag for a Boolean one, else a text."""
-    is_flag = info.annotation is bool
+    """Return the option of a setting: a flag for a Boolean one, texts for a mapping, else a text."""
+    is_flag, is_mapping = info.annotation is bool, has_items(info, dict)
     first = str(info.description).partition(". ")[0].removesuffix(".")
     option = typer.Option(
         f"--{name.replace('_', '-')}",
-        help=f"{first}." if is_flag or values == "a text" else f"{first}: {values}.",
-        metavar=None if is_flag else "VALUE",
+        help=f"{first}." if is_flag or values in ("a text", "a path") else f"{first}: {values}.",
+        metavar=None if is_flag else "NAME=VALUE" if is_mapping else "VALUE",
         show_default=state_default(info),
     )
-    kind: Any = bool if is_flag else str | None
+    kind: Any = bool if is_flag else list[str] | None if is_mapping else str | None
     return Parameter(
         name,
         Parameter.POSITIONAL_OR_KEYWORD,

@@ -22,7 +22,6 @@ from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import CalibratedValue, Diagnosis, NoiseClaim
 from islands.effects.interface.effect import Signal
-from islands.errors import SettingsError
 
 
 def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[CalibratedValue, ...]:
@@ -81,21 +80,6 @@ MIN_PART_RATIO = 2.0
 
 #: Autocorrelation at the correlation time.
 CORRELATION = float(np.exp(-1.0))
-
-
-def validate_noise_level(noise_level: float | None) -> None:
-    """Check the standard deviation of the noise of a sensor.
-
-    Raises
-    ------
-    SettingsError
-        It is not positive and finite.
-    """
-    if noise_level is not None and not 0.0 < noise_level < np.inf:
-        raise SettingsError(
-            "the noise level is the standard deviation of the noise of the output, in its unit, and "
-            f"positive; got {noise_level:g}"
-        )
 
 
 def complete_findings(

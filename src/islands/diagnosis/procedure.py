@@ -57,7 +57,7 @@ from islands.diagnosis.interim_findings import (
     MODEL_ERROR,
     InterimFindings,
 )
-from islands.diagnosis.noise_claim import complete_findings, validate_noise_level
+from islands.diagnosis.noise_claim import complete_findings
 from islands.diagnosis.result import Diagnosis
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import EFFECTS
@@ -148,11 +148,10 @@ def diagnose(
         The record or one of its recordings is too short, or has too few outputs or a constant one, or the
         simulation diverges on it.
     SettingsError
-        A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, the noise level is not
-        positive, two effects have the same name, or an effect is invalid.
+        A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two
+        effects have the same name, or an effect is invalid.
     """
     interim = interim or InterimFindings()
-    validate_noise_level(noise_level)
     prior_std = validate_prior({**simulator.tolerances, **(tolerance or {})}, simulator)
     fitted = count_fitted_samples(record)
     record, record_findings = admit_channels(record, fitted, simulator.read_channels)

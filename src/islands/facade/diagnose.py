@@ -1,13 +1,14 @@
 """`diagnose` names what a simulation gets wrong on a record; `plan_experiment` says what one could show."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from threadpoolctl import threadpool_limits
 
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.experiment_plan import plan_experiment as plan_with_simulator
 from islands.diagnosis.procedure import diagnose as diagnose_simulator
+from islands.diagnosis.settings import DiagnosisSettings
 from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect, Signal
 from islands.errors import SettingsError
@@ -21,6 +22,7 @@ from islands.records.reading.column_names import list_inputs
 from islands.records.reading.data_frames import as_record
 from islands.records.reading.options import DEFAULT_READING, take_reading
 from islands.records.split import hold_out
+from islands.settings_schema import document_settings
 from islands.simulators.interface import Simulator
 from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.base import SpecModel
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 SimulationLike: TypeAlias = str | Model | ParametricModel | SimulationSpec | LocalSpec | Simulator
 
 
+@document_settings(DiagnosisSettings, "settings")
 def diagnose(
     record: "RecordLike",
     simulation: "SimulationLike",
@@ -48,14 +51,13 @@ def diagnose(
     output: str | None = None,
     dt: float | None = None,
     validation: "RecordLike | None" = None,
-    tolerance: Mapping[str, float] | None = None,
-    noise_level: float | None = None,
     columns: Mapping[str, Signal] | None = None,
     effects: Sequence[Effect] = EFFECTS,
     seed: int = 0,
     reading: "ReadingLike" = DEFAULT_READING,
     progress: ProgressCallback = ignore_progress,
     parallel_map: ParallelMap = map,
+    **settings: Any,
 ) -> DiagnosisResult:
     """Find which effects explain the difference between a simulation and a record, and how much they explain.
 
@@ -74,12 +76,6 @@ def diagnose(
     validation : Dataset or data frame, optional
         Further recordings, which are held out as a whole instead of the last quarter of the record: of these,
         the initial states alone are fitted.
-    tolerance : mapping, optional
-        Relative standard deviations of parameters about their nominal values. Other parameters are
-        calibrated without a prior.
-    noise_level : float, optional
-        Standard deviation of the noise of the output, in its unit, as the data sheet of the sensor states it
-        or a resting output shows it. A residual of more than twice this is no noise.
     columns : mapping, optional
         Outputs of external simulations by name, each of shape (samples,), for ``column:NAME``; those of the
         validation data follow those of the record. By default, ``NAME`` is a column of the data frame.
@@ -95,6 +91,7 @@ def diagnose(
         Called with a message, and with the completed fraction if it is known.
     parallel_map : ParallelMap
         Function like `map` that calibrates the effects, possibly in parallel. It does not affect the result.
+    **settings
 
     Returns
     -------
@@ -107,9 +104,10 @@ def diagnose(
     RecordError
         The record cannot be used, or the simulation diverges on it.
     SettingsError, ModelError
-        There is no such simulation, a tolerance belongs to no parameter, the noise level is not positive, two
-        effects have the same name, or an effect is invalid.
+        There is no such simulation, a setting is unknown or out of range, a tolerance belongs to no
+        parameter, two effects have the same name, or an effect is invalid.
     """
+    given = DiagnosisSettings(**settings)
     recorded = () if isinstance(record, Dataset) else _find_recorded(simulation, columns or {})
     options = take_reading(reading).changes()
     names = [*list_inputs(inputs), *recorded] if recorded else inputs
@@ -130,7 +128,8 @@ def diagnose(
     # The matrices are small: several threads take twice the CPU time.
     with threadpool_limits(1, user_api="blas"):
         found = diagnose_simulator(
-            *(record, simulator, tolerance, seed, progress, parallel_map, effects), noise_level=noise_level
+            *(record, simulator, given.tolerance, seed, progress, parallel_map, effects),
+            noise_level=given.noise_level,
         )
     return DiagnosisResult.from_diagnosis(found)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -12,7 +12,7 @@ from islands.evolution.settings import NARX
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
-from islands.facade.fit_settings import FitChanges, FitSettings
+from islands.facade.fit_settings import FitSettings
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
 from islands.progress import (
@@ -48,7 +48,7 @@ def fit(
     reading: "ReadingLike" = DEFAULT_READING,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-    **settings: Unpack[FitChanges],
+    **settings: Any,
 ) -> Result:
     """Fit models of increasing size to a record by subset selection and rank them on validation data.
 
@@ -109,7 +109,7 @@ def fit_record(
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
     on_models: ResultCallback = ignore_result,
-    **changes: Unpack[FitChanges],
+    **changes: Any,
 ) -> Result:
     """Fit models to a record as `fit` does, for a caller that states an extrapolation itself.
 
@@ -128,7 +128,7 @@ def fit_record(
         As `fit`.
     """
     check_seed(seed)
-    settings = FitSettings(**changes)  # type: ignore[arg-type]  # a list of delays becomes a tuple
+    settings = FitSettings(**changes)
     split = split_data(record, validation)
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if settings.model != NARX:

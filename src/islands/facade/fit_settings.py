@@ -1,7 +1,4 @@
-"""Settings of a fit, and the keyword arguments of `fit` that differ from their defaults."""
-
-from collections.abc import Sequence
-from typing import TypedDict
+"""Settings of a fit."""
 
 from islands.errors import SettingsError, name_option
 from islands.estimation.structure_selection.input_delays import Delays
@@ -15,25 +12,6 @@ from islands.settings_schema import Integer, list_changes, setting, setting_of, 
 
 #: Settings of models of every class.
 _COMMON = frozenset({"model", "refit"})
-
-
-class FitChanges(TypedDict, total=False):
-    """Settings of a fit that differ from the defaults. `FitSettings` describes each of them."""
-
-    model: str
-    structure: str
-    library: str
-    degree: int | None
-    lags: int | None
-    delays: Sequence[int] | None
-    constraints: str | None
-    max_terms: int
-    estimator: str
-    refit: str
-    average: int | str
-    feedthrough: str
-    shooting: int | None
-    certificate: int
 
 
 @settings_class

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -42,7 +42,6 @@ from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.latent_identification import complete_latent, search_latent
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
-from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.rate_selection import select_rate
@@ -62,6 +61,7 @@ from islands.records.reading.data_frames import read_data
 from islands.records.reading.options import DEFAULT_READING
 from islands.records.split import split_data, warn_of_extrapolation
 from islands.report.documents.result_folder import record_document
+from islands.settings_schema import document_settings
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
@@ -75,6 +75,7 @@ FEASIBLE_OUTCOMES = ("ok", "abandoned")
 _MIN_RESIDUALS = 3
 
 
+@document_settings(Settings, "changes", of_preset=True)
 def identify(
     record: "RecordLike",
     y: "ArrayLike | IntoSeries | None" = None,
@@ -91,7 +92,7 @@ def identify(
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     reading: "ReadingLike" = DEFAULT_READING,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> Result:
     """Identify a model of a record by evolution.
 
@@ -111,7 +112,8 @@ def identify(
         Data that select among the hall of fame: a separate record, or the fraction at the end of ``record``.
     preset : str or Choice
         An entry of ``PRESETS``, or ``auto``, which chooses library, primitives, constraints and lags by
-        fits that are compared on the validation data. A choice of `choose_preset` is not made again.
+        fits that are compared on the validation data. A choice of `choose_preset` is not made again. It has
+        the settings that are not given.
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
@@ -129,8 +131,6 @@ def identify(
     reading : mapping
         Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
     **changes
-        Settings that differ from the preset: ``generations=100, islands=4``. ``primitives`` contains names of
-        built-in primitives and primitives of your own, ``("mul", islands.primitive("soften", soften))``.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def identify_record(
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     on_models: ResultCallback = ignore_result,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> Result:
     """Identify a model of a record as `identify` does, for a caller that states an extrapolation itself.
 

@@ -7,18 +7,15 @@ from typing import Any, TypeAlias
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE, parse_alarm_rate
-from islands.diagnosis.monitoring.record_follower import (
-    TRAINING,
-    MonitorSettings,
-    MonitorState,
-    follow_record,
-)
+from islands.diagnosis.monitoring.alarm_rate import parse_alarm_rate
+from islands.diagnosis.monitoring.record_follower import MonitorSettings, MonitorState, follow_record
+from islands.diagnosis.settings import MonitoringSettings
 from islands.effects.interface.context import Signal
 from islands.errors import RecordError, SettingsError
 from islands.records.compatibility import ColumnReference, match_record
 from islands.records.dataset import Dataset
 from islands.report.documents.monitor_state import RejectedRecord, SavedMonitor
+from islands.settings_schema import document_settings
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
@@ -37,15 +34,13 @@ _LOCAL_SPEC: TypeAdapter[LocalSpec] = TypeAdapter(LocalSpec)
 MonitoredLike: TypeAlias = str | SimulationSpec | LocalSpec | Mapping[str, Any]
 
 
+@document_settings(MonitoringSettings, "settings")
 def create_monitor(
     record: Dataset,
     simulation: "MonitoredLike",
     *,
-    false_alarms: str = DEFAULT_RATE,
-    interval: float | None = None,
-    training: int = TRAINING,
-    tolerance: Mapping[str, float] | None = None,
     columns: Mapping[str, Signal] | None = None,
+    **settings: Any,
 ) -> SavedMonitor:
     """Create a monitor of a simulation. `monitor_record` analyses the records, the first one included.
 
@@ -56,16 +51,9 @@ def create_monitor(
     simulation : str, spec or mapping
         ``extended.json`` of a diagnosis or its folder, text as on the command line, a specification, or the
         document of an extended simulation.
-    false_alarms : str
-        Rate of false alarms, such as ``1 per month`` or ``1 per 720 records``.
-    interval : float, optional
-        Time from one record to the next in seconds; by default the duration of the first one.
-    training : int
-        Number of records that are taken as the undisturbed state.
-    tolerance : mapping, optional
-        Relative standard deviations of parameters about their nominal values.
     columns : mapping, optional
         Outputs of external simulations by name, each of shape (samples,).
+    **settings
 
     Raises
     ------
@@ -74,15 +62,17 @@ def create_monitor(
     RecordError
         The record cannot be used.
     """
-    interval = record.samples * record.dt if interval is None else interval
-    settings = MonitorSettings(parse_alarm_rate(false_alarms, interval), training, dict(tolerance or {}))
+    given = MonitoringSettings(**settings)
+    interval = given.interval or record.samples * record.dt
+    rate = parse_alarm_rate(given.false_alarms, interval)
+    state = MonitorState(MonitorSettings(rate, given.training, given.tolerance))
     spec = parse_monitored(simulation)
     if not isinstance(spec, ExtendedSpec):
         simulator = make_simulator(spec, record, columns)
         nominal = np.array([each.nominal for each in simulator.parameters])
         spec = describe_extension(simulator, nominal, record.input_names, record.output_name)
     signals = (record.input_names, record.output_name, record.dt)
-    return SavedMonitor(spec, *signals, false_alarms, interval, MonitorState(settings))
+    return SavedMonitor(spec, *signals, given.false_alarms, interval, state)
 
 
 def parse_monitored(simulation: "MonitoredLike") -> LocalSpec:

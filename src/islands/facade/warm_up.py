@@ -2,12 +2,12 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from signal import SIGKILL, raise_signal
 from threading import Thread
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Lagged
 from islands.facade.fit import fit_record
 from islands.facade.identify import identify_record
-from islands.facade.setting_changes import SettingChanges
 from islands.kernels.jit_cache import cache_folder, ready
 from islands.kernels.pair_table import complete_pairs
 from islands.kernels.population import (
@@ -45,7 +44,7 @@ from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
 
 #: Changed settings of a search that calls every kernel and takes no time.
-SMALL: Final[SettingChanges] = {
+SMALL: Final[Mapping[str, Any]] = {
     "population": 10,
     "generations": 1,
     "max_terms": 3,
@@ -81,8 +80,7 @@ def _use_all_kernels() -> None:
         # Half of the time, and all that this process compiles if the other one compiles the rest meanwhile.
         _evaluate_individual(_make_context(record))
         for constraints in ("none", "hysteresis"):
-            changes: SettingChanges = {**SMALL, "constraints": constraints}
-            identify_record(record, preset="hysteresis", **changes)
+            identify_record(record, preset="hysteresis", constraints=constraints, **SMALL)
     fit_record(record, library="phi-polynomial", max_terms=3)
     fit_output_error(record)
     _simulate_two_outputs(record)

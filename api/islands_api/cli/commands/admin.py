@@ -1,18 +1,20 @@
-"""``islands admin``: operation of a service, in its database: audit trail, owners, jobs, backups."""
+"""``islands admin``: operation of a service, in its database: keys, owners, jobs, audit trail, backups."""
 
 import json
 from contextlib import closing
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.table import Column, Table
 from rich.text import Text
 
 from islands.cli.console import errors, output
+from islands.errors import SettingsError
 from islands_api.cli.service.admin_job_commands import jobs
+from islands_api.cli.service.key_commands import keys
 from islands_api.cli.service.owner_commands import owners
 from islands_api.cli.service.store_options import Database, DataDir, open_store
 from islands_service.settings import service_settings
@@ -20,20 +22,10 @@ from islands_service.store.cached_blobs import open_blobs
 from islands_service.store.database import Database as StoreDatabase
 from islands_service.supervisor import folder_lock
 
-admin = typer.Typer(
-    help="Operation of a service: audit, owners, jobs, backup, restore.",
-    no_args_is_help=True,
-    add_completion=False,
-)
+admin = typer.Typer(no_args_is_help=True, add_completion=False)
+admin.command()(keys)
 admin.command()(owners)
 admin.command()(jobs)
-
-Folder = Annotated[Path, typer.Argument(help="Folder of the backup.")]
-
-
-@admin.callback()
-def _admin() -> None:
-    """Operation of a service: audit, owners, jobs, backup, restore."""
 
 
 @admin.command()
@@ -67,45 +59,41 @@ def audit(
 
 @admin.command()
 def backup(
-    folder: Folder,
+    folder: Annotated[Path, typer.Argument(help="Folder of the backup.")],
     verify: Annotated[bool, typer.Option("--verify", help="Read a whole backup and check it.")] = False,
+    restore: Annotated[
+        bool, typer.Option("--restore", help="Restore it into a new data folder and an empty database.")
+    ] = False,
     data_dir: DataDir = None,
     database: Database = None,
 ) -> None:
-    """Write a backup of database and files into a new folder. The service may run meanwhile."""
-    from islands_service.backup import create_backup, verify_backup  # noqa: PLC0415
+    """Write a backup of database and files into a new folder, check one, or restore one.
 
+    The service may run while a backup is written; start it after a restore.
+    """
+    from islands_service.backup import create_backup, restore_backup, verify_backup  # noqa: PLC0415
+
+    settings = service_settings(data_dir=data_dir, database=database)
+    if verify and restore:
+        raise SettingsError("--verify and --restore are two steps: give one of them")
     if verify:
-        _print_manifest("complete", folder, verify_backup(folder, _report))
-        return
-    settings = service_settings(data_dir=data_dir, database=database)
-    with open_store(data_dir, database) as store:
-        manifest = create_backup(store.database, open_blobs(settings), folder, _report)
-    _print_manifest("written", folder, manifest)
-
-
-@admin.command()
-def restore(folder: Folder, data_dir: DataDir = None, database: Database = None) -> None:
-    """Restore a backup into a new data folder and an empty database. Start the service afterwards."""
-    from islands_service.backup import restore_backup  # noqa: PLC0415
-
-    settings = service_settings(data_dir=data_dir, database=database)
-    with folder_lock(settings.data_dir), closing(StoreDatabase(settings.url)) as opened:
-        manifest = restore_backup(folder, opened, open_blobs(settings), _report)
-    _print_manifest("restored", folder, manifest)
-
-
-def _report(line: str) -> None:
-    errors.print(line, markup=False)
-
-
-def _print_manifest(done: str, folder: Path, manifest: dict[str, Any]) -> None:
+        done, manifest = "complete", verify_backup(folder, _report)
+    elif restore:
+        with folder_lock(settings.data_dir), closing(StoreDatabase(settings.url)) as opened:
+            done, manifest = "restored", restore_backup(folder, opened, open_blobs(settings), _report)
+    else:
+        with open_store(data_dir, database) as store:
+            done, manifest = "written", create_backup(store.database, open_blobs(settings), folder, _report)
     rows = {name: about["rows"] for name, about in manifest["tables"].items()}
     output.print(
         f"{folder} is {done}: {rows['jobs']} jobs, {rows['datasets']} data sets, {manifest['blobs']} files, "
         f"of islands {manifest['islands']}",
         markup=False,
     )
+
+
+def _report(line: str) -> None:
+    errors.print(line, markup=False)
 
 
 def _format_time(seconds: float) -> str:

@@ -1,5 +1,6 @@
 """``islands jobs``: submission and monitoring of jobs, over REST only."""
 
+import re
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -11,13 +12,13 @@ from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.settings_options import NONE, Given, with_settings
+from islands.diagnosis.settings import DiagnosisSettings
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
 from islands.evolution.settings import NARX, Settings
 from islands.persistence.models import MODEL_CLASSES
 from islands.records.coupled import join_columns
 from islands.records.reading.options import ReadingOptions
-from islands.settings_schema import setting, settings_class
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import parse_spec
 from islands_api.cli.service import job_views as views
@@ -26,31 +27,19 @@ from islands_api.client import Client, JobFailedError
 from islands_api.client.calls import make_part
 from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.upload_calls import name_uploaded
-from islands_api.schemas import JobView
-from islands_service.domain.job import IDENTIFICATION, KINDS, MAX_NAME_LENGTH, PRIORITIES, JobState
+from islands_api.schemas import JobView, SubmissionSettings
+from islands_service.domain.job import KINDS, MAX_NAME_LENGTH, JobState
 
-jobs = typer.Typer(
-    help="Jobs of a service: submit, diagnose, list, show, label, stop, resume, result.",
-    no_args_is_help=True,
-    add_completion=False,
-)
+jobs = typer.Typer(no_args_is_help=True, add_completion=False)
 
 Name = Annotated[str, typer.Option("--name", help="Name of the job, for display.")]
 Tags = Annotated[
     list[str] | None, typer.Option("--tag", help="Tag of the job, for the list; may be repeated.")
 ]
 Watch = Annotated[bool, typer.Option("--watch", help="Wait for the job and print its result.")]
-Id = Annotated[str, typer.Argument(help="The job's id.")]
 
-
-@settings_class
-class SubmissionSettings:
-    """Settings of the submission of a job."""
-
-    priority: int = setting(
-        0, "Of your own jobs, higher ones run first.", ge=PRIORITIES.start, le=PRIORITIES.stop - 1
-    )
-    idempotency_key: str | None = setting(None, "Submitting again with the same key returns the same job.")
+#: Job to compare, by its recommended model or by that of a rank.
+_MODEL = re.compile("([0-9a-f]{32})(?::([1-9][0-9]*))?")
 
 
 @jobs.command()
@@ -118,15 +107,14 @@ def submit(
 
 
 @jobs.command()
-@with_settings(reading=ReadingOptions, submission=SubmissionSettings)
+@with_settings(changes=DiagnosisSettings, reading=ReadingOptions, submission=SubmissionSettings)
 def diagnose(
     records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     simulated: simulation_options.Simulated,
     channels: simulation_options.Channels = None,
-    tolerance: simulation_options.Tolerances = None,
-    noise_level: simulation_options.NoiseLevel = None,
+    changes: Given = NONE,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
@@ -141,10 +129,7 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """Upload recordings and submit a job that diagnoses the errors of a simulation on them."""
-    driving, tolerances = (
-        simulation_options.single_input(options.columns(inputs)),
-        simulation_options.tolerances(tolerance or []),
-    )
+    driving = simulation_options.single_input(options.columns(inputs))
     channel_names = options.columns(channels or [])
     spec = parse_spec(simulated)
     simulation = {} if isinstance(spec, FmuSpec) else parse_simulation(simulated)
@@ -162,8 +147,6 @@ def diagnose(
             output_column,
             simulation,
             channels=channel_names,
-            tolerance=tolerances,
-            noise_level=noise_level,
             seed=seed,
             dt=dt,
             rows=rows,
@@ -172,12 +155,28 @@ def diagnose(
             name=_make_name(name, records),
             tags=tags or (),
             **submission,
+            **changes,
         )
     _follow(url, key, job, as_json, watch)
 
 
-@jobs.command("list")
-def list_jobs(
+@jobs.command()
+def show(
+    ids: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[JOB...]",
+            help="Id of a job; without one, jobs are listed, newest first; two to six for a report that "
+            "compares their recommended models, or those of JOB:RANK.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the result with its models, figures and report.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="HTML file for the report, or for the comparison.")
+    ] = None,
     state: Annotated[str | None, typer.Option("--state", help=", ".join(JobState))] = None,
     kind: Annotated[str | None, typer.Option("--kind", help=", ".join(KINDS))] = None,
     tag: Annotated[str | None, typer.Option("--tag", help="Only jobs with this tag.")] = None,
@@ -192,85 +191,80 @@ def list_jobs(
     limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of jobs to list.")] = 50,
     url: Url = LOCAL,
     key: ApiKey = None,
+    watch: Watch = False,
     as_json: Json = False,
 ) -> None:
-    """List the jobs, newest first."""
+    """List jobs, or show one with its result, and download it. A cancelled search has models, too.
+
+    With --watch follow a job until it has ended; Ctrl-C stops watching, not the job.
+    """
+    if not ids:
+        if out or report or watch:
+            raise SettingsError("--out, --report and --watch are for a job: give its id")
+        sort = "error" if best else None
+        with open_client(url, key) as client:
+            read_page = partial(client.jobs, state, kind=kind, tag=tag, q=search, sort=sort)
+            views.show_jobs(read_pages(read_page, limit), as_json)
+        return
+    if report is not None:
+        models = [_parse_model(each) for each in ids] if len(ids) > 1 else []
+        with open_client(url, key) as client:
+            report.write_bytes(client.comparison_report(models) if models else client.report(ids[0]))
+        output.print(report, markup=False, highlight=False, soft_wrap=True)
+        return
+    if len(ids) > 1:
+        raise SettingsError("several jobs are compared in a report: add --report FILE")
+    if out is not None:
+        for result in views.RESULTS.values():
+            check_folder(out, force, result.file)
     with open_client(url, key) as client:
-        read_page = partial(client.jobs, state, kind=kind, tag=tag, q=search, sort="error" if best else None)
-        views.show_jobs(read_pages(read_page, limit), as_json)
+        now = client.job(ids[0])
+    if watch:
+        now = _watch(url, key, now, as_json)
+    with open_client(url, key) as client:
+        if not watch or as_json:
+            views.show_job(now, as_json, client)
+        if out is not None:
+            views.download_result(client, now, out)
 
 
 @jobs.command()
-def show(job: Id, url: Url = LOCAL, key: ApiKey = None, watch: Watch = False, as_json: Json = False) -> None:
-    """Show a job. With --watch follow it until it has ended; Ctrl-C stops watching, not the job."""
-    with open_client(url, key) as client:
-        now = client.job(job)
-    _follow(url, key, now, as_json, watch)
-
-
-@jobs.command()
-def label(
-    job: Id,
+def change(
+    job: Annotated[str, typer.Argument(help="The job's id.")],
     name: Annotated[str | None, typer.Option("--name", help="The new name; an empty one for none.")] = None,
     tags: Annotated[
         list[str] | None, typer.Option("--tag", help="A new tag, instead of the present ones; '' for none.")
     ] = None,
-    url: Url = LOCAL,
-    key: ApiKey = None,
-    as_json: Json = False,
-) -> None:
-    """Change the name or the tags of a job."""
-    new = None if tags is None else [tag for tag in tags if tag]
-    with open_client(url, key) as client:
-        views.show_labels(client.label(job, name, tags=new), as_json)
-
-
-@jobs.command()
-def stop(
-    job: Id,
+    stop: Annotated[
+        bool, typer.Option("--stop", help="End the search; the job succeeds with the best models so far.")
+    ] = False,
     cancel: Annotated[bool, typer.Option("--cancel", help="Cancel the job; it can be resumed.")] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Resume a failed or cancelled job from its last checkpoint."),
+    ] = False,
     url: Url = LOCAL,
     key: ApiKey = None,
     as_json: Json = False,
 ) -> None:
-    """Stop the search of a job, which then succeeds with the best models found so far, or cancel it."""
+    """Change the name or the tags of a job, or stop, cancel or resume it."""
+    actions = [each for each, given in (("stop", stop), ("cancel", cancel), ("resume", resume)) if given]
+    if len(actions) + (name is not None or tags is not None) != 1:
+        raise SettingsError("give --name and --tag, or one of --stop, --cancel and --resume")
     with open_client(url, key) as client:
-        views.show_job(client.cancel(job) if cancel else client.stop(job), as_json)
-
-
-@jobs.command()
-def resume(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Resume a job that has failed or was cancelled from its last checkpoint."""
-    with open_client(url, key) as client:
-        views.show_job(client.resume(job), as_json)
-
-
-@jobs.command()
-def result(
-    job: Id,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the result with its models, figures and report.")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
-    url: Url = LOCAL,
-    key: ApiKey = None,
-    as_json: Json = False,
-) -> None:
-    """Show the result of a job, and download it. A cancelled search has the models found so far."""
-    if out is not None:
-        for kind in views.RESULTS.values():
-            check_folder(out, force, kind.file)
-    with open_client(url, key) as client:
-        document = client.result(job)
-        kind = next(kind for name, kind in views.RESULTS.items() if name in document)
-        if out is not None:
-            kind.download(client, job, document, out)
-        if as_json:
-            views.print_json(document)
+        if actions:
+            views.show_job(getattr(client, actions[0])(job), as_json)
         else:
-            kind.show(client, job, document)
-            if out is not None:
-                output.print(f"{out}/: {kind.contents}", markup=False)
+            new = None if tags is None else [tag for tag in tags if tag]
+            views.show_labels(client.label(job, name, tags=new), as_json)
+
+
+def _parse_model(text: str) -> str | tuple[str, int]:
+    found = _MODEL.fullmatch(text)
+    if found is None:
+        raise SettingsError(f"{text} is no job: a comparison has ids of jobs, JOB or JOB:RANK")
+    job, rank = found.groups()
+    return job if rank is None else (job, int(rank))
 
 
 def _make_name(name: str, records: Sequence[Path]) -> str:
@@ -301,17 +295,22 @@ def _parse_validation(text: str | None) -> Path | str | float | None:
         ) from None
 
 
-def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool = True) -> None:
-    """Show the progress of a job until it has ended, then its result; without ``watch`` show the job only.
+def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool) -> None:
+    """Show a job that was submitted; with ``watch`` its progress until it has ended, and its result."""
+    if watch:
+        job = _watch(url, key, job, as_json)
+    if as_json or not watch:
+        views.show_job(job, as_json)
+
+
+def _watch(url: str, key: str | None, job: JobView, as_json: bool) -> JobView:
+    """Show the progress of a job until it has ended, and its result as text; return the job.
 
     Raises
     ------
     JobFailedError
         The job has failed or was cancelled.
     """
-    if not watch:
-        views.show_job(job, as_json)
-        return
     errors.print(f"job {job.id}", markup=False)
     with Client(url, key) as client:
         try:
@@ -324,16 +323,13 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool 
                 f"the job continues: 'islands jobs show {job.id} --watch' follows it again", markup=False
             )
             raise
+        if job.state == JobState.SUCCEEDED and not as_json:
+            views.show_result(client, job)
+    if job.state != JobState.SUCCEEDED:
         if as_json:
             views.show_job(job, as_json)
-        elif job.state == JobState.SUCCEEDED and job.kind != IDENTIFICATION:
-            views.show_findings(job)
-        elif job.state == JobState.SUCCEEDED:
-            views.show_models(client, job, client.models(job))
-            if kept := views.describe_kept_models(job):
-                output.print(f"The job {kept}.", markup=False)
-    if job.state != JobState.SUCCEEDED:
         if kept := views.describe_kept_models(job):
             raise JobFailedError(f"job {job.id} {kept}")
         detail = (job.problem or {}).get("detail", "resume it to continue")
         raise JobFailedError(f"job {job.id} {job.state}: {detail}")
+    return job

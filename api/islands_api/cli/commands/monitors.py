@@ -10,20 +10,18 @@ from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.settings_options import NONE, Given, with_settings
 from islands.cli.watched_folder import find_time, hash_file, order_of_recording
+from islands.diagnosis.settings import MonitoringSettings
 from islands.errors import SettingsError
 from islands.records.reading.options import ReadingOptions
+from islands.settings_schema import setting_of, settings_class
 from islands_api.cli.service.client_options import LOCAL, ApiKey, Json, Url, open_client, read_pages
 from islands_api.cli.service.job_views import print_json
 from islands_api.client import Client
 from islands_api.monitor_schemas import MonitorView
-from islands_api.schemas import JobView
+from islands_api.schemas import JobView, SubmissionSettings
 from islands_service.domain.job import TERMINAL
 
-monitors = typer.Typer(
-    help="Monitors of a service: create, add records, show, delete.",
-    no_args_is_help=True,
-    add_completion=False,
-)
+monitors = typer.Typer(no_args_is_help=True, add_completion=False)
 
 Id = Annotated[str, typer.Argument(help="The monitor's id.")]
 
@@ -34,63 +32,36 @@ _LINE = "{:32}  {:8}  {:>7}  {:>6}  {:>7}  {}"
 ALARM_EXIT = 3
 
 
+@settings_class
+class RecordJobSettings:
+    """Settings of the jobs of a monitor."""
+
+    priority: int = setting_of(SubmissionSettings, "priority")
+
+
 @monitors.command()
-def create(
+@with_settings(changes=MonitoringSettings, jobs=RecordJobSettings, reading=ReadingOptions)
+def add(
+    records: options.RecordsOrNone = None,
+    monitor: Annotated[
+        str | None, typer.Option("--monitor", help="Id of a monitor; without one, a new one is created.")
+    ] = None,
     diagnosis: Annotated[
         str | None,
-        typer.Option("--diagnosis", help="Id of a discrepancy job that has succeeded; or give --simulation."),
+        typer.Option(
+            "--diagnosis", help="Id of a discrepancy job whose simulation a new monitor follows, or:"
+        ),
     ] = None,
     simulated: Annotated[
         str | None, typer.Option("--simulation", help="Simulation to follow, as for islands jobs diagnose.")
     ] = None,
-    inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column.")] = None,
-    output_column: Annotated[str | None, typer.Option("--output", help="Output column.")] = None,
+    inputs: Annotated[list[str] | None, typer.Option("--input", help="Its input column.")] = None,
+    output_column: Annotated[str | None, typer.Option("--output", help="Its output column.")] = None,
     channels: simulation_options.Channels = None,
-    tolerance: simulation_options.Tolerances = None,
     dt: options.SamplingTime = None,
-    false_alarms: Annotated[
-        str | None,
-        typer.Option("--false-alarms", help="Rate of false alarms, as for islands monitor; 1 per month."),
-    ] = None,
-    interval: Annotated[
-        float | None,
-        typer.Option("--interval", help="Seconds from one record to the next; the duration of the first."),
-    ] = None,
-    training: Annotated[
-        int | None,
-        typer.Option("--training", help="Number of first records that are the undisturbed state; 24."),
-    ] = None,
-    name: Annotated[str, typer.Option("--name", help="Name of the monitor, for display.")] = "",
-    priority: Annotated[int, typer.Option("--priority", help="Priority of the jobs of its records.")] = 0,
-    url: Url = LOCAL,
-    key: ApiKey = None,
-    as_json: Json = False,
-) -> None:
-    """Create a monitor of a diagnosed or given simulation."""
-    driving = options.columns(inputs or [])
-    with open_client(url, key) as client:
-        made = client.create_monitor(
-            diagnosis,
-            simulation=simulated,
-            input=simulation_options.single_input(driving) if driving else None,
-            output=output_column,
-            channels=options.columns(channels or []),
-            dt=dt,
-            tolerance=simulation_options.tolerances(tolerance or []),
-            false_alarms=false_alarms,
-            interval=interval,
-            training=training,
-            name=name,
-            priority=priority,
-        )
-    _show_status(made, as_json)
-
-
-@monitors.command()
-@with_settings(reading=ReadingOptions)
-def add(
-    monitor: Id,
-    records: options.Records,
+    changes: Given = NONE,
+    name: Annotated[str, typer.Option("--name", help="Name of a new monitor, for display.")] = "",
+    jobs: Given = NONE,
     reading: Given = NONE,
     url: Url = LOCAL,
     key: ApiKey = None,
@@ -98,23 +69,40 @@ def add(
         bool, typer.Option("--watch/--no-watch", help="Wait until the records are analysed, and show them.")
     ] = True,
 ) -> None:
-    """Upload records and add them to a monitor, in the order of recording; those that it has are left out.
+    """Upload records to a monitor, in the order of recording, or create one; known records are left out.
 
     Exit code 3 if one of them has raised an alarm.
     """
+    driving = options.columns(inputs or [])
+    described = {
+        "simulation": simulated,
+        "input": simulation_options.single_input(driving) if driving else None,
+        "output": output_column,
+        "channels": options.columns(channels or []),
+        "dt": dt,
+        "name": name,
+        **changes,
+        **jobs,
+    }
     with open_client(url, key) as client:
+        if monitor is None:
+            made = client.create_monitor(diagnosis, **described)
+            _show_status(made, as_json=False)
+            monitor = made.id
+        elif given := [each for each, value in {"diagnosis": diagnosis, **described}.items() if value]:
+            raise SettingsError(f"{given[0]} is of a new monitor: leave it out, or leave out --monitor")
         known = _find_known(client, monitor)
-        jobs = []
-        for path in sorted(records, key=order_of_recording):
+        added = []
+        for path in sorted(records or [], key=order_of_recording):
             content = hash_file(path)
             if (path.name, content) not in known:
-                jobs.append(_add_file(client, monitor, path, content, ReadingOptions(**reading)))
+                added.append(_add_file(client, monitor, path, content, ReadingOptions(**reading)))
     if not watch:
-        for job in jobs:
+        for job in added:
             output.print(f"job {job.id}: {job.name}", markup=False)
         return
     with Client(url, key) as client:
-        raised = sum(_await_record(client, job) for job in jobs)
+        raised = sum(_await_record(client, job) for job in added)
     if raised:
         raise typer.Exit(ALARM_EXIT)
 

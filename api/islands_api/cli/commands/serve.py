@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from islands.cli.console import errors
+from islands.cli.settings_options import GIVEN, NONE, Given, split_settings, with_settings
 from islands.distribution import describe_missing_extra, list_missing_packages
 from islands.errors import SettingsError
 from islands_api.cli.service.page_opening import open_when_ready
@@ -30,54 +31,21 @@ _RAY_HEARTBEAT_TIMEOUT = 20.0
 _MIN_COORDINATOR_TIMEOUT = 5.0
 
 
+@with_settings(given=ServiceSettings)
 def serve(
-    data_dir: Annotated[
-        Path | None, typer.Option("--data-dir", help="Uploads, results, and the database if none is given.")
-    ] = None,
-    host: Annotated[
-        str | None, typer.Option("--host", help="127.0.0.1 by default; other addresses require keys.")
-    ] = None,
-    port: Annotated[int | None, typer.Option("--port", help="8000 by default.")] = None,
-    database: Annotated[
-        str | None,
-        typer.Option(
-            "--database",
-            callback=refuse_password,
-            help="postgresql+psycopg://... without a password; SQLite by default.",
-        ),
-    ] = None,
-    ray_address: Annotated[
-        str | None,
-        typer.Option(
-            "--ray-address", help="HOST:PORT of a cluster; by default a local Ray, when a job needs it."
-        ),
-    ] = None,
-    coordinators: Annotated[
-        int | None,
-        typer.Option(
-            "--coordinators", help="Jobs that run at the same time; one for each core by default, at most 4."
-        ),
-    ] = None,
-    tls_certificate: Annotated[Path | None, typer.Option("--tls-certificate", help="PEM file.")] = None,
-    tls_key: Annotated[Path | None, typer.Option("--tls-key", help="PEM file.")] = None,
-    require_keys: Annotated[
-        bool | None, typer.Option("--require-keys", help="Require a key on this machine, too.")
-    ] = None,
-    trusted_proxies: Annotated[
-        str | None,
-        typer.Option("--trusted-proxies", help="Addresses of proxies whose X-Forwarded-For is believed."),
-    ] = None,
-    root_path: Annotated[
-        str | None, typer.Option("--root-path", help="Path prefix of a proxy, for example /islands.")
-    ] = None,
-    log_format: Annotated[str | None, typer.Option("--log-format", help="text or json.")] = None,
+    context: typer.Context,
+    given: Given = NONE,
     show: Annotated[
         bool, typer.Option("--open", help="Open the page in the browser when the service is ready.")
     ] = False,
 ) -> None:
-    """Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next start."""
-    given = dict(locals())
-    del given["show"]  # no setting of the service
+    """Accept jobs over REST and run them. After Ctrl-C or SIGTERM they continue at the next start.
+
+    Each setting is also an environment variable: ISLANDS_ and its name.
+    """
+    in_file = split_settings(context.lookup_default(GIVEN) or ())
+    if "database" in given and given["database"] != in_file.get("database"):
+        refuse_password(given["database"])
     settings = service_settings(**given)
     check_packages(settings)
     with folder_lock(settings.data_dir):

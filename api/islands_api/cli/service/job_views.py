@@ -44,10 +44,12 @@ ENDED: Mapping[object, str] = MappingProxyType(
 _LINE, _SECOND_LINE = "{:32}  {:9}  {:>13}  {:>10}", "  {:16}  {}"
 
 
-def show_job(job: JobView, as_json: bool) -> None:
-    """Show the current state of a job."""
+def show_job(job: JobView, as_json: bool, client: Client | None = None) -> None:
+    """Show the current state of a job; with a client also its result, if it has one."""
+    client = client if job.summary is not None else None
     if as_json:
-        print_json(job.model_dump(mode="json"))
+        result = {} if client is None else {"result": client.result(job)}
+        print_json({**job.model_dump(mode="json"), **result})
         return
     output.print(f"job {job.id}: {job.state}", markup=False)
     status = job.progress or {}
@@ -62,13 +64,7 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(status["note"], markup=False)
     for warning in status.get("warnings", ()):
         output.print("\n".join(wrap(f"Warning: {warning}.")), markup=False)
-    if job.kind != IDENTIFICATION:
-        show_findings(job)
-    elif job.summary is not None:
-        for sentence in job.summary["words"].splitlines():
-            output.print("\n".join(wrap(sentence.strip())), markup=False)
-        if kept := describe_kept_models(job):
-            output.print("\n".join(wrap(f"The job {kept}.")), markup=False)
+    show_result(client, job)
     if job.problem is not None:
         output.print(job.problem["detail"], markup=False)
 
@@ -90,19 +86,33 @@ def describe_kept_models(job: JobView) -> str:
         return ""
     count = summary["models"]
     models = f"{count} model{'s' if count > 1 else ''} found so far"
-    get = f"'islands jobs result {job.id} --out FOLDER' writes {'them' if count > 1 else 'it'} to a folder"
+    get = f"'islands jobs show {job.id} --out FOLDER' writes {'them' if count > 1 else 'it'} to a folder"
     if is_cancelled:
-        return f"was cancelled and kept the {models}: {get}, 'islands jobs resume {job.id}' continues"
+        return (
+            f"was cancelled and kept the {models}: {get}, 'islands jobs change {job.id} --resume' continues"
+        )
     return f"{ENDED[ended_by]} and kept the {models}: {get}"
 
 
-def show_findings(job: JobView) -> None:
-    """Show the verdict of a discrepancy job, or the states of a record, as text; the phase if it runs."""
-    if job.summary is not None:
+def show_result(client: Client | None, job: JobView) -> None:
+    """Show the models of a search, or the summary of a job as text; the phase of one that runs."""
+    if client is not None and job.kind == IDENTIFICATION:
+        show_models(client, job, client.models(job))
+        if kept := describe_kept_models(job):
+            output.print("\n".join(wrap(f"The job {kept}.")), markup=False)
+    elif job.summary is not None:
         for line in job.summary["words"].splitlines():
             output.print("\n".join(wrap(line, "    ")), markup=False)
-    elif job.progress is not None and job.state == JobState.RUNNING:
+    elif job.progress is not None and job.state == JobState.RUNNING and job.kind != IDENTIFICATION:
         output.print(job.progress["phase"], markup=False)
+
+
+def download_result(client: Client, job: JobView, folder: Path) -> None:
+    """Write the result of a job into a folder, and print the names of its files."""
+    document = client.result(job)
+    kind = next(kind for name, kind in RESULTS.items() if name in document)
+    kind.download(client, job.id, document, folder)
+    output.print(f"{folder}/: {kind.contents}", markup=False)
 
 
 def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
@@ -266,14 +276,13 @@ class DownloadFolder:
         File of the result document.
     contents : str
         Files of the folder, for a message.
-    download, show : callable
-        Functions that write the folder and print the result.
+    download : callable
+        Function that writes the folder.
     """
 
     file: str
     contents: str
     download: Callable[[Client, str, dict[str, Any], Path], None]
-    show: Callable[[Client, str, dict[str, Any]], None]
 
 
 #: Kinds of results, by a key of the result document.
@@ -283,20 +292,17 @@ RESULTS: Mapping[str, DownloadFolder] = MappingProxyType(
             "result.json",
             "result.json, models/, figures/",
             download,
-            lambda client, job, document: show_models(client, client.job(job), parse_models(document)),
         ),
         "verdict": DownloadFolder(
             "discrepancy.json",
             "discrepancy.json, report.html, extended.json if an effect was named, next-experiment.csv if an "
             "input separates causes",
             download_diagnosis,
-            lambda client, job, _: show_findings(client.job(job)),
         ),
         "record": DownloadFolder(
             "record.json",
             "record.json",
             download_record,
-            lambda client, job, _: show_findings(client.job(job)),
         ),
     }
 )

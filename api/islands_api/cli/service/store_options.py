@@ -17,30 +17,34 @@ if TYPE_CHECKING:
 COMMAND_LINE = Requester("command line")
 
 
-def refuse_password(context: typer.Context, parameter: typer.CallbackParam, value: str | None) -> str | None:
+def refuse_password(value: str) -> None:
     """Refuse a password on the command line, which every user of the machine can read.
 
     Raises
     ------
     SettingsError
     """
+    # `islands serve` starts faster without this import.
+    from sqlalchemy import make_url  # noqa: PLC0415
+    from sqlalchemy.exc import ArgumentError  # noqa: PLC0415
+
+    try:
+        url = make_url(value)
+    except ArgumentError as error:
+        raise SettingsError(
+            "--database is not the URL of a database: write postgresql+psycopg://USER@HOST/NAME"
+        ) from error
+    if url.password is not None or "password" in url.query:
+        raise SettingsError(
+            "--database contains a password, and every user of this machine can read the arguments of a "
+            "process: give the URL as ISLANDS_DATABASE, or in a file named by ISLANDS_DATABASE_FILE"
+        )
+
+
+def _check_database(context: typer.Context, parameter: typer.CallbackParam, value: str | None) -> str | None:
     source = context.get_parameter_source(str(parameter.name))
     if value and source is not None and source.name == "COMMANDLINE":
-        # `islands serve` starts faster without this import.
-        from sqlalchemy import make_url  # noqa: PLC0415
-        from sqlalchemy.exc import ArgumentError  # noqa: PLC0415
-
-        try:
-            url = make_url(value)
-        except ArgumentError as error:
-            raise SettingsError(
-                "--database is not the URL of a database: write postgresql+psycopg://USER@HOST/NAME"
-            ) from error
-        if url.password is not None or "password" in url.query:
-            raise SettingsError(
-                "--database contains a password, and every user of this machine can read the arguments of a "
-                "process: give the URL as ISLANDS_DATABASE, or in a file named by ISLANDS_DATABASE_FILE"
-            )
+        refuse_password(value)
     return value
 
 
@@ -49,7 +53,7 @@ Database = Annotated[
     str | None,
     typer.Option(
         "--database",
-        callback=refuse_password,
+        callback=_check_database,
         help="The service's database, if it is not in the data folder; without a password.",
     ),
 ]

@@ -2,16 +2,12 @@
 
 import { getJson } from "../lib/api.js";
 import { el, setText } from "../lib/dom.js";
+import { findType, isNumber, makeInput } from "../lib/schema.js";
 
 const format = (value) => {
   if (typeof value === "boolean") return value ? "yes" : "no";
   return Array.isArray(value) ? value.join(", ") : String(value);
 };
-
-/** Return the type of a setting that is not null. */
-const findType = ({ anyOf = [], ...schema }) => anyOf.find(({ type }) => type !== "null") ?? schema;
-
-const isNumber = ({ type }) => type === "integer" || type === "number";
 
 /** Return the value that is written in a field; undefined if the field is empty. */
 function readValue(text, type) {
@@ -23,14 +19,8 @@ function readValue(text, type) {
   return isNumber(item) ? items.map(Number) : items;
 }
 
-function makeField(name, type) {
-  const names = { name, id: `setting-${name}`, "aria-describedby": `meaning-${name}` };
-  if (type.type === "boolean")
-    return el("select", names, ["", "yes", "no"].map((value) => el("option", { value }, value)));
-  const kind = isNumber(type) ? "number" : "text";
-  const step = type.type === "integer" ? 1 : "any";
-  return el("input", { ...names, type: kind, step, maxlength: 500, autocomplete: "off" });
-}
+const makeField = (name, schema) =>
+  makeInput(schema, { name, id: `setting-${name}`, "aria-describedby": `meaning-${name}` });
 
 /** Preset whose structure is chosen next to it, and what its values mean. */
 const LATENT = "latent";
@@ -96,7 +86,7 @@ export function makeSearchSettings(initial, onChange, signal) {
 
   function makeRow([name, schema]) {
     const type = findType(schema);
-    const field = makeField(name, type);
+    const field = makeField(name, schema);
     const standard = el("span");
     const given = name === "structure" && chosen === LATENT ? null : initial.settings?.[name];
     if (given !== undefined && given !== null) field.value = format(given);

@@ -7,7 +7,7 @@ import { el, setText } from "../lib/dom.js";
 const KEY_CHARACTERS = /^[\x21-\x7e]+$/;
 
 /** Command that creates a key, and its options. */
-const COMMAND = ["islands keys create", "--scope read", "--scope write"];
+const COMMAND = ["islands admin keys", "--scope read", "--scope write"];
 
 /** Show the form; call `onAccepted()` once the service accepts the key. */
 export function mountKeyForm(host, problem, onAccepted) {

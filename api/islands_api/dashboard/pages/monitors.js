@@ -76,7 +76,7 @@ function makeEmptyMessage(cursor) {
       "has changed. Create one on the page of a ",
       el("a", { href: "#/jobs?kind=discrepancy&state=succeeded" }, "diagnosis that has succeeded"),
       " (“Monitor later records with this diagnosis”), or with the command ",
-      el("code", {}, "islands monitors create"),
+      el("code", {}, "islands monitors add"),
       ".",
     ),
   );

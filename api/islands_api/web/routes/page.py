@@ -101,6 +101,7 @@ FILES = {
     "lib/numbers.js": _SCRIPT,
     "lib/polling.js": _SCRIPT,
     "lib/scale.js": _SCRIPT,
+    "lib/schema.js": _SCRIPT,
     "lib/toml.js": _SCRIPT,
     "pages/compare.js": _SCRIPT,
     "pages/data.js": _SCRIPT,

@@ -31,11 +31,11 @@ from islands.diagnosis.detectability import SelfTest
 from islands.diagnosis.findings import ResidualFormula
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.interim_findings import InterimFindings
-from islands.diagnosis.noise_claim import validate_noise_level
 from islands.diagnosis.planning.experiment_plan import plan_experiment
 from islands.diagnosis.procedure import LEAST_FRACTION
 from islands.diagnosis.procedure import diagnose as run_diagnosis
 from islands.diagnosis.result import Diagnosis
+from islands.diagnosis.settings import DiagnosisSettings
 from islands.errors import SettingsError
 from islands.facade.explain_residual import (
     BEFORE_FORMULA,
@@ -67,7 +67,7 @@ SELF_TEST = "self-test"
 SELF_TEST_MODULE = "lab.diagnosis.self_test"
 
 
-@with_settings(reading=ReadingOptions, plan=PlanOptions)
+@with_settings(changes=DiagnosisSettings, reading=ReadingOptions, plan=PlanOptions)
 def diagnose(
     inputs: options.Inputs,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
@@ -80,8 +80,7 @@ def diagnose(
         str | None, typer.Option("--output", help="Output column; not needed for --plan.")
     ] = None,
     channels: simulation_options.Channels = None,
-    tolerance: simulation_options.Tolerances = None,
-    noise_level: simulation_options.NoiseLevel = None,
+    changes: Given = NONE,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
@@ -102,19 +101,21 @@ def diagnose(
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
-    planning, file_options = PlanOptions(**plan), ReadingOptions(**reading)
+    planning, file_options, settings = (
+        PlanOptions(**plan),
+        ReadingOptions(**reading),
+        DiagnosisSettings(**changes),
+    )
     if planning.plan:
-        _check_unused_by_plan(validation, noise_level)
+        _check_unused_by_plan(validation, settings.noise_level)
         check_folder(out, force, PLAN)
         columns_of_input = [simulation_options.single_input(options.columns(inputs)), *(channels or [])]
         data = read_input(records or [], columns_of_input, output_column, dt, rows, file_options, planning)
-        tolerances = simulation_options.tolerances(tolerance or [])
         compile_kernels()
-        _plan(data, simulated, tolerances, planning, out, seed, workers)
+        _plan(data, simulated, settings.tolerance, planning, out, seed, workers)
         return
     if not records or output_column is None:
         raise SettingsError("a diagnosis needs a record and --output: give both, or --plan before any data")
-    validate_noise_level(noise_level)
     check_folder(out, force, DIAGNOSIS_FILE)
     self_test = import_laboratory(SELF_TEST_MODULE, "--self-test").self_test if tested else None
     # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
@@ -132,10 +133,12 @@ def diagnose(
     compile_kernels()
     with progress("diagnose", BEFORE_FORMULA * LEAST_FRACTION) as show:
         simulator = make_simulator(spec, data, columns)
-        tolerances = simulation_options.tolerances(tolerance or [])
+        tolerances = settings.tolerance
         began = perf_counter()
         report = report_part(show, 0.0, BEFORE_FORMULA)
-        run = partial(run_diagnosis, data, simulator, tolerances, seed, report, noise_level=noise_level)
+        run = partial(
+            run_diagnosis, data, simulator, tolerances, seed, report, noise_level=settings.noise_level
+        )
         diagnosis, fits, before = _diagnose_until_stopped(run, out, seed, workers)
         with stop_requests(before) as stop:
             steps = Steps(show, stop)

@@ -16,8 +16,7 @@ from islands.cli.progress_display import compile_kernels
 from islands.cli.recordings import Recordings
 from islands.cli.settings_options import NONE, Given, with_settings
 from islands.cli.watched_folder import WatchedFolder, find_time, hash_file
-from islands.diagnosis.monitoring.alarm_rate import DEFAULT_RATE
-from islands.diagnosis.monitoring.record_follower import TRAINING
+from islands.diagnosis.settings import MonitoringSettings
 from islands.errors import IslandsError, SettingsError
 from islands.facade.record_monitor import (
     create_monitor,
@@ -37,6 +36,7 @@ from islands.report.documents.monitor_state import (
 from islands.report.figures.monitored_states import draw_monitored_states
 from islands.report.figures.style import save
 from islands.report.text.monitor import describe_alarm_text, describe_last_record
+from islands.settings_schema import setting, settings_class
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LocalSpec, innermost
 
@@ -56,7 +56,14 @@ ALARM_EXIT = 3
 POLL = 1.0
 
 
-@with_settings(reading=ReadingOptions)
+@settings_class
+class FolderSettings:
+    """Settings of a folder of records."""
+
+    settle: float = setting(2.0, "Time without a change after which a file is complete.", ge=0, unit="s")
+
+
+@with_settings(changes=MonitoringSettings, folder_settings=FolderSettings, reading=ReadingOptions)
 def monitor(
     folder: Annotated[Path, typer.Argument(help="Folder into which records are written, one file each.")],
     out: Annotated[Path, typer.Option("--out", help="Folder for states, alarms and figure.")],
@@ -76,30 +83,9 @@ def monitor(
         str | None, typer.Option("--output", help="Output column; by default that of the simulation.")
     ] = None,
     channels: simulation_options.Channels = None,
-    tolerance: simulation_options.Tolerances = None,
-    false_alarms: Annotated[
-        str,
-        typer.Option(
-            "--false-alarms", help="Rate of false alarms: 1 per month, 0.1/week, 1 per 720 records."
-        ),
-    ] = DEFAULT_RATE,
-    interval: Annotated[
-        float | None,
-        typer.Option(
-            "--interval",
-            min=0.0,
-            help="Seconds from one record to the next; by default by the times in the file names, or the "
-            "duration of the first record.",
-        ),
-    ] = None,
-    training: Annotated[
-        int, typer.Option("--training", help="Number of first records that are the undisturbed state.")
-    ] = TRAINING,
+    changes: Given = NONE,
     follow: Annotated[bool, typer.Option("--follow", help="Wait for further records, until Ctrl-C.")] = False,
-    settle: Annotated[
-        float,
-        typer.Option("--settle", min=0.0, help="Seconds without a change after which a file is complete."),
-    ] = 2.0,
+    folder_settings: Given = NONE,
     dt: options.SamplingTime = None,
     reading: Given = NONE,
     force: Annotated[bool, typer.Option("--force", help="Start again, without the states in --out.")] = False,
@@ -109,7 +95,7 @@ def monitor(
     Exit code 3 if this run has raised an alarm. Run it again to continue with further records.
     """
     check_folder(out, force=True)
-    watched = WatchedFolder(folder, settle)
+    watched = WatchedFolder(folder, FolderSettings(**folder_settings).settle)
     known = read_monitor(out / STATE) if (out / STATE).exists() and not force else None
     if simulated is not None:
         spec = parse_monitored(simulated)
@@ -120,12 +106,8 @@ def monitor(
     driving = [*options.columns(inputs or []), *(channels or [])]
     columns = _find_columns(spec, known, driving, output_column)
     reader = _Reader(*columns, spec, dt, ReadingOptions(**reading))
-    settings = {
-        "false_alarms": false_alarms,
-        "interval": interval or watched.interval,
-        "training": training,
-        "tolerance": simulation_options.tolerances(tolerance or []),
-    }
+    MonitoringSettings(**changes)  # An error is shown before the first record arrives.
+    settings = {"interval": watched.interval, **changes}
     out.mkdir(parents=True, exist_ok=True)
     run = _Run(out, reader, spec, settings, known)
     try:

@@ -37,7 +37,7 @@ def settings(
         text = str(cls.__doc__).partition("\n\nAttributes")[0]
         output.print(f"{' '.join(text.split())} Of {', '.join(names)}.", markup=False)
         for name, info, values in list_settings(cls):
-            default = _write(info.default)
+            default = "" if info.default_factory else _write(info.default)
             output.print(f"  {name}: {values}{default and f', by default {default}'}", markup=False)
             output.print("\n".join(wrap(f"      {info.description}", "      ")), markup=False)
         output.print()
@@ -58,8 +58,10 @@ def _walk(group: Any, context: Any, prefix: str = "", only: str = "") -> Iterato
 def _write(default: object) -> str:
     """Return a default as a value of ``--set``."""
     match default:
-        case None | "" | ():
+        case None:
             return ""
+        case dict():
+            return ",".join(f"{name}={value}" for name, value in default.items())
         case tuple():
             return ",".join(map(str, default))
         case bool():

@@ -7,6 +7,7 @@ import typer
 
 import islands
 from islands.cli import options
+from islands.cli.console import output
 from islands.cli.settings_options import NONE, Given, with_settings
 from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
@@ -17,7 +18,11 @@ from islands.records.reading import read_dataset
 from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
 from islands.report.figures.names import MODEL_FIGURES
+from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.layout import term_table, wrap
+
+#: Format of the report of a result folder.
+REPORT = "report"
 
 
 @with_settings(reading=ReadingOptions)
@@ -27,13 +32,16 @@ def show(
         str | None,
         typer.Option(
             "--format",
-            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS])}. By default one term in each line, with its "
-            "standard error and the columns of the record.",
+            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS, REPORT])}. By default one term in each line, with "
+            "its standard error and the columns of the record.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="File to write; required for fmu and fmu2, which are not text."),
+        typer.Option(
+            "--out",
+            help="File to write; required for fmu and fmu2, and report.html in the folder for a report.",
+        ),
     ] = None,
     figure: Annotated[
         str | None,
@@ -52,12 +60,17 @@ def show(
     FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica. An extended
     simulation is a program in C or MATLAB; one with a closed form is exported like a
     model, a model of several outputs as one program or block.
+
+    The report of a result folder is one HTML file, which prints on A4, with its figures.
     """
     if figure is not None:
         _draw(model, figure, record, out, dt, parse_rows(rows), ReadingOptions(**reading))
         return
     if record is not None:
         raise SettingsError("--record is for --figure: name one")
+    if kind == REPORT:
+        _write_report(Path(model), out)
+        return
     # `load` imports the search and its kernels, which takes longer than everything else.
     found = read_saved_model(open_document(model)) if Path(model).exists() else None
     if found is None:
@@ -71,6 +84,18 @@ def show(
         _print("\n".join([*term_table(found), *(wrap(f"where {stated}") if stated else [])]))
         return
     _print(export_or_write(found, kind or "plain", out))
+
+
+def _write_report(folder: Path, out: Path | None) -> None:
+    # The models take a second to import.
+    from islands.report.pages.saved_result import report_saved_result  # noqa: PLC0415
+
+    if not folder.exists():
+        raise SettingsError(f"there is no folder {folder}: a report is of the folder of a result")
+    page = report_saved_result(folder)
+    path = out or (folder if folder.is_dir() else folder.parent) / REPORT_FILE
+    path.write_bytes(page)
+    output.print(path, markup=False, highlight=False, soft_wrap=True)
 
 
 def _print(text: str | None) -> None:

@@ -6,9 +6,6 @@ from types import MappingProxyType
 
 from islands.errors import SettingsError, suggest
 
-#: Default rate.
-DEFAULT_RATE = "1 per month"
-
 #: Units of time in seconds. A month has 30 days.
 SECONDS: Mapping[str, float] = MappingProxyType(
     {"hour": 3600.0, "day": 86400.0, "week": 604800.0, "month": 2592000.0, "year": 31536000.0}

@@ -21,12 +21,6 @@ from islands.errors import SettingsError
 from islands.records.dataset import Dataset
 from islands.simulators.interface import Simulator
 
-#: Default number of records that the monitor takes as the undisturbed state: a day of hourly records.
-TRAINING = 24
-
-#: Smallest number of records of the training.
-MIN_TRAINING = 12
-
 #: Decrease of minus twice the log-likelihood per record beyond which a change is large: the record that
 #: raised the alarm shows its cause.
 LARGE_CHANGE = 50.0
@@ -57,22 +51,17 @@ class MonitorSettings:
     Raises
     ------
     SettingsError
-        The rate is not between 0 and 1, or the training is too short.
+        The rate is not between 0 and 1.
     """
 
     false_alarms: float
-    training: int = TRAINING
+    training: int
     tolerance: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.false_alarms < 1.0:
             raise SettingsError(
                 f"the rate of false alarms is a number per record between 0 and 1, got {self.false_alarms:g}"
-            )
-        if self.training < MIN_TRAINING:
-            raise SettingsError(
-                f"a training of {self.training} records is too short to know how much records differ: give "
-                f"at least {MIN_TRAINING}"
             )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 from islands.errors import SettingsError, lookup
 from islands.estimation.refinement import refine
@@ -28,10 +28,8 @@ from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.engine_choice import Ray
 from islands.facade.evolution_run import SearchCallback
 from islands.facade.fit import fit_record
-from islands.facade.fit_settings import FitChanges
 from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
-from islands.facade.setting_changes import SettingChanges
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.coupled_narx import CoupledModel
@@ -90,7 +88,7 @@ def fit_coupled(
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
     reading: "ReadingLike" = DEFAULT_READING,
-    **options: Unpack[FitChanges],
+    **options: Any,
 ) -> CoupledResult:
     """Fit one equation per output by subset selection, for a simulation of all outputs together.
 
@@ -162,7 +160,7 @@ def fit_coupled_data(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-    **options: Unpack[FitChanges],
+    **options: Any,
 ) -> CoupledResult:
     """Fit one equation per output as `fit_coupled` does, for a caller that states an extrapolation itself.
 
@@ -206,7 +204,7 @@ def identify_coupled(
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     reading: "ReadingLike" = DEFAULT_READING,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> CoupledResult:
     """Identify one equation per output by evolution, for a simulation of all outputs together.
 
@@ -277,7 +275,7 @@ def identify_coupled_data(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> CoupledResult:
     """Identify one equation per output, for a caller that states an extrapolation itself.
 

@@ -176,11 +176,11 @@ def test_simulate_takes_a_record_whose_output_has_its_first_values_only(run, fit
     assert np.isfinite(np.loadtxt("s.csv", delimiter=",", skiprows=4)).all()
 
 
-def test_systems_make_writes_into_a_folder_with_brackets(run):
+def test_the_record_of_a_system_is_written_into_a_folder_with_brackets(run):
     Path("[red]").mkdir()
-    code, out, _ = run("systems", "s1", "--out", "[red]/a[b].csv")
+    code, out, _ = run("examples", "[red]/a[b].csv", "--system", "s1")
     assert code == 0
-    assert out.startswith("[red]/a[b].csv: 500 samples, ")
+    assert out.startswith("[red]/a[b].csv: 500 samples\n")
 
 
 def test_an_export_is_written_to_a_file(run, tmp_path):
@@ -201,7 +201,7 @@ def test_an_export_is_written_to_a_file(run, tmp_path):
         (("show", "published:12", "--format", "[bold]"), "unknown format '[bold]'"),
         (("show", "published:12", "--format", "fmu"), "the format fmu is not text: write a file with --out"),
         (("simulate", "published:12", "nowhere.csv"), "there is no file nowhere.csv"),
-        (("systems", "s1", "--out", "no/where.csv"), "cannot write no/where.csv: No such file"),
+        (("examples", "no/where.csv", "--system", "s1"), "cannot write no/where.csv: No such file"),
     ],
 )
 def test_error_message_with_brackets_is_printed_verbatim(run, arguments, message):

@@ -14,7 +14,7 @@ from support.repository import ROOT
 def test_the_help_imports_no_command():
     program = (
         "import sys; from typer.testing import CliRunner; from islands_api.cli.app import app;"
-        "print('systems' in CliRunner().invoke(app, ['--help']).output);"
+        "print('examples' in CliRunner().invoke(app, ['--help']).output);"
         "print([name for name in sys.modules if '.cli.commands.' in name]);"
         "print([name for name in sys.modules if name.partition('.')[0] == 'lab']);"
         "print({'numpy', 'numba', 'ray', 'pydantic'} & set(sys.modules))"

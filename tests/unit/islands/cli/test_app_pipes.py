@@ -15,13 +15,13 @@ from support.command_line import ISLANDS
 @pytest.mark.parametrize(
     ("arguments", "is_joined"),
     [
-        *((each, False) for each in ("", "systems")),
+        *((each, False) for each in ("", "examples")),
         ("show no-result", True),
         *(
             pytest.param(*each, marks=pytest.mark.nightly)
             for each in [
                 *((each, False) for each in ("--help", "--version", "fit --help", "jobs --help")),
-                *((each, True) for each in ("--help", "systems", "fitt")),
+                *((each, True) for each in ("--help", "examples", "fitt")),
             ]
         ),
     ],

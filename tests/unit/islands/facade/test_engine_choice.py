@@ -1,9 +1,7 @@
 """Choice of an engine by name."""
 
 from contextlib import contextmanager
-from dataclasses import fields
 from importlib.metadata import EntryPoint
-from typing import get_type_hints
 
 import pytest
 
@@ -11,7 +9,6 @@ import islands
 from islands.evolution.engine import SerialEngine
 from islands.facade import engine_choice
 from islands.facade.engine_choice import open_engine
-from islands.facade.setting_changes import SettingChanges
 from support.searches import record
 
 OPENED = []
@@ -83,7 +80,3 @@ def test_an_engine_that_is_not_installed_is_named_in_one_line(installed, name, m
 def test_impossible_cores_of_ray_are_refused(arguments):
     with pytest.raises(islands.SettingsError, match="core"):
         islands.Ray(**arguments)
-
-
-def test_the_typed_changes_of_a_preset_are_the_settings():
-    assert [*get_type_hints(SettingChanges)] == [each.name for each in fields(islands.Settings)]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.diagnosis.monitoring.record_follower import AlarmKind, MonitorSettings
+from islands.diagnosis.monitoring.record_follower import AlarmKind
 from islands.errors import RecordError, SettingsError
-from islands.facade.record_monitor import monitor_record
+from islands.facade.record_monitor import create_monitor, monitor_record
 from islands.report.documents.monitor_json import describe_alarm, describe_status, monitor_document
 from islands.report.documents.monitor_state import (
     head_to_json,
@@ -17,7 +17,14 @@ from islands.report.documents.monitor_state import (
 )
 from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from lab.diagnosis.monitor import run
-from support.monitored_oscillator import ONSET, TRAINING, follow, make_records, undisturbed_monitor
+from support.monitored_oscillator import (
+    ONSET,
+    SIMULATION,
+    TRAINING,
+    follow,
+    make_records,
+    undisturbed_monitor,
+)
 
 
 def disturb(**change):
@@ -111,11 +118,11 @@ def test_the_document_has_the_states_with_their_intervals():
 
 
 @pytest.mark.parametrize(
-    "given", [{"false_alarms": 0.0}, {"false_alarms": 1e-3, "training": 3}, {"false_alarms": 2.0}]
+    "given", [{"false_alarms": "0 per month"}, {"training": 3}, {"false_alarms": "2 per record"}]
 )
 def test_impossible_settings_are_refused(given):
     with pytest.raises(SettingsError):
-        MonitorSettings(**given)
+        create_monitor(make_records(1)[0], SIMULATION, **given)
 
 
 @pytest.mark.nightly

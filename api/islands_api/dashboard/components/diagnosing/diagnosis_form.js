@@ -1,7 +1,8 @@
 /** Form that starts a diagnosis of a simulation on a data set. */
 
 import { getJson } from "../../lib/api.js";
-import { el } from "../../lib/dom.js";
+import { el, setText } from "../../lib/dom.js";
+import { getFields, limitInput } from "../../lib/schema.js";
 import { makeField, makeJobForm, quote } from "../job_request.js";
 import { makeSimulationChoice } from "./simulation_choice.js";
 import { makeSimulationPreview } from "./simulation_preview.js";
@@ -43,12 +44,13 @@ function makeRowsField(samples, initial, getVisibleRows, onChange) {
 
 /** Make the field of the noise of the sensor. */
 function makeNoiseField(initial) {
-  const options = { type: "number", min: 0, step: "any", placeholder: "unknown" };
-  const level = el("input", { name: "noise_level", ...options });
-  level.value = initial ?? "";
-  const hint = "Standard deviation in the unit of the output, if known: a far larger residual is no noise.";
-  const nodes = makeField("diagnose", "Noise of the sensor", level, hint);
-  return { nodes, get: () => Number(level.value) };
+  const level = el("input", { name: "noise_level", placeholder: "unknown", value: initial });
+  const nodes = makeField("diagnose", "Noise of the sensor", level, "");
+  function describe(schema) {
+    limitInput(level, schema);
+    setText(nodes.at(-1), schema.description);
+  }
+  return { nodes, describe, get: () => Number(level.value) };
 }
 
 /** Return the fields of a request that the form keeps as they are, and their description in words. */
@@ -136,6 +138,7 @@ export function makeDiagnosisForm({ id, name, preview }, initial, getVisibleRows
     if (!form.node.isConnected) details.append(form.node);
     try {
       if (simulated === null) {
+        noise.describe((await getFields("DiscrepancyRequest")).noise_level);
         const { items } = await getJson("v1/simulations", { signal });
         const accepted = items.filter(({ refusal }) => !refusal);
         simulated = makeSimulationChoice(accepted, initial, update, signal);

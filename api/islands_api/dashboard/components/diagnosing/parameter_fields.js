@@ -2,6 +2,7 @@
 
 import { el, makeScrollable, makeTable } from "../../lib/dom.js";
 import { formatShort } from "../../lib/numbers.js";
+import { getFields, limitInput } from "../../lib/schema.js";
 
 /** Return the numbers of fields that are not empty, by name. */
 function readNumbers(fields, divisor) {
@@ -30,7 +31,7 @@ export function makeParameterFields(parameters, { hasValues, units: [input, outp
       ...{ type: "number", step: "any", placeholder: describe(value), "aria-label": `Value of ${name}` },
     });
     const tolerance = el("input", {
-      ...{ type: "number", step: "any", min: 0.001, max: 99, placeholder: "none" },
+      placeholder: "none",
       "aria-label": `Tolerance of ${name} in per cent`,
     });
     if (hasValues) values.push([name, field]);
@@ -46,6 +47,10 @@ export function makeParameterFields(parameters, { hasValues, units: [input, outp
       ...(chosen ? [boxes.at(-1)[1]] : []),
     ];
   });
+  // The form states that the service does not answer.
+  getFields("DiscrepancyRequest").then(({ tolerance: { additionalProperties: schema } }) => {
+    for (const [, field] of tolerances) limitInput(field, schema, 100);
+  }, () => {});
   const headings = ["Parameter", "Unit", "Value", "Tolerance (± %)", ...(chosen ? ["Calibrate"] : [])];
   const table = makeTable("Parameters of the simulation", headings, rows);
   table.classList.add("parameters");

@@ -2,13 +2,26 @@
 
 import { postJson } from "../../lib/api.js";
 import { el } from "../../lib/dom.js";
+import { getFields, makeInput } from "../../lib/schema.js";
 import { clearBanner, showProblem } from "../banner.js";
 
-const makeField = (name, label, hint, attributes) => [
-  el("label", { for: `monitor-${name}` }, label),
-  el("input", { id: `monitor-${name}`, name, "aria-describedby": `monitor-${name}-hint`, ...attributes }),
-  el("span", { class: "soft small", id: `monitor-${name}-hint` }, hint),
-];
+/** Labels of the fields. */
+const LABELS = {
+  name: "Name",
+  false_alarms: "False alarms",
+  interval: "Seconds between records",
+  training: "Records of the training",
+};
+
+function makeField(name, schema, value) {
+  const id = `monitor-${name}`;
+  const required = Boolean(schema.default);
+  return [
+    el("label", { for: id }, LABELS[name]),
+    makeInput(schema, { id, name, required, "aria-describedby": `${id}-hint`, ...(value && { value }) }),
+    el("span", { class: "soft small", id: `${id}-hint` }, schema.description),
+  ];
+}
 
 /** Make the form, folded; the page of the new monitor opens. */
 export function makeMonitorForm(job) {
@@ -29,31 +42,21 @@ export function makeMonitorForm(job) {
     }
   }
 
-  return el(
-    "details",
-    { class: "follow" },
-    el("summary", {}, "Monitor later records with this diagnosis"),
-    el(
-      "form",
-      { class: "fields", on: { submit: create } },
-      makeField("name", "Name", "For display.", { maxlength: 200, value: job.name }),
-      makeField("false_alarms", "False alarms", "A rate: 1 per month, 0.1/week or 1 per 720 records.", {
-        required: true,
-        value: "1 per month",
-      }),
-      makeField("interval", "Seconds between records", "The duration of the first record if it is empty.", {
-        type: "number",
-        min: "0",
-        step: "any",
-      }),
-      makeField("training", "Records of the training", "The undisturbed state: at least 12 records.", {
-        type: "number",
-        min: "12",
-        max: "10000",
-        required: true,
-        value: "24",
-      }),
-      submit,
-    ),
-  );
+  const form = el("form", { class: "fields", on: { submit: create } });
+
+  async function open() {
+    if (form.childElementCount) return;
+    form.replaceChildren(el("p", { class: "loading" }, "Loading…"));
+    try {
+      const fields = await getFields("MonitorRequest");
+      const made = Object.keys(LABELS).flatMap((name) => makeField(name, fields[name], job[name]));
+      form.replaceChildren(...made, submit);
+    } catch (error) {
+      form.replaceChildren();
+      showProblem(error);
+    }
+  }
+
+  const title = el("summary", {}, "Monitor later records with this diagnosis");
+  return el("details", { class: "follow", on: { toggle: open } }, title, form);
 }

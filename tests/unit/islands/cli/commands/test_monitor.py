@@ -27,8 +27,8 @@ def write(folder, first, last):
 def run(folder, out, *more):
     (folder / "oscillator.toml").write_text(_write_toml(SIMULATION))
     simulation = f"ode:{folder / 'oscillator.toml'}"
-    command = ["monitor", str(folder / "records"), "--out", str(folder / out), "--settle", "0"]
-    command += ["--simulation", simulation, "--training", str(TRAINING), *more]
+    command = ["monitor", str(folder / "records"), "--out", str(folder / out), "--set", "settle=0"]
+    command += ["--simulation", simulation, "--set", f"training={TRAINING}", *more]
     return CliRunner().invoke(app, command)
 
 

@@ -1,11 +1,16 @@
-"""``islands show``: figures of a model on a record."""
+"""``islands show``: figures of a model on a record, and the report of a folder."""
+
+from pathlib import Path
 
 import pytest
 
+import islands
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
 from islands.persistence.models import write_model
 from islands.records.writer import write_record
+from islands.report.pages.saved_result import report_saved_result
+from support.identifications import record as make_record
 from support.searches import record
 from support.undrawn import undrawn_figures
 
@@ -38,3 +43,19 @@ def test_options_of_a_figure_without_the_others_are_refused(model, command_line,
     code, _, error = command_line("show", "model.json", *options)
     assert code == 2
     assert message in error
+
+
+@pytest.mark.parametrize("options", [(), ("--out", "mine.html")])
+def test_report_of_a_folder_is_written_into_it_or_where_it_is_asked_for(command_line, tmp_path, options):
+    settings = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 1, "certificate": 0}
+    folder = islands.fit(make_record(300), average=1, **settings).save(tmp_path / "result", figures=())
+    code, out, error = command_line("show", folder, "--format", "report", *options)
+    assert (code, error) == (0, "")
+    expected = tmp_path / options[1] if options else folder / "report.html"
+    assert Path(out.strip()).absolute() == expected
+    assert expected.read_bytes() == report_saved_result(folder)
+
+
+def test_a_report_of_no_folder_is_an_error_with_advice(command_line):
+    code, _, error = command_line("show", "nothing", "--format", "report")
+    assert (code, "there is no folder nothing" in error) == (2, True)

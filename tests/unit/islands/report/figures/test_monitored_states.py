@@ -20,4 +20,4 @@ def test_every_parameter_has_a_panel_and_an_alarm_a_mark():
 
 
 def test_a_monitor_without_records_has_an_empty_figure():
-    assert not draw_monitored_states(MonitorState(MonitorSettings(1e-3))).axes
+    assert not draw_monitored_states(MonitorState(MonitorSettings(1e-3, 24))).axes

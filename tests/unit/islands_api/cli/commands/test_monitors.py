@@ -21,7 +21,7 @@ from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
 
-CREATE = ("create", "--simulation", "bouc-wen-piezo", "--input", "u_V", "--output", "y_um")
+CREATE = ("add", "--simulation", "bouc-wen-piezo", "--input", "u_V", "--output", "y_um")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(
     run: Run, command_line: Run, service: Service, tmp_path: Path
 ) -> None:
     saved = reject_record(follow(make_records(1)), "short.csv", "", "it is too short")
-    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
+    monitor = run(*CREATE)[1].split()[1].rstrip(":")
     submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
     job, _ = service.store.jobs.submit(submission)
     texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
@@ -58,7 +58,7 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(
     assert rejected == "short.csv: rejected: it is too short"
     assert (tmp_path / "states" / "state.json").read_text() == texts[0]
     assert json.loads((tmp_path / "states" / "monitor.json").read_text()) == json.loads(texts[1])
-    code, shown, _ = command_line("jobs", "result", job.id, "--out", "record")
-    assert (code, shown) == (0, "record 0: normal\nrecord/: record.json\n")
+    code, shown, _ = command_line("jobs", "show", job.id, "--out", "record")
+    assert (code, shown) == (0, f"job {job.id}: succeeded\nrecord 0: normal\nrecord/: record.json\n")
     assert json.loads((tmp_path / "record" / "record.json").read_text()) == {"record": {}}
     assert "<svg" in (tmp_path / "states" / "monitor.svg").read_text()

@@ -131,7 +131,7 @@ def diagnosed(service: Service, owner: str) -> str:
     ("arguments", "message"),
     [
         (("--simulation", "pendulum"), "unknown simulation 'pendulum'"),
-        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
+        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "tolerance is NAME=VALUE"),
         (("--simulation", "bouc-wen-piezo", "--input", "t_s"), "is driven by one input, got u_V, t_s"),
         (("--simulation", "column:y_sim"), "has no column y_sim"),
         (("--simulation", "python:a.py:run"), "a service does not run code of its clients"),
@@ -148,8 +148,7 @@ def test_diagnosis_is_watched_listed_and_shown_as_text(run: Run, diagnosed: str)
     words = "It lacks something.\n  thermal-drift\n"
     assert run("show", diagnosed, "--watch")[1] == words
     assert run("show", diagnosed)[1] == f"job {diagnosed}: succeeded\n{words}"
-    assert run("result", diagnosed)[1] == words
-    first, second = run("list")[1].splitlines()[2:4]
+    first, second = run("show")[1].splitlines()[2:4]
     assert first.startswith(diagnosed)
     assert second.endswith("piezo (named: thermal-drift)")
 
@@ -157,15 +156,15 @@ def test_diagnosis_is_watched_listed_and_shown_as_text(run: Run, diagnosed: str)
 def test_downloaded_diagnosis_equals_that_of_the_command_line(run: Run, diagnosed: str) -> None:
     Path("out").mkdir()
     Path("out/notes.txt").write_text("notes")
-    code, out, err = run("result", diagnosed, "--out", "out")
+    code, out, err = run("show", diagnosed, "--out", "out")
     assert code == 0, err
     assert out.splitlines()[-1].startswith("out/: discrepancy.json, report.html, extended.json")
     names = {"discrepancy.json", "report.html", "extended.json", "notes.txt"}
     assert {path.name for path in Path("out").iterdir()} == names
     document = json.loads(Path("out/discrepancy.json").read_text())
-    assert document == json.loads(run("result", diagnosed, "--json")[1])
+    assert document == json.loads(run("show", diagnosed, "--json")[1])["result"]
     assert Path("out/extended.json").read_bytes() == b'{"effects": []}'
-    code, _, err = run("result", diagnosed, "--out", "out")
+    code, _, err = run("show", diagnosed, "--out", "out")
     assert code == 2
     assert "holds a result already" in err
-    assert run("result", diagnosed, "--out", "out", "--force")[0] == 0
+    assert run("show", diagnosed, "--out", "out", "--force")[0] == 0

@@ -1,4 +1,4 @@
-"""``islands keys`` in this process, on the database of a running service."""
+"""``islands admin keys`` in this process, on the database of a running service."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -26,14 +26,14 @@ def service(serve: Any) -> Iterator[Service]:
 
 @pytest.fixture
 def run(service: Service, monkeypatch: pytest.MonkeyPatch, command_line: Run) -> Run:
-    """Run ``islands keys`` on the service's data folder; return exit code, standard output and error."""
+    """Run ``islands admin keys`` on the service's data folder; return code, output and error."""
     monkeypatch.setenv("ISLANDS_DATA_DIR", str(service.settings.data_dir))
-    return partial(command_line, "keys")
+    return partial(command_line, "admin", "keys")
 
 
 def create_key(run: Run, *words: object) -> str:
     """Create a key and return its secret."""
-    code, out, _ = run("create", *words)
+    code, out, _ = run(*words)
     assert code == 0
     return out.strip()
 
@@ -57,7 +57,7 @@ def is_accepted(service: Service, secret: str) -> bool:
 
 
 def test_create_prints_a_valid_secret_and_describes_it_in_a_message(run: Run, service: Service) -> None:
-    code, out, err = run("create", *ALL, "--name", "lab-3")
+    code, out, err = run(*ALL, "--name", "lab-3")
     secret = out.removesuffix("\n")
     key = get_key(service, secret)
     assert (code, err) == (0, f"key {key.id} of owner {key.owner}: metrics, read, write\n")
@@ -69,7 +69,7 @@ def test_create_prints_a_valid_secret_and_describes_it_in_a_message(run: Run, se
 @pytest.mark.parametrize("days", [0, -1, "nan", "inf", "-inf"])
 def test_invalid_days_are_rejected(run: Run, service: Service, days: object) -> None:
     before = service.store.keys.all()
-    code, out, err = run("create", *ALL, "--days", days)
+    code, out, err = run(*ALL, "--days", days)
     assert (code, out) == (2, "")
     assert err.strip() == f"error: --days is a number of days above 0, got {days}"
     assert service.store.keys.all() == before
@@ -85,7 +85,7 @@ def test_options_name_the_data_folder_and_the_database(
         ("--data-dir", tmp_path / "new"),
         ("--database", f"sqlite:///{tmp_path / 'new' / 'islands.db'}"),
     ):
-        out = run("list", *where)[1]
+        out = run(*where)[1]
         assert "here" in out
         assert out.count("valid") == 1
 
@@ -94,13 +94,13 @@ def test_options_name_the_data_folder_and_the_database(
     ("arguments", "message"),
     [
         (
-            ("create", "--scope", "read", "--scope", "root"),
+            ("--scope", "read", "--scope", "root"),
             "unknown scopes root: take some of read, write, metrics",
         ),
-        (("create", "--scope", "read,write"), "unknown scopes read,write"),
-        (("create", "--scope", ""), "unknown scopes"),
-        (("revoke", "nothing"), "there is no key 'nothing': list them with 'islands keys list'"),
-        (("list", "--data-dir", "/dev/null"), "/dev/null"),
+        (("--scope", "read,write"), "unknown scopes read,write"),
+        (("--scope", ""), "unknown scopes"),
+        (("--revoke", "nothing"), "there is no key 'nothing': list them with 'islands admin keys'"),
+        (("--data-dir", "/dev/null"), "/dev/null"),
     ],
 )
 def test_error_is_one_line(run: Run, service: Service, arguments: tuple[str, ...], message: str) -> None:
@@ -116,7 +116,7 @@ def test_error_is_one_line(run: Run, service: Service, arguments: tuple[str, ...
 @pytest.mark.parametrize(("option", "most"), [("--name", 200), ("--owner", 64)])
 def test_too_long_name_or_owner_is_rejected(run: Run, option: str, most: int) -> None:
     create_key(run, *ALL, option, "ü" * most)
-    code, out, err = run("create", *ALL, option, "ü" * (most + 1))
+    code, out, err = run(*ALL, option, "ü" * (most + 1))
     assert (code, out) == (2, "")
     message = (
         f"the {option[2:]} of a key has at most {most} characters, this one has {most + 1}: take a shorter"
