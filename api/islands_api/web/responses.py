@@ -9,16 +9,17 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
+from islands_api.schemas import ResponseModel
 from islands_service.domain.job import TERMINAL, WAITING_PHASE, Job, JobState, find_seconds_left
-from islands_service.domain.monitoring import Monitor
 from islands_service.domain.owner import Owner
-from islands_service.domain.webhook import Delivery, Webhook
 from islands_service.store.datasets import StoredDataset
 from islands_service.store.fair_queue import QueuePlace
-from islands_service.store.keys import Key
 
 #: Parts of the progress that are valid only while a job runs.
 _OF_ATTEMPTS = ("phase", "note", "seconds_left", "evaluations_per_second", "free_run")
+
+#: Types of the fields of views that are seconds since 1970 in the values.
+_TIMES = (datetime, datetime | None)
 
 #: Seconds for which the place of a queued job is kept.
 _PLACE_SECONDS = 1.0
@@ -143,34 +144,12 @@ def dataset_summary(dataset: StoredDataset, retention: int = 0) -> dict[str, Any
     return {**document, **summary}
 
 
-def monitor_summary(monitor: Monitor) -> dict[str, Any]:
-    """Convert a monitor to a document with the fields of `islands_api.monitor_schemas.MonitorSummary`."""
-    return {
-        "id": monitor.id,
-        "name": monitor.name,
-        "status": monitor.status,
-        "records": monitor.records,
-        "alarms": monitor.alarms,
-        "pending": monitor.pending,
-        "priority": monitor.priority,
-        "created": _format_time(monitor.created),
-        "updated": _format_time(monitor.updated),
-        "last_alarm": monitor.last_alarm,
-    }
-
-
-def key_document(key: Key) -> dict[str, Any]:
-    """Convert a key to a document with the fields of `islands_api.admin_schemas.KeyView`."""
-    return {
-        "id": key.id,
-        "owner": key.owner,
-        "name": key.name,
-        "scopes": sorted(key.scopes),
-        "created": _format_time(key.created),
-        "expires": _format_time(key.expires),
-        "revoked": _format_time(key.revoked),
-        "valid": key.valid,
-    }
+def view_document(value: object, view: type[ResponseModel]) -> dict[str, Any]:
+    """Convert a value to a document with the fields of a view, which are attributes of the value."""
+    given = {name: getattr(value, name) for name in view.model_fields}
+    times = (name for name, field in view.model_fields.items() if field.annotation in _TIMES)
+    sets = {name: sorted(each) for name, each in given.items() if isinstance(each, frozenset)}
+    return {**given, **sets, **{name: _format_time(given[name]) for name in times}}
 
 
 def owner_document(owner: Owner) -> dict[str, Any]:
@@ -183,32 +162,6 @@ def owner_document(owner: Owner) -> dict[str, Any]:
         "running": owner.running,
         "running_islands": owner.running_islands,
         "stored": owner.stored,
-    }
-
-
-def webhook_document(webhook: Webhook) -> dict[str, Any]:
-    """Convert a webhook to a document with the fields of `islands_api.webhook_schemas.WebhookView`."""
-    return {
-        "id": webhook.id,
-        "url": webhook.url,
-        "events": webhook.events,
-        "created": _format_time(webhook.created),
-    }
-
-
-def delivery_document(delivery: Delivery) -> dict[str, Any]:
-    """Convert a delivery to a document with the fields of `islands_api.webhook_schemas.DeliveryView`."""
-    return {
-        "id": delivery.id,
-        "event": delivery.event,
-        "job": delivery.job,
-        "state": delivery.state,
-        "attempts": delivery.attempts,
-        "created": _format_time(delivery.created),
-        "attempted": _format_time(delivery.attempted),
-        "next_attempt": _format_time(delivery.next_attempt),
-        "status": delivery.status,
-        "error": delivery.error,
     }
 
 

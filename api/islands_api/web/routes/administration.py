@@ -19,7 +19,7 @@ from islands_api.web.dependencies import AppStateDep
 from islands_api.web.job_submission import describe_job, describe_jobs
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
-from islands_api.web.responses import JSONDocument, key_document, owner_document
+from islands_api.web.responses import JSONDocument, owner_document, view_document
 from islands_api.web.routes.jobs import Id, StateFilter
 
 router = APIRouter(prefix="/v1/admin", tags=["administration"], responses=RESPONSES, route_class=JSONRoute)
@@ -49,14 +49,14 @@ async def create(request: KeyRequest, caller: Administrator, state: AppStateDep)
         None if request.days is None else request.days * _DAY_SECONDS,
         caller.requester,
     )
-    return JSONDocument({**key_document(key), "secret": secret}, 201, {"Cache-Control": "no-store"})
+    return JSONDocument({**view_document(key, KeyView), "secret": secret}, 201, {"Cache-Control": "no-store"})
 
 
 @router.get("/keys", response_model=KeyPage)
 async def keys(_caller: Administrator, state: AppStateDep) -> Any:
     """List all keys, oldest first, without their secrets."""
     found = await state.run_blocking(state.store.keys.all)
-    return JSONDocument({"items": [key_document(key) for key in found]})
+    return JSONDocument({"items": [view_document(key, KeyView) for key in found]})
 
 
 @router.post("/keys/{key}/revoke", response_model=KeyView)
@@ -70,7 +70,7 @@ async def revoke(
 ) -> Any:
     """Revoke a key. The service refuses it after at most a second."""
     return JSONDocument(
-        key_document(await state.run_blocking(state.store.keys.revoke, key, caller.requester))
+        view_document(await state.run_blocking(state.store.keys.revoke, key, caller.requester), KeyView)
     )
 
 

@@ -12,6 +12,7 @@ from islands_api.monitor_schemas import (
     MonitorRecordPage,
     MonitorRecordRequest,
     MonitorRequest,
+    MonitorSummary,
     MonitorView,
 )
 from islands_api.result_schemas import SavedMonitorState
@@ -36,7 +37,7 @@ from islands_api.web.requests import (
     encode_cursor,
     matches_etag,
 )
-from islands_api.web.responses import JSONDocument, json_text, monitor_summary
+from islands_api.web.responses import JSONDocument, json_text, view_document
 from islands_service.domain.job import DISCREPANCY, EXTENDED, MONITORING, Submission
 from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.domain.monitor_spec import MonitorSpec, parse_monitor
@@ -101,7 +102,9 @@ async def monitors(caller: Reader, state: AppStateDep, cursor: Cursor = None, li
     page, after = await state.run_blocking(
         state.store.monitors.page, caller.owner, decode_cursor(cursor), limit
     )
-    return JSONDocument({"items": [monitor_summary(each) for each in page], "next": encode_cursor(after)})
+    return JSONDocument(
+        {"items": [view_document(each, MonitorSummary) for each in page], "next": encode_cursor(after)}
+    )
 
 
 @router.get("/{monitor}", response_model=MonitorView, responses=_CONDITIONAL)
@@ -231,5 +234,5 @@ def _make_etag(monitor: Monitor) -> str:
 
 def _render(monitor: Monitor, document: str | None) -> bytes:
     """Return a monitor as JSON; its document is not parsed."""
-    head = json_text({**monitor_summary(monitor), "spec": monitor.spec})
+    head = json_text({**view_document(monitor, MonitorSummary), "spec": monitor.spec})
     return f'{head[:-1]},"result":{document or "null"}}}'.encode()

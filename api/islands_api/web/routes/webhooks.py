@@ -8,8 +8,15 @@ from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
-from islands_api.web.responses import JSONDocument, delivery_document, webhook_document
-from islands_api.webhook_schemas import CreatedWebhook, DeliveryPage, WebhookPage, WebhookRequest
+from islands_api.web.responses import JSONDocument, view_document
+from islands_api.webhook_schemas import (
+    CreatedWebhook,
+    DeliveryPage,
+    DeliveryView,
+    WebhookPage,
+    WebhookRequest,
+    WebhookView,
+)
 from islands_service.outbound import OutboundFailedError, OutboundRefusedError
 
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES, route_class=JSONRoute)
@@ -42,14 +49,16 @@ async def create(request: WebhookRequest, caller: Writer, state: AppStateDep) ->
         state.settings.max_webhooks,
         caller.requester,
     )
-    return JSONDocument({**webhook_document(webhook), "secret": secret}, 201, {"Cache-Control": "no-store"})
+    return JSONDocument(
+        {**view_document(webhook, WebhookView), "secret": secret}, 201, {"Cache-Control": "no-store"}
+    )
 
 
 @router.get("", response_model=WebhookPage)
 async def webhooks(caller: Reader, state: AppStateDep) -> Any:
     """List your webhooks, oldest first, without their secrets."""
     found = await state.run_blocking(state.store.webhooks.all, caller.owner)
-    return JSONDocument({"items": [webhook_document(webhook) for webhook in found]})
+    return JSONDocument({"items": [view_document(webhook, WebhookView) for webhook in found]})
 
 
 @router.delete("/{webhook}", status_code=204)
@@ -63,4 +72,4 @@ async def delete(webhook: Id, caller: Writer, state: AppStateDep) -> Response:
 async def deliveries(webhook: Id, caller: Reader, state: AppStateDep) -> Any:
     """Return the last 100 deliveries of a webhook, newest first. They are kept for a week."""
     found = await state.run_blocking(state.store.webhooks.deliveries, caller.owner, webhook)
-    return JSONDocument({"items": [delivery_document(delivery) for delivery in found]})
+    return JSONDocument({"items": [view_document(delivery, DeliveryView) for delivery in found]})
