@@ -14,9 +14,9 @@ from islands.models.regressor import Regressor, regressor
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
+from islands.simulators.external import RecordedOutput
+from islands.simulators.identified import NarxSimulator
 from islands.simulators.interface import Simulator
-from islands.simulators.narx import NarxSimulator
-from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.factory import make_simulator
 from lab.diagnosis.injection.measurement import VISIBLE_FRACTION, FaultyRecord
 from lab.diagnosis.injection.oscillator import OSCILLATOR

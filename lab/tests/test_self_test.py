@@ -13,7 +13,7 @@ from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Candidate, Diagnosis
 from islands.effects.interface.effect import Effect, Signal, SimulationContext
 from islands.records.noise_model import fit_noise
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from lab.diagnosis.injection.measurement import inject
 from lab.diagnosis.self_test import (
     UNKNOWN,

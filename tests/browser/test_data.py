@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from islands.evolution.settings import FITNESSES
 
-from islands.evolution.settings import MOST_ISLANDS
+from islands.evolution.settings import FITNESSES, MOST_ISLANDS
 from support.canvas import DRAWN
 from support.command_line import write_hysteresis
 from support.processes import eventually

@@ -16,8 +16,8 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect, Signal
 from islands.records.dataset import Dataset
 from islands.records.noise_model import NoiseModel
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.interface import Simulator
-from islands.simulators.python_function import PythonFunctionSimulator
 
 DT = 0.01
 

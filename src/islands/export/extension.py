@@ -7,9 +7,9 @@ from types import MappingProxyType
 from islands.effects.catalogue import get_summary
 from islands.export import export
 from islands.export.closed_form import closed_form, find_closed_form
-from islands.export.equations.c_program import c_equations
+from islands.export.equations.c import c_equations
 from islands.export.equations.collection import collect_equations
-from islands.export.equations.matlab_program import matlab_equations
+from islands.export.equations.matlab import matlab_equations
 from islands.simulators.ode.system_document import SYMBOL_MEANINGS
 from islands.simulators.specification.base import ValueSpec
 from islands.simulators.specification.equations import OdeParameterSpec, OdeSpec

@@ -23,8 +23,8 @@ from islands.records.reading.data_frames import as_record
 from islands.records.reading.options import DEFAULT_READING, take_reading
 from islands.records.split import hold_out
 from islands.settings_schema import document_settings
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.interface import Simulator
-from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.base import SpecModel
 from islands.simulators.specification.factory import make_model_simulator, make_simulator
 from islands.simulators.specification.table import (

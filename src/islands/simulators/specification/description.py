@@ -7,16 +7,14 @@ from islands.effects.interface.context import ForceCoordinate, Parameter, Signal
 from islands.effects.interface.effect import Effect
 from islands.persistence.models import model_json
 from islands.simulators.extended import SavedExtension
+from islands.simulators.external import PythonFunctionSimulator, RecordedOutput
 from islands.simulators.fmu.simulator import FmuSimulator
+from islands.simulators.identified import NarxSimulator, ParametricSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.narx import NarxSimulator
 from islands.simulators.ode.simulator import OdeSimulator
 from islands.simulators.output_equation import OutputEquation
-from islands.simulators.parametric import ParametricSimulator
-from islands.simulators.python_function import PythonFunctionSimulator
-from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.equations import OdeSpec, OutputEquationSpec

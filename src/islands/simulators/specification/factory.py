@@ -33,18 +33,16 @@ from islands.records.preprocessing_steps import NO_STEPS, PreprocessingSteps
 from islands.records.segments import fill_gaps
 from islands.records.split import estimation_part
 from islands.simulators.extended import SavedExtension
+from islands.simulators.external import PythonFunctionSimulator, RecordedOutput
 from islands.simulators.fmu.instance import LOCAL_FMUS, FmuSource
 from islands.simulators.fmu.simulator import make_fmu_simulator
+from islands.simulators.identified import NarxSimulator, ParametricSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.linear import LinearSimulator, estimate_linear
-from islands.simulators.narx import NarxSimulator
 from islands.simulators.ode.simulator import make_ode_simulator
 from islands.simulators.ode.system_document import SIMULATED
 from islands.simulators.output_equation import OutputEquation
-from islands.simulators.parametric import ParametricSimulator
-from islands.simulators.python_function import PythonFunctionSimulator
-from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.base import ParameterRange, SimulatorEntry, SpecModel
 from islands.simulators.specification.code import FmuSpec, ProgramSpec
 from islands.simulators.specification.description import read_scales

@@ -24,7 +24,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from support.simulated_records import recorded, wave
 
 pytestmark = pytest.mark.ci

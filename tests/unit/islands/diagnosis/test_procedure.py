@@ -16,8 +16,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document
-from islands.simulators.python_function import PythonFunctionSimulator
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import PythonFunctionSimulator, RecordedOutput
 from lab.diagnosis.injection.measurement import inject
 from lab.diagnosis.trial import TOLERANCE, Trial, run_trial
 from support.built_in_simulators import make_piezo

@@ -8,10 +8,10 @@ import pytest
 from islands.effects.interface.effect import Signal
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.interface import SimulationRun
 from islands.simulators.ode.system import OUTPUT, OdeParameter
 from islands.simulators.output_equation import OutputEquation, add_output_equation
-from islands.simulators.python_function import PythonFunctionSimulator
 
 DT = 0.1
 

@@ -15,7 +15,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.parallel import ParallelMap
 from islands.records.dataset import Dataset
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from support.simulated_records import recorded, wave
 
 U = wave(400)

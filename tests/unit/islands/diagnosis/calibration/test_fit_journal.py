@@ -19,7 +19,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
 from islands.records.noise_model import NoiseModel
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from support.simulated_records import recorded, wave
 
 Tasks = list[CalibrationTask]

@@ -9,7 +9,7 @@ from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.external import PythonFunctionSimulator
 
 NOISE = 0.05
 

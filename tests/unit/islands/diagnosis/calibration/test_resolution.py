@@ -11,7 +11,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 
 
 def excite(seed: int, samples: int = 1500) -> np.ndarray:

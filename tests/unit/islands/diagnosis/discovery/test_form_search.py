@@ -15,7 +15,7 @@ from islands.kernels.curve import PLACES
 from islands.report.documents.extension_json import extended_document
 from islands.report.figures.form_values import draw_free_forms
 from islands.simulators.extended import ExtendedSimulator
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from lab.diagnosis.trial import Trial, run_trial
 from support.simulated_records import recorded, wave
 

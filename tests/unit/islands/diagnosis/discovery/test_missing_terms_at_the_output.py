@@ -13,8 +13,8 @@ from islands.diagnosis.result import Diagnosis
 from islands.effects.interface.effect import Signal
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json
+from islands.simulators.external import RecordedOutput
 from islands.simulators.interface import Simulator
-from islands.simulators.recorded_output import RecordedOutput
 from islands.simulators.specification.table import LocalExtendedSpec
 
 DT = 0.01

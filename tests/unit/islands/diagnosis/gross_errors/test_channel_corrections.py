@@ -11,7 +11,7 @@ from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.records.dataset import Dataset
-from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from support.simulated_records import wave

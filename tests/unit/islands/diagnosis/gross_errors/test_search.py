@@ -11,7 +11,7 @@ from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec

@@ -24,7 +24,7 @@ from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 
 SAMPLES = 800
 

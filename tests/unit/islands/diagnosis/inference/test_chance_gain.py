@@ -15,7 +15,7 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.records.noise_model import estimate_effective_samples
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from lab.diagnosis.injection.noise import NOISES
 from support.simulated_records import recorded, wave
 

@@ -12,9 +12,9 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.kernels.memory_operators import play_from, slider
 from islands.simulators.extended import ExtendedSimulator, make_context
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.python_function import PythonFunctionSimulator
 from support.simulated_records import recorded
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from islands.diagnosis.inference.hypothesis import Hypothesis
 from islands.effects.catalogue import CATALOGUE
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 
 SAMPLES = 800
 

@@ -14,7 +14,7 @@ from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.external import PythonFunctionSimulator
 from support.simulated_records import DT, recorded, wave
 
 EFFECTS = [CATALOGUE[name] for name in ("offset", "linear-drift", "jump", "delay", "even-nonlinearity")]

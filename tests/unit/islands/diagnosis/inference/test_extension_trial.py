@@ -25,9 +25,9 @@ from islands.effects.interface.context import Parameter
 from islands.effects.interface.effect import Effect, Site
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator
-from islands.simulators.python_function import PythonFunctionSimulator
 from islands.simulators.specification.factory import make_simulator
 from lab.diagnosis.injection.unusual.table import UNUSUAL_CAUSES
 from lab.diagnosis.unusual_trial import draw_record

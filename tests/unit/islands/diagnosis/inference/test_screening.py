@@ -16,8 +16,8 @@ from islands.parallel import ParallelMap
 from islands.progress import ignore_progress
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.linear import LinearSimulator
-from islands.simulators.python_function import PythonFunctionSimulator
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded, wave
 

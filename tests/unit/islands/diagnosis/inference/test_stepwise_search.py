@@ -24,9 +24,8 @@ from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.effect import Effect
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
+from islands.simulators.external import PythonFunctionSimulator, RecordedOutput
 from islands.simulators.interface import Simulator
-from islands.simulators.python_function import PythonFunctionSimulator
-from islands.simulators.recorded_output import RecordedOutput
 from lab.diagnosis.trial import Trial, run_trial
 from support.built_in_simulators import make_piezo
 from support.simulated_records import DT, made, recorded, wave

@@ -18,7 +18,7 @@ from islands.records.split import hold_out
 from islands.report.documents.diagnosis_json import diagnosis_document
 from islands.report.text.diagnosis_statements import describe_details
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.python_function import PythonFunctionSimulator
+from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.specification.factory import make_simulator
 
 DT, SAMPLES, NOISE = 0.1, 600, 0.02

@@ -15,7 +15,7 @@ from islands.report.documents.diagnosis_json import as_json
 from islands.report.documents.plan_json import plan_document
 from islands.report.figures.separability import draw_separability
 from islands.report.text.plan import plan_text
-from islands.simulators.recorded_output import RecordedOutput
+from islands.simulators.external import RecordedOutput
 from support.planned import DT, amplifier, input_record, take_effects, wave
 
 EFFECTS = tuple(take_effects("delay", "sensor-lag", "offset", "sensor-gain"))

@@ -18,8 +18,8 @@ from islands.report.documents.experiment_json import (
     write_advice,
 )
 from islands.simulators.extended import ExtendedSimulator, make_context
+from islands.simulators.external import RecordedOutput
 from islands.simulators.interface import Simulator
-from islands.simulators.recorded_output import RecordedOutput
 from support.planned import DT, amplifier, input_record, take_effects, wave
 
 #: A delay in seconds, and the standard deviation of the noise.

@@ -13,7 +13,7 @@ from islands.models.narx import Model, make_model
 from islands.persistence.models import model_from_json
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.narx import NarxSimulator
+from islands.simulators.identified import NarxSimulator
 from lab.diagnosis.cases import CASES
 from lab.diagnosis.injection.measurement import FaultyRecord, inject
 
@@ -100,3 +100,10 @@ def test_small_models_have_missing_terms_only_if_they_read_the_input() -> None:
     assert effect.family == "shape"
     output_alone = NarxSimulator(model(a="0.5 * y(k-1)", b="0.1 * y(k-2)"), "output alone", start)
     assert output_alone.state_effects == ()
+
+
+def test_a_state_space_at_rest_follows_its_input_from_the_first_sample() -> None:
+    record = latent_systems.spring_record(100, start=(0.0, 0.0))
+    simulator = make_model_simulator(latent_systems.make_model(memory=45), "spring", record)
+    alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
+    np.testing.assert_allclose(alone.simulate(alone.nominal), record.y, rtol=1e-12)
