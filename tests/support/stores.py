@@ -162,10 +162,9 @@ def at_once(actions: list[Callable[[], Any]]) -> list[Any]:
 #: writer thread: another thread might handle a signal to the process, and the writer might commit before.
 _STOPPED_WRITER = """
 import signal, sys, threading
-from islands_service.store import Store
-from islands_service.store.backends import connections
+from islands_service.store import Store, dialect
 from islands_service.store.job_rows import update_job
-connections.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
+dialect.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", -1.0)
 def update_and_stop(connection):

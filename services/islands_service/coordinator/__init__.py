@@ -1,1 +1,1 @@
-"""Coordinator process: leases jobs and runs them on Ray. Read `coordinator` first."""
+"""Coordinator process: leases jobs and runs them on Ray. Read `main_loop` first."""

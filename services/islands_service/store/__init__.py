@@ -1,4 +1,4 @@
-"""SQL store of jobs, data sets and keys, in SQLite or PostgreSQL, and blobs. Read `store` first."""
+"""SQL store of jobs, data sets and keys, in SQLite or PostgreSQL, and blobs. Read `operations` first."""
 
 from islands_service.store.operations import Store
 

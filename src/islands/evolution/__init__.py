@@ -1,4 +1,4 @@
 """Multi-gene genetic programming with forward orthogonal regression (MGGP/FROE) on islands.
 
-Read `island` first, then `engine` and `search_state`.
+Read `archipelago` first, then `engine` and `search_state`.
 """
