@@ -1,4 +1,4 @@
-"""Missing terms of an identified model: names, response, and the model that contains them."""
+"""Identified models in free run, and the missing terms of one: names, response, and the model with them."""
 
 import json
 
@@ -14,8 +14,10 @@ from islands.persistence.models import model_from_json
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.identified import NarxSimulator
+from islands.simulators.specification.factory import make_model_simulator
 from lab.diagnosis.cases import CASES
 from lab.diagnosis.injection.measurement import FaultyRecord, inject
+from support import latent_systems
 
 
 @pytest.fixture(scope="module")
