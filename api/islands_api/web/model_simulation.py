@@ -21,7 +21,7 @@ from islands.models.operating_point import find_equilibrium
 from islands.models.protocol import DynamicModel
 from islands.persistence.models import any_model_from_json
 from islands.records.dataset import Dataset
-from islands.records.split import compare_input_ranges, measure_input_ranges
+from islands.records.split import compare_input_ranges
 from islands.systems import signals
 from islands_api.simulation_schemas import (
     MAX_SAMPLES,
@@ -245,7 +245,7 @@ def _find_rest(model: Model, inputs: tuple[float, ...]) -> tuple[float | None, s
     """Return the stable equilibrium at constant inputs, None if there is no unique one, and the reason."""
     try:
         with np.errstate(all="ignore"):
-            return find_equilibrium(model, inputs), ""
+            return find_equilibrium(model, inputs)[0], ""
     except ModelError as error:
         return None, str(error).partition(":")[0]
 
@@ -277,13 +277,13 @@ def simulate_inputs(
         Warnings about the inputs.
     """
     # Numba takes a second to import, and the API starts without it.
-    from islands.simulation.input_response import input_response, make_resting_record  # noqa: PLC0415
+    from islands.simulation.input_response import input_response  # noqa: PLC0415
 
     model, names = found.model, found.model.column_names
     response = input_response(model, u, initial, found.output_range)
     stated = list(warnings)
     if found.ranges:
-        measured = measure_input_ranges(make_resting_record(model, u, initial))
+        measured = list(zip(u.min(axis=0).tolist(), u.max(axis=0).tolist(), strict=True))
         units = found.units[:-1]
         stated += compare_input_ranges(names, units, found.ranges, measured, title="this response")
     if not response.outcome:
