@@ -115,7 +115,7 @@ def _write_matlab(system: StateSpace, form: str) -> str:
         cells = "; ".join(", ".join(_vector(each) for each in row) for row in numerators)
         made = [f"num = {{{cells}}};", f"den = {_vector(denominator)};"]
         call = f"sys = tf(num, repmat({{den}}, size(num)), {time});"
-    delays = system.delays / (1.0 if system.is_continuous else system.step)
+    delays = system.delays if system.is_continuous else np.rint(system.delays / system.step)
     return "\n".join(
         [
             *names,

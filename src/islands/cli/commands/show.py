@@ -71,7 +71,7 @@ def show(
     design of controllers: state-space, transfer-function.
     """
     if kind in FORMS or (figure in LINEAR_FIGURES and record is None):
-        _show_linear(model, kind, figure, out, options.columns(at or []))
+        _show_linear(model, kind, figure, out, options.values(at or [], "--at"))
         return
     if at:
         raise SettingsError(f"--at is for the formats {', '.join(FORMS)} and for figures of linear systems")
@@ -100,12 +100,13 @@ def _print(text: str | None) -> None:
         typer.echo(text.rstrip("\n"))
 
 
-def _show_linear(name: str, form: str | None, figure: str | None, out: Path | None, at: list[str]) -> None:
+def _show_linear(
+    name: str, form: str | None, figure: str | None, out: Path | None, values: dict[str, float]
+) -> None:
     """Write the linear system of a model, or draw it."""
     loaded = islands.load(name)
     if not isinstance(loaded, islands.Result | islands.FittedModel | islands.FittedCoupledModel):
         raise SettingsError(f"a linear system is that of a model, and {name} is none")
-    values = dict(map(_parse_value, at))
     model = loaded.best.model if isinstance(loaded, islands.Result) else loaded.model
     outputs = model.output_names if isinstance(model, CoupledModel) else (model.output_name,)
     y = [values.pop(each) for each in outputs] if set(outputs) <= set(values) else None
@@ -120,15 +121,6 @@ def _show_linear(name: str, form: str | None, figure: str | None, out: Path | No
     _print(text if out is None else None)
     if out is not None:
         out.write_text(f"{text}\n", encoding="utf-8")
-
-
-def _parse_value(text: str) -> tuple[str, float]:
-    """Read ``INPUT=VALUE``."""
-    name, _, value = text.rpartition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise SettingsError(f"--at {text}: write INPUT=VALUE, for example u_V=0.5") from None
 
 
 def _draw(

@@ -133,7 +133,7 @@ def record_of_model(
     """
     if isinstance(data, Dataset):
         return as_record(data, y, dt, inputs=inputs, output=output)
-    if isinstance(data, list | tuple) and y is None:
+    if isinstance(data, list | tuple) and y is None and not np.isscalar(data[0]):
         return join(tuple(record_of_model(model, each, None, dt, inputs, output) for each in data))
     if y is None:
         inputs, output = inputs or _name_columns(model), output or model.output_name
