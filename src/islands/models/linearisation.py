@@ -38,6 +38,9 @@ from islands.rounding import ROUNDING
 #: Magnitudes of outputs between which equilibria are searched if they are not the roots of a polynomial.
 _MAGNITUDES = np.concatenate([[0.0], np.logspace(-9, 9, 1081)])
 
+#: Points of the search within the range of the output.
+_POINTS = 101
+
 #: Number of bisections of an interval with a change of sign: all bits of a float.
 _BISECTIONS = 80
 
@@ -210,7 +213,7 @@ def find_rest(block: Block, u: Sequence[float], within: tuple[float, float] = (-
     The equilibria of one equation are the roots of a polynomial, if it is one in the output; otherwise those
     between 1e-9 and 1e9 in magnitude. That of several equations is the one that Newton's method finds from
     the values at which a program of the block starts. Of several stable ones of one equation, the only one
-    ``within`` a range of the output is taken.
+    ``within`` a range of the output is taken, which is searched first.
 
     Raises
     ------
@@ -223,7 +226,7 @@ def find_rest(block: Block, u: Sequence[float], within: tuple[float, float] = (-
     )
     if block.computed > 1:
         return _find_joint_rest(block, u, where)
-    roots = _find_roots(block, u, where)
+    roots = _find_roots(block, u, where, within)
     stable = []
     for root in roots:
         slopes = _differentiate(block, [root, *u])
@@ -235,8 +238,10 @@ def find_rest(block: Block, u: Sequence[float], within: tuple[float, float] = (-
         ):
             stable.append(root)
     inside = [root for root in stable if within[0] <= root <= within[1]]
-    if len(inside or stable) == 1:
-        return inside or stable
+    if len(inside) == 1:
+        return inside
+    if within != (-inf, inf):
+        return find_rest(block, u)
     if stable:
         listed = ", ".join(f"{root:g}" for root in stable)
         raise ModelError(f"the model has several stable equilibria at {where}: {listed}; give the output y")
@@ -322,7 +327,7 @@ def _number_leaves(expression: Expression, leaves: Sequence[Lagged]) -> Expressi
     return expression
 
 
-def _find_roots(block: Block, u: Sequence[float], where: str) -> list[float]:
+def _find_roots(block: Block, u: Sequence[float], where: str, within: tuple[float, float]) -> list[float]:
     """Return the outputs at which a block of one equation rests."""
     pairs = [
         (block.parameters[term.weight] if term.weight else 1.0, _insert_parameters(block, term.expression))
@@ -330,7 +335,7 @@ def _find_roots(block: Block, u: Sequence[float], where: str) -> list[float]:
     ]
     polynomials = [_to_polynomial(expression, u) for _, expression in pairs]
     if any(each is None for each in polynomials):
-        return _search_roots(pairs, u)
+        return _search_roots(pairs, u, within)
     excess, size = Polynomial([0.0, -1.0]), Polynomial([0.0, 1.0])
     for (parameter, _), each in zip(pairs, polynomials, strict=True):
         assert each is not None
@@ -392,14 +397,17 @@ _ARITHMETIC: Mapping[str, Callable[[Polynomial, Polynomial], Polynomial]] = {
 }
 
 
-def _search_roots(pairs: Sequence[tuple[float, Expression]], u: Sequence[float]) -> list[float]:
+def _search_roots(
+    pairs: Sequence[tuple[float, Expression]], u: Sequence[float], within: tuple[float, float]
+) -> list[float]:
     """Return the roots with a change of sign, by bisection, and the zeros of the grid."""
 
     def excess(y: float) -> float:
         levels = (y, *u)
         return sum(p * value(each, lambda channel, _: levels[channel]) for p, each in pairs) - y
 
-    grid = np.concatenate([-_MAGNITUDES[:0:-1], _MAGNITUDES])
+    whole = np.concatenate([-_MAGNITUDES[:0:-1], _MAGNITUDES])
+    grid = whole if within == (-inf, inf) else np.linspace(*within, _POINTS)
     values = np.array([excess(float(y)) for y in grid])
     roots = [float(y) for y, at in zip(grid, values, strict=True) if at == 0.0]
     for place in np.flatnonzero(values[:-1] * values[1:] < 0.0):

@@ -529,9 +529,8 @@ class StateSpace:
         return ", ".join(f"{name} = {value:.4g}" for name, value in pairs) or "its operating point"
 
     def describe(self) -> tuple[str, ...]:
-        """State time constants and resonances, slowest first, dead times, and static gains."""
-        if not self.dt:
-            return ()
+        """State time constants and resonances of a discrete system, dead times and static gains."""
+        modes = describe_poles(self.poles, self.dt) if self.dt else ()
         late = [
             f"dead time of {name} {delay:.4g} s"
             for name, delay in zip(self.input_names, self.dead_times, strict=False)
@@ -543,7 +542,7 @@ class StateSpace:
             for name, gain in zip(self.input_names, row, strict=True)
             if np.isfinite(gain)
         ]
-        return (*describe_poles(self.poles, self.dt), *late, *gains)
+        return (*modes, *late, *gains)
 
     @property
     def quantities(self) -> "tuple[Quantity, ...]":

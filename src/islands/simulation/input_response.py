@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import SettingsError
 from islands.models.coupled_narx import AnyModel, CoupledModel
-from islands.models.protocol import DynamicModel
+from islands.models.protocol import DynamicModel, no_model_error
 from islands.records.compatibility import ColumnReference, match_record
 from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.dataset import Dataset
@@ -190,6 +190,8 @@ def step_response(
     SettingsError
         There is not one value for each input, no input changes, or there is less than one sample.
     """
+    if not isinstance(model, DynamicModel):
+        raise no_model_error(model)
     levels = [np.atleast_1d(np.asarray(each, dtype=np.float64)) for each in (start, end)]
     for level in levels:
         if level.shape != (model.inputs,):

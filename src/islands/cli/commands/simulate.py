@@ -15,7 +15,7 @@ from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.settings_options import NONE, Given, with_settings
-from islands.errors import ExtrapolationWarning, SettingsError
+from islands.errors import ExtrapolationWarning, ModelError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import Loaded, load
 from islands.facade.results.fitted_model import FittedModel
@@ -228,7 +228,11 @@ def _simulate_model(
     if y or states or not np.isfinite(data.y).any():
         if request.bands is not None:
             raise SettingsError("--bands need the measured output of the first samples: add it to the record")
-        simulation = found.simulate(data, mode, y=y[0] if y else None, states=states)
+        try:
+            simulation = found.simulate(data, mode, y=y[0] if y else None, states=states)
+        except ModelError as error:
+            advice = "" if y or states else f", as --start {model.output_name}=VALUE"
+            raise ModelError(f"{error}{advice}") from error
         line = f"{mode} {_describe_start(request)}: {simulation.outcome}"
         _print_metrics(data, simulation.y, line, request.out, None, bool(simulation.outcome))
         return

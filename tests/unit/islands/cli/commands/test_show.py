@@ -38,3 +38,16 @@ def test_options_of_a_figure_without_the_others_are_refused(model, command_line,
     code, _, error = command_line("show", "model.json", *options)
     assert code == 2
     assert message in error
+
+
+def test_a_linear_system_is_written_and_drawn_without_a_record(model, command_line, tmp_path):
+    code, out, _ = command_line("show", "model.json", "--format", "transfer-function", "--at", "u=2")
+    assert (code, "about u = 2" in out, "static gain of u 1" in out) == (0, True, True)
+    assert command_line("show", "model.json", "--format", "state-space", "--out", "m.m")[0] == 0
+    assert "sys = ss(A, B, C, D, -1);" in (tmp_path / "m.m").read_text()
+    with undrawn_figures():
+        assert command_line("show", "model.json", "--figure", "nyquist", "--out", "n.svg") == (0, "", "")
+    code, _, error = command_line("show", "model.json", "--at", "u=2")
+    assert (code, "--at is for the formats state-space, transfer-function" in error) == (2, True)
+    code, _, error = command_line("show", "model.json", "--format", "state-space", "--at", "u")
+    assert (code, "--at u: write NAME=VALUE" in error) == (2, True)
