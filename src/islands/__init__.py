@@ -55,7 +55,7 @@ _PUBLIC = {
     "models.narx": ("Model", "make_model"),
     "models.operating_point": ("static_characteristic",),
     "models.sympy_expression": ("to_sympy",),
-    "simulation.step_response": ("step_response",),
+    "simulation.input_response": ("step_response",),
     "simulators.interface": ("Simulator",),
     "models.coupled_narx": ("CoupledModel",),
 }

@@ -82,7 +82,7 @@ USES = {
         lambda _: make_engine("postgresql+psycopg://user@127.0.0.1/name"),
         ("islands_service.store.timed_connection",),
     ),
-    "control": Use("control", "control", lambda _: islands.linearise(model(), [0.0])),
+    "control": Use("control", "control", lambda _: islands.linearise(model(), [0.0]).to_control()),
     "excel": Use("openpyxl", "openpyxl", read("a.xlsx")),
     "fmi": Use("fmpy", "fmpy", lambda _: import_fmpy()),
     "mdf": Use("asammdf", "asammdf.blocks.utils", read("a.mf4")),

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+import pytest
 
 from islands.expressions.evaluation import value
 from islands.expressions.primitives import PRIMITIVES
@@ -111,6 +112,12 @@ OF_BLOCKS = {
         tuple(with_offsets(each, 3.7, (20.0,)) for each in make_coupled_latent_model().models)
     ),
 }
+
+
+def mark_slow(names):
+    """Return names of `OF_BLOCKS`; equilibria that are searched, and new machine code, take a second."""
+    slow = ("many parts", "deviations", "own primitive")
+    return [pytest.param(name, marks=pytest.mark.ci) if name in slow else name for name in names]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import gzip
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,11 @@ from pydantic_core import to_json
 
 from islands.errors import ModelError, SettingsError, suggest
 from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model
 from islands.models.operating_point import find_equilibrium
 from islands.models.protocol import DynamicModel
 from islands.persistence.models import any_model_from_json
 from islands.records.dataset import Dataset
-from islands.records.split import compare_input_ranges, measure_input_ranges
+from islands.records.split import compare_input_ranges
 from islands.systems import signals
 from islands_api.simulation_schemas import (
     MAX_SAMPLES,
@@ -205,9 +204,25 @@ def _check_frequency(found: SimulatedModel, name: str, frequency: float) -> None
         )
 
 
-def find_start(
-    found: SimulatedModel, inputs: Sequence[float], given: float | None
-) -> tuple[float | None, str]:
+class Start(NamedTuple):
+    """Start of a response.
+
+    Attributes
+    ----------
+    output : float or None
+        Output before the first sample; None if the first measured one is taken, since there is no other.
+    is_rest : bool
+        Whether the model rests there, with all of its states.
+    reason : str
+        Reason of the value, the end of a sentence.
+    """
+
+    output: float | None
+    is_rest: bool
+    reason: str
+
+
+def find_start(found: SimulatedModel, inputs: Sequence[float], given: float | None) -> Start:
     """Return the output before the first sample, and where it is from.
 
     Parameters
@@ -217,35 +232,29 @@ def find_start(
         First values of the inputs.
     given : float or None
         Output of the request.
-
-    Returns
-    -------
-    float or None
-        None if the model has no unique equilibrium: the first measured output is taken.
-    str
-        Reason of the value, the end of a sentence.
     """
     if given is not None:
-        return given, "as given"
-    model = found.model
-    no_equation = f"equilibria of the class {model.kind} are not known"
-    rest, reason = _find_rest(model, tuple(inputs)) if isinstance(model, Model) else (None, no_equation)
+        return Start(given, False, "as given")
+    model: Any = found.model  # each class is a frozen data class, with a hash
+    rest, reason = _find_rest(model, tuple(inputs))
     if rest is not None:
-        return rest, "where the model rests at the first values of the inputs"
-    return None, (
+        return Start(rest, True, "where the model rests at the first values of the inputs")
+    return Start(
+        None,
+        False,
         "the first measured value of the record, since the model has no unique equilibrium at the "
-        f"first values of the inputs: {reason}"
+        f"first values of the inputs: {reason}",
     )
 
 
 # A slider that does not change the first values of the inputs does not change the equilibrium, whose search
 # takes longer than the simulation if the model is no polynomial of its output.
 @lru_cache(maxsize=256)
-def _find_rest(model: Model, inputs: tuple[float, ...]) -> tuple[float | None, str]:
+def _find_rest(model: DynamicModel, inputs: tuple[float, ...]) -> tuple[float | None, str]:
     """Return the stable equilibrium at constant inputs, None if there is no unique one, and the reason."""
     try:
         with np.errstate(all="ignore"):
-            return find_equilibrium(model, inputs), ""
+            return find_equilibrium(model, inputs)[0], ""
     except ModelError as error:
         return None, str(error).partition(":")[0]
 
@@ -262,7 +271,12 @@ def describe_start(found: SimulatedModel, output: float, reason: str) -> str:
 
 
 def simulate_inputs(
-    found: SimulatedModel, u: NDArray[np.float64], initial: float, start: str, warnings: Sequence[str]
+    found: SimulatedModel,
+    u: NDArray[np.float64],
+    initial: float,
+    is_rest: bool,
+    start: str,
+    warnings: Sequence[str],
 ) -> dict[str, Any]:
     """Simulate a model; return the fields of `islands_api.simulation_schemas.SimulatedOutput`.
 
@@ -271,19 +285,21 @@ def simulate_inputs(
     u : ndarray, shape (samples, inputs)
     initial : float
         Output before the first sample.
+    is_rest : bool
+        Whether the model rests there.
     start : str
         Statement about it.
     warnings : sequence of str
         Warnings about the inputs.
     """
     # Numba takes a second to import, and the API starts without it.
-    from islands.simulation.input_response import input_response, make_resting_record  # noqa: PLC0415
+    from islands.simulation.input_response import input_response  # noqa: PLC0415
 
     model, names = found.model, found.model.column_names
-    response = input_response(model, u, initial, found.output_range)
+    response = input_response(model, u, None if is_rest else initial, found.output_range)
     stated = list(warnings)
     if found.ranges:
-        measured = measure_input_ranges(make_resting_record(model, u, initial))
+        measured = list(zip(u.min(axis=0).tolist(), u.max(axis=0).tolist(), strict=True))
         units = found.units[:-1]
         stated += compare_input_ranges(names, units, found.ranges, measured, title="this response")
     if not response.outcome:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from islands.estimation.constraints.state_space import take_system
-from islands.estimation.constraints.static_state import StateSpace
+from islands.estimation.constraints.static_state import StateSpaceParameters
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import (
     LARGEST_MEMORY,
@@ -333,7 +333,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
     radius = float(np.abs(np.linalg.eigvals(layout.split(theta)["A"])).max())
     # Changes of units and coordinates round: the corrections restore the last digits.
     theta = data.stated.polish(
-        StateSpace(layout, data.scales.use_record_units(layout, theta), find_codes(system.units))
+        StateSpaceParameters(layout, data.scales.use_record_units(layout, theta), find_codes(system.units))
     )
     wiring = tuple(name for name, value in zip(layout.names, theta, strict=True) if value != 0.0)
     decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))

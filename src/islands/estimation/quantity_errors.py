@@ -21,7 +21,7 @@ from islands.estimation.fitted_state_space import number
 from islands.kernels.state_space import trace_states
 from islands.kernels.state_space_products import accumulate_products
 from islands.models.latent import LatentModel
-from islands.models.linear_system import Quantity, list_modes, measure_gains, measure_mode
+from islands.models.state_space import Quantity, list_modes, measure_gains, measure_mode
 from islands.records.dataset import Dataset
 from islands.simulation.initial_states import estimate_initial_states, read_inputs
 from islands.simulation.layout import find_intervals
@@ -135,7 +135,7 @@ def _find_admissible(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return the derivatives of the quantities, shape (quantities, parameters); None if there are none."""
-    poles = list_modes(model.linearise(model.rest).poles)
+    poles = list_modes(model.linearise().poles)
     names = [each.name for each in model.quantities]
     slopes = np.empty((len(names), theta.size))
     for place, value in enumerate(theta):
@@ -155,7 +155,7 @@ def _differentiate(model: LatentModel, theta: NDArray[np.float64]) -> NDArray[np
 
 def _measure(model: LatentModel, poles: Sequence[complex]) -> list[Quantity]:
     """Return the quantities of a model, with its modes in the order of the nearest of the given poles."""
-    system = model.linearise(model.rest)
+    system = model.linearise()
     left, ordered = list_modes(system.poles), []
     for pole in poles[: len(left)]:
         nearest = min(left, key=lambda each: abs(each - pole))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
-from islands.estimation.constraints.static_state import StateSpace
+from islands.estimation.constraints.static_state import StateSpaceParameters
 from islands.kernels.damped_step import solve_damped, solve_own
 from islands.kernels.dependent_parameters import extend_products, find_dependent
 from islands.kernels.state_space_products import NO_DERIVATIVES, accumulate_products
@@ -89,10 +89,10 @@ class StateSpaceFit:
         self.mean_square = self._measure(self.theta, self.states) if self.meets_conditions else np.inf
 
     @property
-    def system(self) -> StateSpace:
+    def system(self) -> StateSpaceParameters:
         """State space with the parameters so far."""
         layout = StateSpaceLayout(self.states.shape[1], self.segments[0].u.shape[1], len(self.codes))
-        return StateSpace(layout, self.theta, self.codes)
+        return StateSpaceParameters(layout, self.theta, self.codes)
 
     @property
     def meets_conditions(self) -> bool:

@@ -194,7 +194,7 @@ class Block:
 
     def start_values(self) -> tuple[float, ...]:
         """Return the value of each past sample of the state of a program, unless others are given."""
-        levels = self._find_levels()
+        levels = self.find_levels()
         return tuple(levels[channel] for channel, _ in self.samples)
 
     def first_states(self) -> tuple[float, ...]:
@@ -202,19 +202,19 @@ class Block:
 
         They follow from `start_values`, so that they are those of the start, up to rounding, if it is a rest.
         """
-        levels = self._find_levels()
-        return tuple(self._evaluate(place, levels) for place in range(self.outputs, self.computed))
+        levels = self.find_levels()
+        return tuple(self.evaluate(place, levels) for place in range(self.outputs, self.computed))
 
-    def _find_levels(self) -> list[float]:
+    def find_levels(self) -> list[float]:
         """Return the value of each signal before the first sample of a program."""
         found = [self.levels.get(name, 0.0) for name in self.signals]
         for place, start in enumerate(self.starts, start=self.outputs):
             found[place] = value(start, lambda channel, _lag: found[channel], self.parameters)
         if self.is_state_space:
-            found[: self.outputs] = [self._evaluate(place, found) for place in range(self.outputs)]
+            found[: self.outputs] = [self.evaluate(place, found) for place in range(self.outputs)]
         return found
 
-    def _evaluate(self, place: int, levels: Sequence[float]) -> float:
+    def evaluate(self, place: int, levels: Sequence[float]) -> float:
         """Return the right side of an equation if all signals are constant, rounded as in programs."""
         total = 0.0
         for term in self.equations[place]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Any, ClassVar, TypeAlias
 
+from numpy.typing import ArrayLike
+
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged
 from islands.models.block import Block, BlockTerm
@@ -22,9 +24,11 @@ from islands.models.equations import (
     named_term,
     signal_names,
 )
-from islands.models.narx import Model, measured_model, require_narx
+from islands.models.linearisation import OperatingPoint, linearise_block
+from islands.models.narx import Model, measured_model, require_narx, start_at_offsets
 from islands.models.protocol import DynamicModel, EquationText
 from islands.models.signal_statement import describe_values, join_statements, symbols
+from islands.models.state_space import StateSpace
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 from islands.records.preprocessing_steps import Preprocessing
@@ -208,6 +212,17 @@ class CoupledModel:
             values=describe_values(self),
             texts=tuple(texts),
         )
+
+    def linearise(
+        self, operating_point: OperatingPoint | None = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Return the linear system of small deviations; see `DynamicModel.linearise`."""
+        return linearise_block(self.measured_block(), operating_point, y)
+
+    def measured_block(self) -> Block:
+        """Return the block of the measured signals, with the offsets in its equations."""
+        block = measured_coupled_model(self).block()
+        return start_at_offsets(block, self.models[0], self.channels(0))
 
     def _equation(self, place: int) -> str:
         """Return the text of one equation with the signals of the block."""

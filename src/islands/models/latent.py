@@ -16,23 +16,16 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError
-from islands.models.block import Block
+from islands.models.block import Block, subtract_offsets
 from islands.models.equations import signal_names
-from islands.models.linear_system import (
-    LinearSystem,
-    Quantity,
-    describe_poles,
-    list_modes,
-    measure_gains,
-    measure_mode,
-    write_error,
-)
+from islands.models.linearisation import OperatingPoint, read_levels
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
+from islands.models.state_space import Quantity, StateSpace, describe_poles, write_error
 from islands.models.state_space_rest import find_rest, linearise
 from islands.models.unit_functions import find_codes, parse_unit
 from islands.records.channel_names import parse_channel_name
@@ -244,9 +237,43 @@ class LatentModel(ParametricModel):
         """Blocks of the parameters by name, as in the equations; see `StateSpaceLayout.find_matrices`."""
         return self.layout.find_matrices(self.theta)
 
-    def linearise(self, x: NDArray[np.float64]) -> LinearSystem:
-        """Return the linear system of small deviations from the operating point with the states ``x``."""
-        return linearise(self.matrices, self.codes, x, np.array(self.operating_inputs)).system
+    def linearise(
+        self, operating_point: OperatingPoint | None = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Return the linear system of small deviations; see `DynamicModel.linearise`.
+
+        By default the operating point is that of the model, with states of zero if they are not found to rest
+        there.
+        """
+        if y is not None:
+            raise ModelError(
+                "the states of this model determine its output: leave out the output of the operating point"
+            )
+        done = self.preprocessing
+        offsets = np.array(done.input_offsets if done else (0.0,) * self.inputs)
+        measured = subtract_offsets(self.block(), done)
+        levels = read_levels(measured, operating_point)
+        u, x = np.array(self.operating_inputs), self.rest
+        if operating_point is not None:
+            u = np.array(levels) - offsets
+            found = find_rest(self.matrices, self.codes, u, self.rest)
+            if found is None and self.units:
+                raise ModelError(
+                    f"the model is not found to rest at the inputs {levels}: take another operating point"
+                )
+            x = self.rest if found is None else found
+        of, at = self.matrices, linearise(self.matrices, self.codes, x, u)
+        y0 = float(of["C"] @ x + of["D"] @ u + of["F"] @ at.values + of["level"][0])
+        return replace(
+            at.system,
+            dt=self.dt,
+            input_names=self.column_names,
+            output_names=(self.output_name,),
+            input_units=tuple(parse_channel_name(name).unit for name in self.column_names),
+            output_units=(parse_channel_name(self.output_name).unit,),
+            operating_inputs=tuple(levels),
+            operating_outputs=(y0 + (done.output_offset if done else 0.0),),
+        )
 
     @property
     def reads_at_once(self) -> bool:
@@ -298,7 +325,7 @@ class LatentModel(ParametricModel):
         if self.dt is None:
             return ()
         errors = self.known_errors
-        modes = describe_poles(self.linearise(self.rest).poles, self.dt, errors)
+        modes = describe_poles(self.linearise().poles, self.dt, errors)
         if errors is None:
             return modes
         gains = zip(names, self.quantities[-self.inputs :], errors[-self.inputs :], strict=True)
@@ -313,11 +340,7 @@ class LatentModel(ParametricModel):
 
         Empty without a time.
         """
-        if self.dt is None:
-            return ()
-        system = self.linearise(self.rest)
-        modes = (each for pole in list_modes(system.poles) for each in measure_mode(pole, self.dt))
-        return (*modes, *measure_gains(system))
+        return self.linearise().quantities
 
     @property
     def known_errors(self) -> tuple[float, ...] | None:

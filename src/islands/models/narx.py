@@ -7,6 +7,8 @@ from numbers import Real
 from reprlib import repr as abbreviate
 from typing import Any, ClassVar
 
+from numpy.typing import ArrayLike
+
 from islands.errors import ModelError
 from islands.expressions.primitives import SUB
 from islands.expressions.printing import plain
@@ -20,9 +22,11 @@ from islands.models.equations import (
     named_term,
     plain_text,
 )
+from islands.models.linearisation import OperatingPoint, linearise_block
 from islands.models.protocol import DynamicModel, ModelEquation, no_model_error
 from islands.models.regressor import Regressor, regressor
 from islands.models.signal_statement import describe_values, symbols
+from islands.models.state_space import StateSpace
 from islands.records.channel_names import parse_channel_name
 from islands.records.preprocessing_steps import Preprocessing
 
@@ -158,6 +162,14 @@ class Model:
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
             texts=(equation(self),),
+        )
+
+    def linearise(
+        self, operating_point: OperatingPoint | None = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Return the linear system of small deviations; see `DynamicModel.linearise`."""
+        return linearise_block(
+            start_at_offsets(measured_model(self).block(), self, range(1 + self.inputs)), operating_point, y
         )
 
     def equation(self) -> ModelEquation:
@@ -320,3 +332,12 @@ def measured_model(model: Model) -> Model:
     terms.append((Constant(1.0), done.output_offset))
     measured = make_model(terms, model.input_names, model.output_name, model.dt)
     return replace(measured, average=model.average, preprocessing=rate)
+
+
+def start_at_offsets(block: Block, model: DynamicModel, channels: Iterable[int]) -> Block:
+    """Return a block whose past signals are the offsets of a model unless others are given."""
+    done = model.preprocessing
+    if done is None:
+        return block
+    offsets = zip(channels, (done.output_offset, *done.input_offsets), strict=True)
+    return replace(block, levels={block.signals[channel]: offset for channel, offset in offsets})

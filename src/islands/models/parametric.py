@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, ClassVar, Self
 
+from numpy.typing import ArrayLike
+
 from islands.errors import ModelError
 from islands.expressions.parsing import parse_signals
 from islands.expressions.printing import (
@@ -19,10 +21,12 @@ from islands.expressions.printing import (
     Printer,
 )
 from islands.expressions.tree import Constant, Expression, Lagged, replace_leaves, substitute
-from islands.models.block import Block, BlockTerm
+from islands.models.block import Block, BlockTerm, subtract_offsets
 from islands.models.equations import latex_statement, mathml_statement, signal_names
+from islands.models.linearisation import OperatingPoint, linearise_block
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import describe_signals, describe_values, symbols
+from islands.models.state_space import StateSpace
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
 from islands.records.preprocessing_steps import Preprocessing
@@ -171,6 +175,12 @@ class ParametricModel(ABC):
             values=describe_values(self),
             texts=tuple(self._write_lines(sides, self.signals, self.signals)),
         )
+
+    def linearise(
+        self, operating_point: OperatingPoint | None = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Return the linear system of small deviations; see `DynamicModel.linearise`."""
+        return linearise_block(subtract_offsets(self.block(), self.preprocessing), operating_point, y)
 
     def _parse(self, text: str) -> Expression:
         return parse_signals(text, self.signals)

@@ -7,8 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
+from numpy.typing import ArrayLike
+
 from islands.errors import ModelError
 from islands.models.block import Block
+from islands.models.linearisation import OperatingPoint
+from islands.models.state_space import StateSpace
 from islands.records.signal_map import SignalReference
 
 
@@ -105,6 +109,26 @@ class DynamicModel(SignalReference, Protocol):
 
     def block(self) -> Block:
         """Return the difference equations of the model."""
+
+    def linearise(
+        self, operating_point: OperatingPoint | None = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Return the linear system of small deviations from an operating point as measured.
+
+        Parameters
+        ----------
+        operating_point : float, sequence of float or mapping, optional
+            Constant value of every input, in the order of the model or by column; by default, and for columns
+            that a mapping leaves out, the point at which an exported program of the model starts.
+        y : float or sequence of float, optional
+            Outputs there; by default the stable equilibrium.
+
+        Raises
+        ------
+        ModelError
+            The model has no unique stable equilibrium at these inputs and no output is given, or it has a
+            kink or a step at the operating point.
+        """
 
     def equation(self) -> ModelEquation:
         """Return the equation as text."""

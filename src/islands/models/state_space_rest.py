@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.models.linear_system import LinearSystem
+from islands.models.state_space import StateSpace
 
 #: Newton steps that find the states at rest, and the step that ends them.
 _REST_STEPS, _STILL = 50, 1e-12
@@ -21,7 +21,7 @@ class Linearised(NamedTuple):
         Next states.
     arguments, values, slopes : ndarray, shape (units,)
         Arguments of the units, their values and their slopes.
-    system : LinearSystem
+    system : StateSpace
         System of small deviations.
     """
 
@@ -29,7 +29,7 @@ class Linearised(NamedTuple):
     arguments: NDArray[np.float64]
     values: NDArray[np.float64]
     slopes: NDArray[np.float64]
-    system: LinearSystem
+    system: StateSpace
 
 
 def linearise(
@@ -55,11 +55,11 @@ def linearise(
     pairs = [evaluate_unit(code, s) for code, s in zip(codes, arguments, strict=True)]
     values, slopes = np.array(pairs).reshape(-1, 2).T
     on_states, on_output = of["E"] * slopes, of["F"] * slopes
-    system = LinearSystem(
-        a=of["A"] + on_states @ of["W"],
-        b=of["B"] + on_states @ of["V"],
-        c=of["C"] + on_output @ of["W"],
-        d=of["D"] + on_output @ of["V"],
+    system = StateSpace(
+        A=of["A"] + on_states @ of["W"],
+        B=of["B"] + on_states @ of["V"],
+        C=(of["C"] + on_output @ of["W"])[None],
+        D=(of["D"] + on_output @ of["V"])[None],
     )
     after = of["A"] @ x + of["B"] @ u + of["E"] @ values + of["o"]
     return Linearised(after, arguments, values, slopes, system)
@@ -84,7 +84,7 @@ def find_rest(
     for _ in range(_REST_STEPS):
         at = linearise(of, codes, x, u)
         try:
-            step = np.linalg.solve(np.eye(len(x)) - at.system.a, at.after - x)
+            step = np.linalg.solve(np.eye(len(x)) - at.system.A, at.after - x)
         except np.linalg.LinAlgError:
             return None
         x = x + step

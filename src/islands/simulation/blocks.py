@@ -24,6 +24,36 @@ from islands.simulation.initial_states import estimate_initial_states
 from islands.simulation.layout import check_warm_up, find_intervals
 
 
+class LinkedBlock:
+    """A block with its program, which is built once for many simulations."""
+
+    def __init__(self, block: Block) -> None:
+        self._program, self._weights = _link(block)
+        self._ends = np.cumsum([len(equation) for equation in block.equations], dtype=np.int64)
+
+    def simulate(self, signals: NDArray[np.float64], sets: NDArray[np.float64], warm_up: int) -> None:
+        """Compute all rows after the warm-up in place.
+
+        Parameters
+        ----------
+        signals : ndarray, shape (channels, rows, lanes)
+            In C order, with `LANES` or `MANY_LANES`; a row does not depend on later ones, nor a lane on
+            others.
+        sets : ndarray, shape (parameters, lanes)
+        warm_up : int
+            Number of rows before the first computed one, at least the largest lag.
+        """
+        ones = np.ones(signals.shape[2])
+        weights = np.array([ones if place is None else sets[place] for place in self._weights])
+        constants = np.empty((self._program.constants.size, len(ones)))
+        for row, number, fixed in zip(
+            constants, self._program.parameters, self._program.constants, strict=True
+        ):
+            row[:] = sets[number - 1] if number else fixed
+        flat = signals.reshape(len(signals), -1)
+        simulate_block(self._program, weights, constants, self._ends, warm_up, flat)
+
+
 class BlockSimulator:
     """A block with its program and the intervals of a record, which are built once for many simulations.
 
@@ -56,8 +86,7 @@ class BlockSimulator:
     ) -> None:
         self._block, self._warm_up = block, warm_up
         self.states: NDArray[np.float64] | None = None
-        self._program, self._weights = _link(block)
-        self._ends = np.cumsum([len(equation) for equation in block.equations], dtype=np.int64)
+        self._linked = LinkedBlock(block)
         self._outputs, self._inputs = outputs, inputs
         self._start, self._length = start, length
         self._order = np.argsort(-length, kind="stable")
@@ -153,16 +182,8 @@ class BlockSimulator:
             np.concatenate([self._outputs[:, samples], states, self._inputs[:, samples]])
         )
         self._start_states(signals, sets, intervals)
-        ones = np.ones(width)
-        weights = np.array([ones if place is None else sets[place] for place in self._weights])
-        constants = np.empty((self._program.constants.size, width))
-        for row, number, fixed in zip(
-            constants, self._program.parameters, self._program.constants, strict=True
-        ):
-            row[:] = sets[number - 1] if number else fixed
-        flat = signals.reshape(len(signals), -1)
-        simulate_block(self._program, weights, constants, self._ends, self._warm_up, flat)
-        return flat.reshape(signals.shape)
+        self._linked.simulate(signals, sets, self._warm_up)
+        return signals
 
     def _start_states(
         self, signals: NDArray[np.float64], sets: NDArray[np.float64], intervals: NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""Responses of a model to inputs of choice, from a constant output, and to a step of one input."""
+"""Responses of a model to inputs of choice and to a step, without a measured output."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import SettingsError
-from islands.models.narx import Model, require_narx
-from islands.models.operating_point import find_equilibrium
-from islands.models.protocol import DynamicModel
+from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.protocol import DynamicModel, no_model_error
+from islands.records.compatibility import ColumnReference, match_record
+from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.dataset import Dataset
-from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import BOUND, free_run
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
+from islands.simulation.predictors import BOUND, Simulation
+from islands.simulation.stepper import Stepper, measure_offsets, read_inputs
 
 #: Steps of the model before the step of the input, besides the largest lag.
 _BEFORE = 5
@@ -32,10 +34,8 @@ class InputResponse:
     time : ndarray, shape (samples,)
         Time in seconds, from 0.
     u : ndarray, shape (samples, inputs)
-    y : ndarray, shape (samples,)
+    y : ndarray, shape (samples,) or (samples, outputs)
         Output; NaN after a divergence.
-    start : float
-        Output before the first sample.
     outcome : EvaluationOutcome
         OK, or DIVERGED with the first diverged sample.
     """
@@ -43,81 +43,97 @@ class InputResponse:
     time: NDArray[np.float64]
     u: NDArray[np.float64]
     y: NDArray[np.float64]
-    start: float
     outcome: EvaluationOutcome
 
 
 def input_response(
-    model: DynamicModel, u: ArrayLike, y: float | None = None, scale: float = 0.0
+    model: AnyModel,
+    u: ArrayLike,
+    y: ArrayLike | None = None,
+    scale: float = 0.0,
+    states: ArrayLike | None = None,
 ) -> InputResponse:
     """Simulate the response of a model to inputs at its rate.
 
-    Before the first sample the inputs have their first values, and the output is constant. The response is
-    the free run of a record with these values.
+    Before the first sample the inputs have their first values, and the output is constant.
 
     Parameters
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         Model with parameters.
     u : array_like, shape (samples,) or (samples, inputs)
         Inputs as measured, at the sampling time of the model.
-    y : float, optional
-        Output before the first sample; by default the stable equilibrium at the first values of the inputs.
+    y : float or sequence of float, optional
+        Outputs before the first sample; by default the stable equilibrium at the first values of the inputs.
     scale : float
         Size of the output, if it is known. The response has diverged above `BOUND` times the largest of this
         size, of the inputs, of ``y`` and of 1.
+    states : sequence of float, optional
+        States of a state space at the first sample, in place of ``y``.
 
     Raises
     ------
-    ModelError
-        The model has no unique stable equilibrium at the first inputs, and no output is given.
-    SettingsError
-        The inputs are not those of the model, there is no sample, or a number is not finite.
+    ModelError, SettingsError
+        As for `Stepper`; or the inputs are not those of the model, there is no sample, or a number is not
+        finite.
     """
-    signals = _read_inputs(model, u)
-    start = find_equilibrium(require_narx(model), signals[0].tolist()) if y is None else float(y)
-    if not np.isfinite(start):
-        raise SettingsError(f"the output before the first sample is a finite number, got {start}")
-    # The first samples only fill the past of the model.
-    before = model.maximum_lag
-    record = make_resting_record(model, np.vstack([np.tile(signals[0], (before, 1)), signals]), start)
-    bound = BOUND * max(1.0, scale, abs(start), float(np.abs(signals).max()))
-    run = free_run(model, record, bound=bound)
-    time = record.dt * np.arange(len(signals), dtype=np.float64)
-    return InputResponse(time, signals, run.y[before:], start, run.outcome)
+    block = model.block()
+    signals = read_inputs(model, u, block.columns[block.computed :])
+    found = Stepper(model, signals[0], y, states).run(signals)
+    offsets, _ = measure_offsets(model)
+    given = 0.0 if y is None else float(np.abs(np.asarray(y)).max())
+    bound = BOUND * max(1.0, scale, given, float(np.abs(signals).max()))
+    outside, outcome = ~(np.abs(found - offsets) <= bound), OK
+    if outside.any():
+        first = int(np.argmax(outside.any(axis=1)))
+        name = block.signals[int(np.argmax(outside[first]))]
+        outcome = EvaluationOutcome(Status.DIVERGED, f"|{name}| left {bound:.3g} at sample {first}")
+        found[first:] = np.nan
+    time = (1.0 if model.dt is None else model.dt) * np.arange(len(signals), dtype=np.float64)
+    return InputResponse(time, signals, found[:, 0] if block.outputs == 1 else found, outcome)
 
 
-def make_resting_record(model: DynamicModel, u: NDArray[np.float64], rest: float) -> Dataset:
-    """Return a record at the rate of a model whose output is known in its first samples and constant.
+def simulate_inputs(
+    model: AnyModel, record: AnyRecord, y: ArrayLike | None = None, states: ArrayLike | None = None
+) -> Simulation:
+    """Simulate every segment of a record from its inputs alone, from rest or from a given start.
 
     Parameters
     ----------
-    model : DynamicModel
-    u : ndarray, shape (samples, inputs)
-        Inputs as measured: those that the model reads one sample early are advanced by its simulation.
-    rest : float
-        Output in as many samples as the largest lag of the model.
+    model : DynamicModel or CoupledModel
+    record : Dataset or CoupledRecord
+        Inputs at the rate of the model; its outputs are only compared.
+    y, states
+        As for `input_response`: the start of every segment.
+
+    Returns
+    -------
+    Simulation
+        One value for every sample, from the first one on.
+
+    Raises
+    ------
+    ModelError, RecordError, SettingsError
+        As for `input_response`; or the record does not match the model.
     """
-    y = np.full(len(u), np.nan)
-    y[: model.maximum_lag] = rest
-    dt = 1.0 if model.dt is None else model.dt
-    done = model.preprocessing and model.preprocessing.without_offsets
-    return Dataset(u, y, dt, model.column_names, model.output_name, preprocessing=done)
+    first = record.records[0] if isinstance(record, CoupledRecord) else record
+    columns, output = model.block().columns, model.block().outputs
+    inputs = columns[len(columns) - len(model.input_names) :]
+    data = match_record(ColumnReference(inputs, columns[0], model.dt, model.average), first)
+    done = data.preprocessing
+    u = data.u + (done.input_offsets if done else 0.0)
+    measured = record.y.reshape(len(u), output)
+    runs = [input_response(model, u[begin:end], y, 0.0, states) for begin, end in data.bounds]
+    found = np.concatenate([each.y.reshape(-1, output) for each in runs])
+    found -= [each.preprocessing.output_offset if each.preprocessing else 0.0 for each in _list(record)]
+    outcome = next((each.outcome for each in runs if not each.outcome), OK)
+    errors = np.mean((found - measured) ** 2, axis=0) if outcome else np.full(output, np.inf)
+    is_coupled = isinstance(model, CoupledModel)
+    return Simulation(found if is_coupled else found[:, 0], tuple(errors.tolist()), outcome)
 
 
-def _read_inputs(model: DynamicModel, u: ArrayLike) -> NDArray[np.float64]:
-    signals = np.asarray(u, dtype=np.float64)
-    signals = signals[:, None] if signals.ndim == 1 else signals
-    if signals.ndim != 2 or signals.shape[1] != model.inputs:
-        raise SettingsError(
-            f"the model has the inputs {', '.join(model.column_names)}: give an array of shape (samples, "
-            f"{model.inputs}), got {np.shape(u)}"
-        )
-    if not len(signals):
-        raise SettingsError("a response has at least 1 sample, got 0")
-    if not np.isfinite(signals).all():
-        raise SettingsError("an input is NaN or infinite: give finite numbers")
-    return signals
+def _list(record: AnyRecord) -> tuple[Dataset, ...]:
+    return record.records if isinstance(record, CoupledRecord) else (record,)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -174,12 +190,13 @@ def step_response(
     SettingsError
         There is not one value for each input, no input changes, or there is less than one sample.
     """
-    narx = require_narx(model)
+    if not isinstance(model, DynamicModel):
+        raise no_model_error(model)
     levels = [np.atleast_1d(np.asarray(each, dtype=np.float64)) for each in (start, end)]
     for level in levels:
-        if level.shape != (narx.inputs,):
+        if level.shape != (model.inputs,):
             raise SettingsError(
-                f"the model has the inputs {', '.join(narx.column_names)}: give one value for each before "
+                f"the model has the inputs {', '.join(model.column_names)}: give one value for each before "
                 f"and after the step, got {level.tolist()}"
             )
     changed = np.flatnonzero(levels[0] != levels[1])
@@ -187,31 +204,15 @@ def step_response(
         raise SettingsError("no input changes: give different values before and after the step")
     if samples is not None and samples < 1:
         raise SettingsError(f"a response has at least 1 sample, got {samples}")
-    rest = find_equilibrium(narx, levels[0].tolist()) if y is None else y
-    count = _FEWEST if samples is None else samples
+    before, count = model.maximum_lag + _BEFORE, _FEWEST if samples is None else samples
     while True:
-        found = _simulate(narx, levels[0], levels[1], rest, count, int(changed[0]))
+        u = np.vstack([np.tile(levels[0], (before, 1)), np.tile(levels[1], (count, 1))])
+        found = input_response(model, u, y)
         after = found.y[-count:]
         change = np.abs(after - after[-1])
         settled = np.isnan(change).any() or change[count // 2 :].max() <= _SETTLED * change.max()
         if samples is not None or settled or count >= _MOST:
-            return found
+            channel = int(changed[0])
+            names = model.column_names[channel], model.output_name
+            return StepResponse(found.time - found.time[before], u[:, channel], found.y, *names)
         count *= 2
-
-
-def _simulate(
-    model: Model,
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    rest: float,
-    count: int,
-    channel: int,
-) -> StepResponse:
-    before = model.maximum_lag + _BEFORE
-    u = np.vstack([np.tile(start, (before, 1)), np.tile(end, (count, 1))])
-    record = make_resting_record(model, u, rest)
-    scale = max(1.0, abs(rest), float(np.abs(u).max()))
-    simulated = free_run(model, record, bound=BOUND * scale).y
-    simulated[: model.maximum_lag] = rest
-    time = record.dt * np.arange(-before, count, dtype=np.float64)
-    return StepResponse(time, u[:, channel], simulated, model.column_names[channel], model.output_name)

@@ -199,14 +199,15 @@ async def simulate(
     recorded = await _get_beginning(state, caller, entry, rank, found) if reads_record(request) else None
     async with state.simulation_slots.hold(caller.owner):
         u, warnings = await state.run_blocking(make_inputs, found, request, recorded)
-        initial, reason = await state.run_blocking(find_start, found, u[0].tolist(), request.initial_output)
+        begun = await state.run_blocking(find_start, found, u[0].tolist(), request.initial_output)
+    initial = begun.output
     if initial is None:
         recorded = await _get_beginning(state, caller, entry, rank, found)
         initial = find_first_output(recorded)
-    start, compressed = describe_start(found, initial, reason), "gzip" in accept_encoding
+    start, compressed = describe_start(found, initial, begun.reason), "gzip" in accept_encoding
 
     def respond() -> bytes:
-        return write_document(simulate_inputs(found, u, initial, start, warnings), compressed)
+        return write_document(simulate_inputs(found, u, initial, begun.is_rest, start, warnings), compressed)
 
     async with state.simulation_slots.hold(caller.owner):
         data = await state.run_blocking(respond)

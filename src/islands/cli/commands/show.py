@@ -11,13 +11,15 @@ from islands.cli.console import output
 from islands.cli.settings_options import NONE, Given, with_settings
 from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
+from islands.export.linear_system import find_notation, write_linear_system
 from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
+from islands.models.state_space import FORMS
 from islands.persistence.saved_documents import open_document, read_saved_model
 from islands.records.reading import read_dataset
 from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
-from islands.report.figures.names import MODEL_FIGURES
+from islands.report.figures.names import LINEAR_FIGURES, MODEL_FIGURES
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.layout import term_table, wrap
 
@@ -32,24 +34,35 @@ def show(
         str | None,
         typer.Option(
             "--format",
-            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS, REPORT])}. By default one term in each line, with "
-            "its standard error and the columns of the record.",
+            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS, *FORMS, REPORT])}. By default one term in each line, "
+            "with its standard error and the columns of the record.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
-            help="File to write; required for fmu and fmu2, and report.html in the folder for a report.",
+            help="File to write; required for fmu and fmu2, and report.html in the folder for a report. A "
+            "linear system is written for MATLAB to a file .m, as JSON to .json.",
         ),
     ] = None,
     figure: Annotated[
         str | None,
         typer.Option(
-            "--figure", help=f"Draw {', '.join(MODEL_FIGURES)} of the model on --record into --out, as SVG."
+            "--figure",
+            help=f"Draw {', '.join(MODEL_FIGURES)} of the model on --record into --out, as SVG; "
+            f"{', '.join(LINEAR_FIGURES)} of its linear system need no record.",
         ),
     ] = None,
     record: Annotated[Path | None, typer.Option("--record", help="Record of --figure.")] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--at",
+            help="INPUT=VALUE: operating point of a linear system; by default that of the model, or the "
+            "middle of the range of its data. Name the output, too, if the model rests at several.",
+        ),
+    ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: Given = NONE,
@@ -61,8 +74,15 @@ def show(
     simulation is a program in C or MATLAB; one with a closed form is exported like a
     model, a model of several outputs as one program or block.
 
+    Linear systems for the design of controllers: state-space, transfer-function.
+
     The report of a result folder is one HTML file, which prints on A4, with its figures.
     """
+    if kind in FORMS or (figure in LINEAR_FIGURES and record is None):
+        _show_linear(model, kind, figure, out, options.values(at or [], "--at"))
+        return
+    if at:
+        raise SettingsError(f"--at is for the formats {', '.join(FORMS)} and for figures of linear systems")
     if figure is not None:
         _draw(model, figure, record, out, dt, parse_rows(rows), ReadingOptions(**reading))
         return
@@ -101,6 +121,29 @@ def _write_report(folder: Path, out: Path | None) -> None:
 def _print(text: str | None) -> None:
     if text is not None:
         typer.echo(text.rstrip("\n"))
+
+
+def _show_linear(
+    name: str, form: str | None, figure: str | None, out: Path | None, values: dict[str, float]
+) -> None:
+    """Write the linear system of a model, or draw it."""
+    loaded = islands.load(name)
+    if not isinstance(loaded, islands.Result | islands.FittedModel | islands.FittedCoupledModel):
+        raise SettingsError(f"a linear system is that of a model, and {name} is none")
+    model = loaded.best.model if isinstance(loaded, islands.Result) else loaded.model
+    outputs = model.output_names if isinstance(model, CoupledModel) else (model.output_name,)
+    y = [values.pop(each) for each in outputs] if set(outputs) <= set(values) else None
+    if form is None:
+        if out is None:
+            raise SettingsError(f"--figure {figure} is an SVG file: give --out FILE")
+        from islands.report.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
+
+        save(loaded.plot_linear(figure or LINEAR_FIGURES[0], values or None, y), out)
+        return
+    text = write_linear_system(loaded.linearise(values or None, y), form, find_notation(out))
+    _print(text if out is None else None)
+    if out is not None:
+        out.write_text(f"{text}\n", encoding="utf-8")
 
 
 def _draw(

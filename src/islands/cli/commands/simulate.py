@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
@@ -15,9 +15,9 @@ from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.settings_options import NONE, Given, with_settings
-from islands.errors import ExtrapolationWarning, RecordError, SettingsError
+from islands.errors import ExtrapolationWarning, ModelError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
-from islands.facade.load import load
+from islands.facade.load import Loaded, load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.model_simulation import SHOOTING
@@ -81,6 +81,21 @@ class _Request:
     reading: ReadingOptions
     settings: SimulationSettings
     bands: float | None
+    start: Mapping[str, float]
+
+    def split_start(self, model: AnyModel) -> tuple[list[float] | None, list[float] | None]:
+        """Return the outputs and the states of ``--start``; None for those that are not given."""
+        block = model.block()
+        outputs = block.columns[: block.outputs]
+        parts = [
+            [self.start[name] for name in names if name in self.start]
+            for names in (outputs, block.columns[block.outputs : block.computed])
+        ]
+        if len(self.start) != sum(map(len, parts)):
+            known = ", ".join(block.columns[: block.computed])
+            raise SettingsError(f"--start {', '.join(self.start)}: the model has {known}")
+        y, states = (part or None for part in parts)
+        return y, states
 
     def read(
         self,
@@ -92,22 +107,17 @@ class _Request:
         """Read a record of one output; a given output column replaces that of the model."""
         if len(self.outputs) > 1:
             raise SettingsError(f"the model has one output, got {', '.join(self.outputs)}: give one --output")
-        name = self.outputs[0] if self.outputs else output_name
-        try:
-            return read_dataset(
-                *(self.record, inputs, name, self.dt, self.rows),
-                missing_output=missing_output,
-                options=self.reading,
-                signals=signals,
-            )
-        except RecordError as error:
+        name: str | None = self.outputs[0] if self.outputs else output_name
+        if missing_output and not self.outputs:
             columns = read_columns(self.record, self.reading)
-            if find_column(name, columns) in columns:
-                raise
-            raise RecordError(
-                f"{error}. A free run starts from the first values of {name}: add this column with them and "
-                "leave its other cells empty, or name the output by --output"
-            ) from error
+            name = name if find_column(output_name, columns) in columns else None
+        record = read_dataset(
+            *(self.record, inputs, name, self.dt, self.rows),
+            missing_output=missing_output,
+            options=self.reading,
+            signals=signals,
+        )
+        return record if name else replace(record, output_name=output_name)
 
     def refuse_detrend(self, model: str) -> None:
         """Refuse ``detrend`` for a model that states its signals."""
@@ -118,11 +128,29 @@ class _Request:
 @with_settings(reading=ReadingOptions, settings=SimulationSettings)
 def simulate(
     model: options.ModelFile,
-    record: options.Record,
+    records: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORD...",
+            help="Record of the inputs and the output, or of inputs alone; several, one by one.",
+        ),
+    ],
     mode: Annotated[str, typer.Option("--mode", help="one-step, shooting or free-run.")] = "free-run",
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="CSV file for time and y_sim, with --bands also for y_low and y_high."),
+        typer.Option(
+            "--out",
+            help="CSV file for time and y_sim, with --bands also y_low and y_high; of several records a "
+            "folder.",
+        ),
+    ] = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--start",
+            help="NAME=VALUE: output before the first sample, or states x1, x2 .. of a latent model at it; "
+            "by default the measured output, and rest at the first inputs without one.",
+        ),
     ] = None,
     inputs: Annotated[
         list[str] | None,
@@ -143,15 +171,28 @@ def simulate(
         ),
     ] = None,
 ) -> None:
-    """Simulate a model on a record. A free run needs only the first samples of the output.
+    """Simulate a model on records. A free run needs only the inputs.
 
-    For a model of a result folder, the errors on the validation data are those of the result.
+    It starts from the first samples of the output if the record has them. For a model
+    of a result folder, the errors on the validation data are those of the result.
     """
-    request = _Request(
-        *(record, mode, out, options.columns(inputs or []), options.columns(output_columns or []), dt),
-        *(parse_rows(rows), ReadingOptions(**reading), SimulationSettings(**settings), bands),
-    )
-    match load(model):
+    if len(records) > 1 and out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    loaded = load(model)
+    for record in records:
+        if len(records) > 1:
+            output.print(f"{record}:", markup=False)
+        file = out if out is None or len(records) == 1 else out / f"{record.stem}.csv"
+        request = _Request(
+            *(record, mode, file, options.columns(inputs or []), options.columns(output_columns or []), dt),
+            *(parse_rows(rows), ReadingOptions(**reading), SimulationSettings(**settings), bands),
+            start=options.values(start or [], "--start"),
+        )
+        _simulate_loaded(loaded, request)
+
+
+def _simulate_loaded(loaded: Loaded, request: _Request) -> None:
+    match loaded:
         case Result() as result:
             _simulate_model(result.best, request, result.document.get("data", {}).get("inputs", {}))
         case FittedModel() as single:
@@ -183,6 +224,18 @@ def _simulate_model(
     if "estimation" in ranges:
         _print_extrapolation(model, data, ranges["estimation"])
     compile_kernels()
+    y, states = request.split_start(model)
+    if y or states or not np.isfinite(data.y).any():
+        if request.bands is not None:
+            raise SettingsError("--bands need the measured output of the first samples: add it to the record")
+        try:
+            simulation = found.simulate(data, mode, y=y[0] if y else None, states=states)
+        except ModelError as error:
+            advice = "" if y or states else f", as --start {model.output_name}=VALUE"
+            raise ModelError(f"{error}{advice}") from error
+        line = f"{mode} {_describe_start(request)}: {simulation.outcome}"
+        _print_metrics(data, simulation.y, line, request.out, None, bool(simulation.outcome))
+        return
     first = found.warm_up if request.settings.warm_up is None else request.settings.warm_up
     band = None if request.bands is None else found.bands(data, request.bands, first)
     simulation = found.simulate(data, mode, first, request.settings.shooting)
@@ -192,6 +245,12 @@ def _simulate_model(
         _print_first_states(model, data, first)
     line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
     _print_metrics(data, simulation.y, line, request.out, band, bool(simulation.outcome))
+
+
+def _describe_start(request: _Request) -> str:
+    if not request.start:
+        return "from rest at the first inputs"
+    return f"from {', '.join(f'{name} = {value:g}' for name, value in request.start.items())}"
 
 
 def _describe_preparation(model: DynamicModel, data: Dataset, is_prepared: bool, statement: str) -> str:
@@ -227,14 +286,24 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
         )
     inputs = request.inputs or model.models[0].column_names[: len(model.input_names)]
     table = open_record(request.record, request.reading)
+    names = outputs or model.output_names
     recorded = CoupledRecord(
         tuple(
-            read_table(
-                *(table, request.record.name, inputs, name, request.dt, request.rows),
-                missing_output=True,
-                options=request.reading,
+            replace(
+                read_table(
+                    *(
+                        table,
+                        request.record.name,
+                        inputs,
+                        name if find_column(name, table.names) in table.names else None,
+                    ),
+                    *(request.dt, request.rows),
+                    missing_output=True,
+                    options=request.reading,
+                ),
+                output_name=name,
             )
-            for name in outputs or model.output_names
+            for name in names
         )
     )
     data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
@@ -242,16 +311,22 @@ def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
         output.print(f"as in the model, {statement}", markup=False)
     compile_kernels()
     first = found.warm_up if request.settings.warm_up is None else request.settings.warm_up
-    simulation = found.simulate(data, first)
+    y, states = request.split_start(model)
+    is_measured = y is None and states is None and bool(np.isfinite(data.y).any())
+    simulation = found.simulate(data, first, y, states)
     bands = () if request.bands is None else found.bands(data, request.bands, first)
     if request.out is not None:
         limits = [(band.lower, band.upper) for band in bands]
         write_coupled_simulation(data, simulation.y, request.out, limits)
         output.print(f"{request.out}: {data.samples} rows", markup=False)
-    _print_first_states(model, data, first)
-    output.print(f"free-run after a warm-up of {first} samples: {simulation.outcome}", markup=False)
-    for each, y in zip(data.records, simulation.y.T, strict=True):
-        errors = metrics(each.y, y)
+    if is_measured:
+        _print_first_states(model, data, first)
+    begun = f"after a warm-up of {first} samples" if is_measured else _describe_start(request)
+    output.print(f"free-run {begun}: {simulation.outcome}", markup=False)
+    for each, simulated in zip(data.records, simulation.y.T, strict=True):
+        if np.count_nonzero(np.isfinite(each.y)) < _LEAST_KNOWN:
+            continue
+        errors = metrics(each.y, simulated)
         output.print(
             f"{each.output_name}: MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
             f"{each.output_unit}".rstrip(),
@@ -306,7 +381,11 @@ def _print_metrics(
     known = int(np.count_nonzero(np.isfinite(data.y) & np.isfinite(y)))
     if not is_complete:
         return
-    if known < _LEAST_KNOWN:
+    if not known:
+        output.print(
+            f"{data.output_name}: {y[0]:.6g} at the first sample, {y[-1]:.6g} at the last", markup=False
+        )
+    elif known < _LEAST_KNOWN:
         output.print(
             f"{data.output_name} is measured in {known} of the simulated samples: too few for an error",
             markup=False,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from islands.estimation.constraints.conditions import Constrained
 from islands.estimation.constraints.elimination import eliminate
 from islands.estimation.constraints.parts import FixedPoint, StaticGain
-from islands.estimation.constraints.static_state import StateSpace, find_static_state
+from islands.estimation.constraints.static_state import StateSpaceParameters, find_static_state
 from islands.estimation.parameter_constraints import check_latent_constraints, constraint
 from islands.models.latent import LatentModel
 
@@ -106,13 +106,13 @@ class StateSpaceConditions:
     # The parameters of a trial step may overflow.
     @np.errstate(over="ignore", invalid="ignore")
     def evaluate(
-        self, system: StateSpace, starts: Sequence[NDArray[np.float64]] | None = None
+        self, system: StateSpaceParameters, starts: Sequence[NDArray[np.float64]] | None = None
     ) -> StaticErrors | None:
         """Return the errors of the static conditions and their derivatives.
 
         Parameters
         ----------
-        system : StateSpace
+        system : StateSpaceParameters
         starts : sequence of ndarray, optional
             States near those at rest, one for each condition.
 
@@ -135,24 +135,24 @@ class StateSpaceConditions:
         finite = np.isfinite(errors).all() and np.isfinite(slopes).all()
         return StaticErrors(errors, scales, slopes, states) if finite else None
 
-    def are_met(self, system: StateSpace) -> bool:
+    def are_met(self, system: StateSpaceParameters) -> bool:
         """Return whether the parameters meet the static conditions."""
         found = self.evaluate(system)
         return found is not None and found.measure() <= _LARGEST_ERROR
 
     def correct(
         self,
-        system: StateSpace,
+        system: StateSpaceParameters,
         free: NDArray[np.bool_],
         invert: Invert,
         tolerance: float = _CLOSE,
         starts: Sequence[NDArray[np.float64]] | None = None,
-    ) -> tuple[StateSpace, StaticErrors] | None:
+    ) -> tuple[StateSpaceParameters, StaticErrors] | None:
         """Return a system that meets the static conditions, after the smallest corrections in a metric.
 
         Parameters
         ----------
-        system : StateSpace
+        system : StateSpaceParameters
         free : ndarray of bool, shape (parameters,)
             Parameters that may change.
         invert : callable
@@ -164,7 +164,7 @@ class StateSpaceConditions:
 
         Returns
         -------
-        (StateSpace, StaticErrors) or None
+        (StateSpaceParameters, StaticErrors) or None
             None if the corrections do not meet the conditions.
         """
         found = self.evaluate(system, starts)
@@ -188,14 +188,16 @@ class StateSpaceConditions:
             system, found = moved, later
         return (system, found) if found is not None and found.measure() <= _LARGEST_ERROR else None
 
-    def correct_slightly(self, system: StateSpace, tolerance: float = _CLOSE) -> NDArray[np.float64] | None:
+    def correct_slightly(
+        self, system: StateSpaceParameters, tolerance: float = _CLOSE
+    ) -> NDArray[np.float64] | None:
         """Return parameters after the smallest relative corrections; those that are zero remain so."""
         free = system.theta != 0.0
         squares = system.theta[free, None] ** 2
         found = self.correct(system, free, lambda columns: squares * columns, tolerance)
         return None if found is None else found[0].theta
 
-    def polish(self, system: StateSpace) -> NDArray[np.float64]:
+    def polish(self, system: StateSpaceParameters) -> NDArray[np.float64]:
         """Return parameters that meet the static conditions up to rounding.
 
         The parameters as they are if the corrections fail.
@@ -274,6 +276,6 @@ def meet_constraints(
     return np.array(kept).reshape(-1, model.size)
 
 
-def take_system(model: LatentModel) -> StateSpace:
+def take_system(model: LatentModel) -> StateSpaceParameters:
     """Return the parameters of a model."""
-    return StateSpace(model.layout, model.theta, model.codes)
+    return StateSpaceParameters(model.layout, model.theta, model.codes)

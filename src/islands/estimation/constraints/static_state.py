@@ -40,7 +40,7 @@ _CURVATURES: Mapping[str, Callable[[float], float]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StateSpace:
+class StateSpaceParameters:
     """Parameters of a state space with static units.
 
     Attributes
@@ -55,9 +55,9 @@ class StateSpace:
     theta: NDArray[np.float64]
     codes: NDArray[np.int64]
 
-    def with_theta(self, theta: NDArray[np.float64]) -> "StateSpace":
+    def with_theta(self, theta: NDArray[np.float64]) -> "StateSpaceParameters":
         """Return the state space with other parameters."""
-        return StateSpace(self.layout, theta, self.codes)
+        return StateSpaceParameters(self.layout, theta, self.codes)
 
 
 class StaticValue(NamedTuple):
@@ -73,14 +73,14 @@ class StaticState:
 
     Attributes
     ----------
-    system : StateSpace
+    system : StateSpaceParameters
     x : ndarray, shape (states,)
     u : ndarray, shape (inputs,)
     at : Linearised
         The system there.
     """
 
-    system: StateSpace
+    system: StateSpaceParameters
     x: NDArray[np.float64]
     u: NDArray[np.float64]
     at: Linearised
@@ -98,11 +98,11 @@ class StaticState:
         """Return the slope of the static characteristic from an input; NaN with a pole of 1."""
         linear = self.at.system
         try:
-            inverse = np.linalg.inv(np.eye(len(self.x)) - linear.a)
+            inverse = np.linalg.inv(np.eye(len(self.x)) - linear.A)
         except np.linalg.LinAlgError:
             return StaticValue(nan, 1.0)
-        through = linear.c[:, None] * inverse * linear.b[:, channel - 1]
-        direct = float(linear.d[channel - 1])
+        through = linear.C.T * inverse * linear.B[:, channel - 1]
+        direct = float(linear.D[0, channel - 1])
         return StaticValue(float(through.sum()) + direct, max(float(np.abs(through).max()), abs(direct)))
 
     def measure(self, channel: int) -> StaticValue:
@@ -116,14 +116,14 @@ class StaticState:
         """
         layout, x, u, at = self.system.layout, self.x, self.u, self.at
         of, found = layout.find_matrices(self.system.theta), np.zeros(self.system.theta.size)
-        remainder = np.eye(layout.order) - at.system.a
+        remainder = np.eye(layout.order) - at.system.A
         try:
             inverse = np.linalg.inv(remainder)
         except np.linalg.LinAlgError:
             return np.full(found.size, np.nan)
         blocks, signals = layout.split(found), np.concatenate([x, u])
         # Effect of an addition to the next states, and to the value of each unit, on the output at rest.
-        on_output = at.system.c @ inverse
+        on_output = at.system.C[0] @ inverse
         effects = on_output @ of["E"] + of["F"]
         if not channel:
             _add_products(blocks, on_output, signals, at.values)
@@ -134,7 +134,7 @@ class StaticState:
             return found
         # Changes of all signals for a unit of the input.
         unit = np.eye(layout.inputs)[channel - 1]
-        changes = np.concatenate([inverse @ at.system.b @ unit, unit])
+        changes = np.concatenate([inverse @ at.system.B @ unit, unit])
         arguments = np.hstack([of["W"], of["V"]]) @ changes
         bends = _find_curvatures(self.system.codes, at.arguments) * arguments * effects
         shifts = bends @ of["W"] @ inverse
@@ -148,7 +148,7 @@ class StaticState:
 
 
 def find_static_state(
-    system: StateSpace,
+    system: StateSpaceParameters,
     u: NDArray[np.float64],
     near: float | None = None,
     start: NDArray[np.float64] | None = None,
@@ -157,7 +157,7 @@ def find_static_state(
 
     Parameters
     ----------
-    system : StateSpace
+    system : StateSpaceParameters
     u : ndarray, shape (inputs,)
     near : float or None
         Of several states at rest, take those with the output nearest to this one; None for those that are

@@ -16,8 +16,11 @@ from islands.export import export_or_write
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.identification import Result
+from islands.facade.results.model_analysis import linearise
+from islands.facade.results.model_simulation import coupled_record_of_model
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel, coupled_signals
+from islands.models.state_space import StateSpace
 from islands.persistence.checkpoints import replace_file
 from islands.persistence.ensembles import (
     bands_document,
@@ -42,7 +45,9 @@ from islands.report.figures.names import FREE_RUN, OVERVIEW
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.coupled_statements import describe_coupled
 from islands.report.text.layout import term_table, wrap
+from islands.simulation.input_response import simulate_inputs
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
+from islands.simulation.stepper import Stepper
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import (
@@ -54,6 +59,10 @@ from islands.validation.prediction_bands import LEVEL, PredictionBand, Predictio
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from islands.models.linearisation import OperatingPoint
+    from islands.records.reading.data_frames import RecordLike
 
 #: Errors by output, part and prediction.
 _Metrics: TypeAlias = Mapping[str, Mapping[str, Mapping[str, Metrics]]]
@@ -85,17 +94,39 @@ class FittedCoupledModel:
         """Equations with the column names of the record, one line per output."""
         return self.model.equation().named
 
-    def simulate(self, record: CoupledRecord, warm_up: int | None = None) -> Simulation:
-        """Simulate all outputs of a record from its first samples.
+    def simulate(
+        self,
+        record: "RecordLike | CoupledRecord",
+        warm_up: int | None = None,
+        y: Sequence[float] | None = None,
+        states: Sequence[float] | None = None,
+    ) -> Simulation:
+        """Simulate all outputs of a record from its first samples, or inputs alone from rest.
 
         Parameters
         ----------
-        record : CoupledRecord
-            Its samples are averaged as those of the search.
+        record : CoupledRecord, Dataset, data frame or array
+            Its samples are averaged as those of the search. Without any output, as in an array of inputs, the
+            model is simulated from rest at the first inputs.
         warm_up : int, optional
             Number of samples before the first prediction; by default that of the errors of the result.
+        y, states
+            Outputs before the first sample, or states of a latent model at the first sample, from which to
+            start in place of the measured outputs.
         """
-        return free_run(self.model, record, self.warm_up if warm_up is None else warm_up)
+        data = coupled_record_of_model(self.model, record)
+        if y is None and states is None and np.isfinite(data.y).any():
+            return free_run(self.model, data, self.warm_up if warm_up is None else warm_up)
+        return simulate_inputs(self.model, data.map(lambda each: match_rate(self.model, each)), y, states)
+
+    def stepper(
+        self,
+        u: "OperatingPoint | None" = None,
+        y: Sequence[float] | None = None,
+        states: Sequence[float] | None = None,
+    ) -> Stepper:
+        """Return a simulation of one sample at a time; see `FittedModel.stepper`."""
+        return Stepper(self.model, u, y, states)
 
     def bands(
         self, record: CoupledRecord, level: float = LEVEL, warm_up: int | None = None
@@ -134,6 +165,23 @@ class FittedCoupledModel:
             each.band(data.records[place], run[:, place], runs[place], level)
             for place, each in enumerate(self.prediction_bands)
         )
+
+    def linearise(
+        self, operating_point: "OperatingPoint | None" = None, y: "ArrayLike | None" = None
+    ) -> StateSpace:
+        """Linearise the model, with the uncertainty of its ensemble; see `islands.linearise`."""
+        return linearise(self.model, operating_point, y, self._shared_ensemble)
+
+    def plot_linear(
+        self,
+        kind: str = "bode",
+        operating_point: "OperatingPoint | None" = None,
+        y: "ArrayLike | None" = None,
+    ) -> "Figure":
+        """Draw the linear system of the model about an operating point; see `FittedModel.plot_linear`."""
+        from islands.report.figures.linear_system import draw_linear_system  # noqa: PLC0415 - matplotlib
+
+        return draw_linear_system(self.linearise(operating_point, y), kind)
 
     @property
     def _shared_ensemble(self) -> Ensemble | None:

@@ -1,7 +1,7 @@
 """`FittedModel`: one model of a result, new or read from a folder, or of a model file."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +13,14 @@ from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import SearchResult
 from islands.export import export_or_write
-from islands.facade.results.model_analysis import linearise
+from islands.facade.results.model_analysis import find_rest_of_data, linearise
 from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
 from islands.facade.results.notebook_html import render_html
+from islands.models.narx import Model
 from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
+from islands.models.state_space import StateSpace
 from islands.models.sympy_expression import to_sympy
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
@@ -26,6 +28,7 @@ from islands.report.text.facts import BEFORE_REFIT, is_refitted
 from islands.simulation.input_response import StepResponse, step_response
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
+from islands.simulation.stepper import Stepper
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
@@ -34,12 +37,12 @@ from islands.validation.prediction_bands import LEVEL, PredictionBand, Predictio
 from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
-    import control
     import sympy
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from narwhals.typing import IntoSeries
 
+    from islands.models.linearisation import OperatingPoint
     from islands.records.reading.data_frames import RecordLike
 
 
@@ -158,9 +161,43 @@ class FittedModel:
         """Return the model as a SymPy equation; see `to_sympy` (extra ``sympy``)."""
         return to_sympy(self.model)
 
-    def linearise(self, operating_point: ArrayLike, y: float | None = None) -> "control.StateSpace":
-        """Linearise the model; see `islands.linearise` (extra ``control``)."""
-        return linearise(self.model, operating_point, y)
+    def linearise(
+        self, operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Linearise the model, with the uncertainty of its ensemble; see `islands.linearise`.
+
+        Parameters
+        ----------
+        operating_point, y
+            As in `islands.linearise`. By default the operating point is that of a latent model, and for a
+            NARX model of a result the middle of the range of every input in its data; of several equilibria,
+            the only one within the range of the output is taken.
+        """
+        bands = self.prediction_bands
+        data = None if bands is None else bands.data_range
+        if data is not None and isinstance(self.model, Model):
+            if operating_point is None:
+                operating_point = [0.5 * (low + high) for low, high in data.inputs]
+            if y is None:
+                y = find_rest_of_data(self.model, operating_point, data.output)
+        found = linearise(self.model, operating_point, y, None if bands is None else bands.ensemble)
+        return replace(found, output_units=(self.output_unit or found.output_units[0],))
+
+    def plot_linear(
+        self, kind: str = "bode", operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
+    ) -> "Figure":
+        """Draw the linear system of the model about an operating point, with 90 % bands if they are known.
+
+        Parameters
+        ----------
+        kind : str
+            ``bode``, ``nyquist``, ``pole-map`` or ``unit-step``.
+        operating_point, y
+            As in `linearise`.
+        """
+        from islands.report.figures.linear_system import draw_linear_system  # noqa: PLC0415 - matplotlib
+
+        return draw_linear_system(self.linearise(operating_point, y), kind)
 
     def static_characteristic(self, inputs: ArrayLike) -> NDArray[np.float64]:
         """Return the output at rest for constant inputs; see `static_characteristic`."""
@@ -304,26 +341,50 @@ class FittedModel:
         mode: str = "free-run",
         warm_up: int | None = None,
         shooting: int | None = None,
+        y: float | None = None,
+        states: Sequence[float] | None = None,
     ) -> Simulation:
-        """Simulate the model on a record.
+        """Simulate the model on a record, or on inputs alone.
 
         On the validation data, the errors of the simulation are those in `metrics`, unless the parameters
         were estimated again on all data. A free run starts as that of `predict`.
 
         Parameters
         ----------
-        record : Dataset or data frame
-            Its samples are averaged as in the search if it has the sampling time of the search's record.
+        record : Dataset, data frame or array
+            Its samples are averaged as in the search if it has the sampling time of the search's record. An
+            array, or a frame without the output, is simulated from rest at its first inputs, and every
+            sample is predicted. A list of frames has several recordings.
         mode : str
             ``one-step``, ``shooting`` or ``free-run``.
         warm_up : int, optional
             Number of samples before the first prediction; by default that of the errors in `metrics`.
         shooting : int, optional
             Steps of the model in each shooting interval; by default those of the errors in `metrics`.
+        y, states
+            Output before the first sample, or states of a latent model at the first sample, from which to
+            start in place of the measured output.
         """
         warm_up = self.warm_up if warm_up is None else warm_up
         shooting = self.shooting_interval if shooting is None else shooting
-        return simulate(self.model, record, mode, shooting, warm_up=warm_up)
+        return simulate(self.model, record, mode, shooting, warm_up=warm_up, y=y, states=states)
+
+    def stepper(
+        self,
+        u: "OperatingPoint | None" = None,
+        y: float | None = None,
+        states: Sequence[float] | None = None,
+    ) -> Stepper:
+        """Return a simulation that computes one sample at a time, for observers and controllers.
+
+        Its outputs have the bits of `simulate` on the same inputs.
+
+        Parameters
+        ----------
+        u, y, states
+            Inputs and output before the first sample, or states at the first one; see `Stepper`.
+        """
+        return Stepper(self.model, u, y, states)
 
     def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
         """Simulate the model on a record, with a band that contains a measured sample with a probability.

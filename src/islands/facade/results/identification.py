@@ -15,6 +15,7 @@ from islands.evolution.search_result import SearchResult, state_steps
 from islands.facade.results.comparison import ResultComparison, compare_models
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.notebook_html import render_html
+from islands.models.state_space import StateSpace
 from islands.progress import Steps
 from islands.report.documents.result_folder import content_sha256, result_document, write_result
 from islands.report.figures.names import OVERVIEW, RESPONSES
@@ -22,6 +23,7 @@ from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.statements import describe
 from islands.report.text.summary import summary
 from islands.simulation.predictors import Simulation
+from islands.simulation.stepper import Stepper
 from islands.validation.recommendation import Recommendation
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from narwhals.typing import IntoSeries
 
+    from islands.models.linearisation import OperatingPoint
     from islands.records.reading.data_frames import RecordLike
 
 
@@ -106,9 +109,32 @@ class Result:
         mode: str = "free-run",
         warm_up: int | None = None,
         shooting: int | None = None,
+        y: float | None = None,
+        states: Sequence[float] | None = None,
     ) -> Simulation:
-        """Simulate a record with the recommended model; see `FittedModel.simulate`."""
-        return self.best.simulate(record, mode, warm_up, shooting)
+        """Simulate a record, or inputs alone, with the recommended model; see `FittedModel.simulate`."""
+        return self.best.simulate(record, mode, warm_up, shooting, y, states)
+
+    def stepper(
+        self,
+        u: "OperatingPoint | None" = None,
+        y: float | None = None,
+        states: Sequence[float] | None = None,
+    ) -> Stepper:
+        """Return a simulation of one sample at a time; see `FittedModel.stepper`."""
+        return self.best.stepper(u, y, states)
+
+    def linearise(
+        self, operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Linearise the recommended model; see `FittedModel.linearise`."""
+        return self.best.linearise(operating_point, y)
+
+    def plot_linear(
+        self, kind: str = "bode", operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
+    ) -> "Figure":
+        """Draw the linear system of the recommended model; see `FittedModel.plot_linear`."""
+        return self.best.plot_linear(kind, operating_point, y)
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
         """Return the recommended model as text, or write it to a file; see `FittedModel.export`."""

@@ -1,63 +1,72 @@
-"""`linearise`: a model about an operating point as a linear system of python-control."""
+"""`linearise`: a model about an operating point as a linear system, with its uncertainty."""
 
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from dataclasses import replace
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from islands.distribution import describe_missing_extra
 from islands.errors import ModelError
-from islands.models.narx import require_narx
-from islands.models.operating_point import differentiate_model
-from islands.models.protocol import DynamicModel
-
-if TYPE_CHECKING:
-    import control
+from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.linearisation import OperatingPoint, find_rest, linearise_block, read_levels
+from islands.models.measured_signals import measured_block
+from islands.models.protocol import DynamicModel, no_model_error
+from islands.models.state_space import StateSpace
+from islands.validation.ensemble import Ensemble
 
 
 def linearise(
-    model: DynamicModel, operating_point: ArrayLike, y: float | None = None
-) -> "control.StateSpace":
-    """Linearise a model about an operating point, as a system of the library python-control.
+    model: AnyModel,
+    operating_point: OperatingPoint | None = None,
+    y: ArrayLike | None = None,
+    ensemble: Ensemble | None = None,
+) -> StateSpace:
+    """Linearise a model about an operating point.
 
     Parameters
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         Model with parameters.
-    operating_point : float or sequence of float
-        Constant value of every input.
-    y : float, optional
-        Output; by default the stable equilibrium at these inputs.
+    operating_point : float, sequence of float or mapping, optional
+        Constant value of every input as measured, in the order of the model or by column; by default, and for
+        columns that a mapping leaves out, the point at which an exported program of the model starts.
+    y : float or sequence of float, optional
+        Outputs there; by default the stable equilibrium.
+    ensemble : Ensemble, optional
+        Models that the data do not exclude, whose linearisations become the members of the system.
 
     Returns
     -------
-    control.StateSpace
-        Discrete system of the deviations from the operating point, in observer canonical form, with the names
-        of the columns and the sampling time of the model (True if it has none). ``control.ss2tf`` converts
-        it; ``control.bode_plot`` and ``control.step_response`` analyse it.
+    StateSpace
+        System of the deviations from the operating point, with the names and units of the columns and the
+        sampling time of the model.
 
     Raises
     ------
     ModelError
-        python-control is not installed, the model has no unique stable equilibrium and no output is given, or
-        it has a kink or a step at the operating point.
+        The model has no unique stable equilibrium at these inputs and no output is given, or it has a kink or
+        a step at the operating point.
     """
-    narx = require_narx(model)
-    try:
-        import control as library  # noqa: PLC0415 - an extra
-    except ImportError as error:
-        raise ModelError(describe_missing_extra("a linear system", "control")) from error
-    found = differentiate_model(narx, operating_point, y)
-    order = len(found.outputs)
-    direct, past = found.inputs[:, 0], found.inputs[:, 1:].T
-    matrix = np.eye(order, k=1)
-    matrix[:, 0] = found.outputs
-    return library.ss(
-        matrix,
-        past + np.outer(found.outputs, direct),
-        np.eye(1, order),
-        direct[None, :],
-        True if narx.dt is None else narx.dt,
-        inputs=list(narx.column_names),
-        outputs=[narx.output_name],
-    )
+    if not isinstance(model, DynamicModel | CoupledModel):
+        raise no_model_error(model)
+    system = model.linearise(operating_point, y)
+    members, weights = [], []
+    for each in ensemble.structures if ensemble else ():
+        for parameters in each.parameters.tolist():
+            # The states of a member may have no rest there.
+            with suppress(ModelError):
+                block = measured_block(each.model.with_parameters(parameters))
+                outputs = None if block.starts else system.operating_outputs
+                members.append(linearise_block(block, system.operating_inputs, outputs))
+                weights.append(each.weight / len(each.parameters))
+    kept = tuple(weight / sum(weights) for weight in weights)
+    return replace(system, members=tuple(members), weights=kept)
+
+
+def find_rest_of_data(
+    model: DynamicModel, operating_point: OperatingPoint, within: tuple[float, float]
+) -> list[float] | None:
+    """Return the output at rest within the range of the data, which other equilibria leave; None without."""
+    block = measured_block(model)
+    with suppress(ModelError):
+        return find_rest(block, read_levels(block, operating_point), within)
+    return None

@@ -77,7 +77,8 @@ def as_record(
     output : str
         Name of the output column.
     missing_output : bool
-        Accept missing values of the output and constant columns, for a simulation.
+        Accept missing values of the output, also of a whole output that is not named, and constant columns,
+        for a simulation.
     resting_inputs : bool
         Accept constant inputs, for a diagnosis.
     signals : sequence of str
@@ -131,7 +132,7 @@ def as_record(
             "an array holds the inputs only: give the output and the sampling time as well, (u, y, dt)"
         )
     table = _make_table(columns, (*list_inputs(inputs), output), reading)
-    if output is None:
+    if output is None and not missing_output:
         raise SettingsError(
             f"no output is given: take one of the columns {', '.join(table.names)} as output=..."
         )
@@ -145,6 +146,8 @@ def as_record(
         resting_inputs=resting_inputs,
         signals=signals,
     )
+    if output is None:
+        return record
     names = [*record.input_names, output]
     units = [
         columns.units.get(find_column(name, table.names)) or unit

@@ -20,6 +20,9 @@ CURVES = "curves"
 #: Figures of a latent model: block diagram, curves of the units, frequency response of the linear part.
 LATENT_FIGURES = ("structure", CURVES, "bode")
 
+#: Figures of the linear system of a model about an operating point, which need no record.
+LINEAR_FIGURES = ("bode", "nyquist", "pole-map", "unit-step")
+
 #: Figures of a model on its data; see `islands.report.figures.availability`.
 MODEL_FIGURES = (FREE_RUN, *LATENT_FIGURES, LOOP, "hold", "residuals")
 

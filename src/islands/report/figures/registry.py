@@ -1,6 +1,7 @@
 """Tables of the figures of a model and of the figures of a search."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from math import isfinite
 from types import MappingProxyType
 from typing import cast
@@ -15,12 +16,12 @@ from islands.models.protocol import DynamicModel
 from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.report.figures.availability import list_model_figures
-from islands.report.figures.bode import draw_bode
 from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.report.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.report.figures.hold import draw_holds
 from islands.report.figures.hysteresis_loop import draw_loop, draw_loop_panel
 from islands.report.figures.latent_structure import draw_structure
+from islands.report.figures.linear_system import draw_bode
 from islands.report.figures.names import LEAST_ISLANDS
 from islands.report.figures.record import draw_record
 from islands.report.figures.residuals import draw_residual_correlations
@@ -63,7 +64,8 @@ def _curves_on(model: DynamicModel, record: Dataset, warm_up: int, bands: Predic
 
 
 def _bode_on(model: DynamicModel, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
-    return draw_bode(_require_latent(model), record)
+    system = _require_latent(model).linearise()
+    return draw_bode(replace(system, input_units=record.input_units, output_units=(record.output_unit,)))
 
 
 def _require_latent(model: DynamicModel) -> LatentModel:

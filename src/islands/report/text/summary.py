@@ -1,8 +1,15 @@
 """Texts of a result: the summary for a terminal, and the method, which is written to a file only."""
 
+from contextlib import suppress
+
+from islands.errors import ModelError
 from islands.evolution.search_result import SearchResult
 from islands.models.equations import named_signals
+from islands.models.linearisation import find_rest
+from islands.models.measured_signals import measured_block
+from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.persistence.saved_documents import find_recommended
 from islands.report.text.certificates import summarise_certificates
 from islands.report.text.facts import Document
 from islands.report.text.latent_method import describe_latent_search, is_latent
@@ -32,6 +39,7 @@ def summary(document: Document, model: DynamicModel) -> str:
         *wrap(describe_choice(document)),
         "",
         *term_table(model),
+        *_describe_linear_part(document, model),
         "",
         *wrap(describe_units(document)),
         *(line for sentence in describe_findings(document) for line in wrap(sentence)),
@@ -40,6 +48,22 @@ def summary(document: Document, model: DynamicModel) -> str:
         LEGEND,
     ]
     return "\n".join(lines) + "\n"
+
+
+def _describe_linear_part(document: Document, model: DynamicModel) -> list[str]:
+    """State modes, dead times and gains of a NARX model in the middle of its data, if it rests there.
+
+    The equation of a latent model states those at its operating point.
+    """
+    bands = find_recommended(document)["bands"] or {}
+    if not isinstance(model, Model) or bands.get("range") is None:
+        return []
+    point = [0.5 * (low + high) for low, high in bands["range"]["inputs"]]
+    with suppress(ModelError):
+        y = find_rest(measured_block(model), point, tuple(bands["range"]["output"]))
+        system = model.linearise(point, y)
+        return wrap(f"Linear part about {system.describe_point()}: {'; '.join(system.describe())}.")
+    return []
 
 
 def method_text(found: SearchResult) -> str:

@@ -162,18 +162,31 @@ def test_simulate_averages_a_record_for_a_model_of_means(run, name):
 
 
 def test_simulate_takes_a_record_whose_output_has_its_first_values_only(run, fitted):
-    """A record to predict has no output: the message says how a free run gets its first values."""
     lines = Path("r.csv").read_text().splitlines()
-    Path("inputs.csv").write_text("\n".join(line.rpartition(",")[0] for line in lines))
-    code, _, error = run("simulate", "out", "inputs.csv", "--out", "s.csv")
-    assert code == 2
-    assert "add this column with them and leave its other cells empty" in " ".join(error.split())
     started = (line if place < 8 else line.rpartition(",")[0] + "," for place, line in enumerate(lines))
     Path("inputs.csv").write_text("\n".join(started))
     code, out, _ = run("simulate", "out", "inputs.csv", "--bands", "0.9", "--out", "s.csv")
     assert (code, "nan" in out) == (0, False)
     assert "y_um is measured in 4 of the simulated samples: too few for an error" in out
     assert np.isfinite(np.loadtxt("s.csv", delimiter=",", skiprows=4)).all()
+
+
+def test_simulate_takes_records_of_inputs_alone(run, fitted):
+    lines = Path("r.csv").read_text().splitlines()
+    for name, kept in (("one.csv", 60), ("two.csv", 40)):
+        Path(name).write_text("\n".join(line.rpartition(",")[0] for line in lines[:kept]))
+    code, _, error = run("simulate", "out", "one.csv")
+    # A model of hysteresis rests at any output.
+    assert (code, "give the output y, as --start y_um=VALUE" in " ".join(error.split())) == (2, True)
+    code, out, _ = run("simulate", "out", "one.csv", "two.csv", "--start", "y_um=0.25", "--out", "both")
+    assert code == 0
+    assert out.count("free-run from y_um = 0.25: ok") == 2
+    one, two = (np.loadtxt(f"both/{name}.csv", delimiter=",", skiprows=1) for name in ("one", "two"))
+    assert one[: len(two)].tolist() == two.tolist()
+    code, _, error = run("simulate", "out", "one.csv", "--start", "x=1")
+    assert (code, "--start x: the model has y_um" in error) == (2, True)
+    code, _, error = run("simulate", "out", "one.csv", "--bands", "0.9")
+    assert (code, "--bands need the measured output" in error) == (2, True)
 
 
 def test_the_record_of_a_system_is_written_into_a_folder_with_brackets(run):

@@ -85,7 +85,7 @@ def test_correct_knowledge_reduces_the_error_of_a_short_noisy_record():
             # The slope at another input than the stated one.
             elsewhere = replace(found, operating_inputs=(1.0,))
             true = replace(make_model(), operating_inputs=(1.0,))
-            gain, target = (each.linearise(each.rest).static_gains[0] for each in (elsewhere, true))
+            gain, target = (each.linearise().static_gain[0, 0] for each in (elsewhere, true))
             gains[constraints] += abs(gain - target)
     assert errors[text] < 0.7 * errors["none"]
     assert gains[text] < 0.7 * gains["none"]

@@ -1,10 +1,10 @@
-"""Equilibria and linearisations of models."""
+"""Equilibria of models."""
 
 import numpy as np
 import pytest
 
 import islands
-from islands.models.operating_point import differentiate_model, find_equilibrium, static_characteristic
+from islands.models.operating_point import find_equilibrium, static_characteristic
 from islands.simulation.predictors import free_run
 
 
@@ -44,30 +44,3 @@ def test_the_characteristic_is_the_end_of_a_long_free_run(system):
 def test_models_without_a_unique_equilibrium_are_named(system, message):
     with pytest.raises(islands.ModelError, match=message):
         find_equilibrium(system, [0.4])
-
-
-@pytest.mark.parametrize("system", [TANK, OUTFLOW, SATURATION])
-def test_the_error_of_the_linearisation_is_of_second_order(system):
-    level = 0.7
-    linear = differentiate_model(system, level)
-    rng = np.random.default_rng(0)
-    wave, lags = rng.normal(size=200), len(linear.outputs)
-
-    def difference(size):
-        u = level + size * wave
-        y = np.full(200, linear.y)
-        simulated = free_run(system, islands.Dataset(u, y, 1.0)).y
-        for k in range(lags, 200):
-            past = np.arange(k - 1, k - lags - 1, -1)
-            y[k] += linear.outputs @ (y[past] - linear.y) + linear.inputs[0, 1:] @ (u[past] - level)
-        return np.nanmax(np.abs(simulated - y))
-
-    assert difference(1e-3) / difference(1e-4) == pytest.approx(100.0, rel=0.1)
-    assert difference(1e-3) < 1e-4
-
-
-def test_a_kink_has_no_linearisation():
-    with pytest.raises(islands.ModelError, match=r"the term y\(k-1\)\*sign\(.* has a kink"):
-        differentiate_model(HYSTERESIS, 0.4, y=1.0)
-    with pytest.raises(islands.ModelError, match=r"the model has 1 inputs \(u\), got"):
-        differentiate_model(TANK, [0.4, 0.5])

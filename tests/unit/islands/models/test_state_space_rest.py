@@ -22,7 +22,7 @@ def test_states_at_rest_do_not_change(u):
 def test_the_linear_system_has_the_slopes_of_the_units():
     model, x, u, step = make_model(), np.array([0.7, -0.2]), np.array([0.4]), 1e-6
     at = linearise(model.matrices, model.codes, x, u)
-    for place, column in enumerate(at.system.a.T):
+    for place, column in enumerate(at.system.A.T):
         moved = x + step * np.eye(2)[place]
         after = linearise(model.matrices, model.codes, moved, u).after
         assert (after - at.after) / step == pytest.approx(column, abs=1e-6)

@@ -59,3 +59,16 @@ def test_report_of_a_folder_is_written_into_it_or_where_it_is_asked_for(command_
 def test_a_report_of_no_folder_is_an_error_with_advice(command_line):
     code, _, error = command_line("show", "nothing", "--format", "report")
     assert (code, "there is no folder nothing" in error) == (2, True)
+
+
+def test_a_linear_system_is_written_and_drawn_without_a_record(model, command_line, tmp_path):
+    code, out, _ = command_line("show", "model.json", "--format", "transfer-function", "--at", "u=2")
+    assert (code, "about u = 2" in out, "static gain of u 1" in out) == (0, True, True)
+    assert command_line("show", "model.json", "--format", "state-space", "--out", "m.m")[0] == 0
+    assert "sys = ss(A, B, C, D, -1);" in (tmp_path / "m.m").read_text()
+    with undrawn_figures():
+        assert command_line("show", "model.json", "--figure", "nyquist", "--out", "n.svg") == (0, "", "")
+    code, _, error = command_line("show", "model.json", "--at", "u=2")
+    assert (code, "--at is for the formats state-space, transfer-function" in error) == (2, True)
+    code, _, error = command_line("show", "model.json", "--format", "state-space", "--at", "u")
+    assert (code, "--at u: write NAME=VALUE" in error) == (2, True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.estimation.constraints.static_state import StateSpace, find_static_state
+from islands.estimation.constraints.static_state import StateSpaceParameters, find_static_state
 from islands.models.latent import StateSpaceLayout
 from islands.models.unit_functions import FUNCTIONS, find_codes
 from support.latent_systems import make_model
@@ -13,7 +13,7 @@ LAYOUT = StateSpaceLayout(3, 2, 3)
 
 def make_system(units, seed=0):
     theta = 0.3 * np.random.default_rng(seed).standard_normal(len(LAYOUT.names))
-    return StateSpace(LAYOUT, theta, find_codes(units))
+    return StateSpaceParameters(LAYOUT, theta, find_codes(units))
 
 
 def measure(system, u, channel):
@@ -36,12 +36,12 @@ def test_the_derivatives_are_those_of_differences(unit, channel):
 def test_the_rest_nearest_to_an_output_is_found():
     # x + 0.1 * (x - x^3): rest at -1, 0 and 1.
     model = make_model({"a1_1": 1.1, "c1": 2.0, "e1_1": -0.1, "w1_1": 1.0, "level": 5.0}, ("cube",), 1)
-    system = StateSpace(model.layout, model.theta, model.codes)
+    system = StateSpaceParameters(model.layout, model.theta, model.codes)
     rests = [find_static_state(system, np.zeros(1), near) for near in (None, 5.1, 6.8, 3.3)]
     assert [each.output.total for each in rests] == pytest.approx([5.0, 5.0, 7.0, 3.0])
 
 
 def test_an_integrator_has_neither_rest_nor_derivatives():
     model = make_model({"a1_1": 1.0, "b1": 1.0, "c1": 1.0}, (), 1)
-    system = StateSpace(model.layout, model.theta, model.codes)
+    system = StateSpaceParameters(model.layout, model.theta, model.codes)
     assert find_static_state(system, np.ones(1)) is None

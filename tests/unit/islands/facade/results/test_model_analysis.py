@@ -1,6 +1,9 @@
 """Analyses of the models of a result: equation, linear system, characteristic, step response."""
 
+import numpy as np
 import pytest
+
+import islands
 
 
 def test_a_response_is_drawn_into_the_axes_of_the_user(result):
@@ -11,3 +14,28 @@ def test_a_response_is_drawn_into_the_axes_of_the_user(result):
     assert result.best.plot_step_response(0.0, 1.0, ax=left) is figure
     assert result.best.plot_static_characteristic([0.0, 1.0], ax=right) is figure
     assert right.get_lines()[0].get_ydata() == pytest.approx(result.best.static_characteristic([0.0, 1.0]))
+
+
+def test_the_members_of_a_linear_system_are_those_of_the_ensemble(result, tmp_path):
+    system = result.linearise()
+    structures = result.search_result.ensemble.structures
+    assert len(system.members) == sum(len(each.parameters) for each in structures)
+    assert sum(system.weights) == pytest.approx(1.0)
+    low, high = system.frequency_response([0.1]).band()
+    assert (low <= high).all()
+    result.save(tmp_path, figures=())
+    again = islands.load(tmp_path).linearise()
+    assert again.A.tobytes() == system.A.tobytes()
+    assert [each.A.tobytes() for each in again.members] == [each.A.tobytes() for each in system.members]
+
+
+def test_inputs_alone_are_simulated_from_rest_as_an_array_a_frame_and_step_by_step(result):
+    u = 0.4 + 0.1 * np.sin(np.arange(30) / 4.0)
+    simulated = result.simulate(u).y
+    assert result.simulate({"u": u}).y.tobytes() == simulated.tobytes()
+    twice = result.simulate([{"u": u}, {"u": u}]).y
+    assert twice.tobytes() == np.tile(simulated, 2).tobytes()
+    stepper = result.stepper(u[0])
+    assert np.array([stepper.step(each) for each in u]).tobytes() == simulated.tobytes()
+    with pytest.raises(islands.RecordError, match="sampling time"):
+        result.simulate({"time": 7.7 * np.arange(30), "u": u})

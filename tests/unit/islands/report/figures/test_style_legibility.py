@@ -13,12 +13,12 @@ import islands
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.records.dataset import Dataset
-from islands.report.figures.bode import draw_bode
 from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
 from islands.report.figures.free_run import draw_free_run
 from islands.report.figures.hold import draw_holds
 from islands.report.figures.hysteresis_loop import draw_loop
 from islands.report.figures.latent_structure import draw_structure
+from islands.report.figures.linear_system import draw_bode
 from islands.report.figures.residuals import draw_residual_correlations
 from islands.report.figures.style import save
 from islands.report.figures.unit_curves import draw_unit_curves
@@ -82,7 +82,7 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
     "a diverging hold": lambda: draw_holds(leaking(1.01), LARGE),
     "a structure": lambda: draw_structure(LATENT),
     "curves of six units": lambda: draw_unit_curves(LATENT, WARM, LATENT.memory, further=WARMER),
-    "a frequency response": lambda: draw_bode(LATENT, WARM),
+    "a frequency response": lambda: draw_bode(LATENT.linearise()),
     "residuals": lambda: draw_residual_correlations(residual_tests(SHORT.y, SHORT.u), LONG_TITLE),
     "residuals of two inputs": lambda: draw_residual_correlations(residual_tests(TWO.y, TWO.u)),
     "residuals of a constant": lambda: draw_residual_correlations(residual_tests(SHORT.y, 0 * SHORT.u)),

@@ -1,11 +1,12 @@
-"""Frequency response of latent models as a figure."""
+"""Figures of linear systems."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from islands.records.dataset import Dataset
-from islands.report.figures.bode import draw_bode
-from support.latent_systems import SPRING, make_model, spring_record
+from islands.report.figures.linear_system import LINEAR_FIGURES, draw_bode, draw_linear_system
+from support.latent_systems import SPRING, make_model
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("without_layout")]
@@ -13,19 +14,19 @@ pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("without_layout")]
 
 def test_lines_are_the_response_up_to_the_nyquist_frequency():
     model = make_model(operating_inputs=(0.5,))
-    figure = draw_bode(model, spring_record(100))
+    figure = draw_bode(model.linearise())
     above, below = figure.axes
     frequencies, magnitude = above.lines[0].get_data()
-    response = model.linearise(model.rest).respond(frequencies * 0.01)[0]
+    response = model.linearise().respond(frequencies)[0, 0]
     assert frequencies[-1] == 50.0
     assert magnitude == pytest.approx(np.abs(response))
     phase = below.lines[0].get_ydata()
     assert np.exp(1j * np.radians(phase)) == pytest.approx(response / np.abs(response))
-    assert figure.get_suptitle() == "linear part about rest at u_V = 0.5"
+    assert figure.get_suptitle() == "linear part about u_V = 0.5"
 
 
 def test_a_resonance_is_marked_with_its_damping_ratio():
-    above, _ = draw_bode(make_model(), spring_record(100)).axes
+    above, _ = draw_bode(make_model().linearise()).axes
     assert [text.get_text() for text in above.texts] == ["5.189 Hz, damping ratio 0.162"]
     mark = above.lines[1].get_xdata()
     assert mark == pytest.approx([5.189] * 2, rel=1e-3)
@@ -37,9 +38,18 @@ def test_a_resonance_is_marked_with_its_damping_ratio():
 def test_an_input_without_an_effect_has_no_line():
     parameters = {f"{name}_1" if name in ("b1", "b2") else name: value for name, value in SPRING.items()}
     model = make_model(parameters, input_names=("u_V", "load_N"), operating_inputs=(0.0, 0.0))
-    record = Dataset(np.zeros((50, 2)), np.zeros(50), 0.01, ("u_V", "load_N"), "y_mm", ("V", "N"), "mm")
-    above, below = draw_bode(model, record).axes
+    above, below = draw_bode(model.linearise()).axes
     labels = [line.get_label() for line in above.lines if not line.get_label().startswith("_")]
     assert labels == ["y (mm) over u (V)", "y (mm) over load (N): no effect"]
     assert [line.get_label() for line in below.lines if not line.get_label().startswith("_")] == labels[:1]
     assert above.get_ylabel() == "magnitude"
+
+
+@pytest.mark.parametrize("kind", LINEAR_FIGURES)
+def test_bands_are_drawn_of_a_system_whose_uncertainty_is_known(kind):
+    system = make_model().linearise()
+    members = tuple(replace(system, B=factor * system.B, members=()) for factor in (0.8, 1.0, 1.2))
+    unsure = replace(system, members=members, weights=(1 / 3,) * 3)
+    axes = [draw_linear_system(each, kind).axes[0] for each in (system, unsure)]
+    without, with_bands = (len(each.lines) + len(each.collections) for each in axes)
+    assert with_bands > without

@@ -1,0 +1,239 @@
+"""Figures of a linear system: Bode plot, Nyquist plot, pole map and responses to unit steps."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from islands.errors import lookup
+from islands.models.state_space import StateSpace, find_resonances
+from islands.report.figures.style import (
+    FRAME,
+    REMARK,
+    blank,
+    finish,
+    house_style,
+    label,
+    set_log_scale,
+    write_plain_numbers,
+)
+
+#: Colours of the inputs, with a contrast of 3 in both colour schemes, and their line styles.
+_COLOURS = ("#d55e00", "#0072b2", "#009e73", "#8c6bb1", "#3a3a3a", "#a68c00")
+_STYLES = ("-", "--", "-.", ":")
+
+#: Distance from the ends of the axis, as a fraction, below which a mark is written inwards.
+_NEAR = 0.2
+
+#: Opacity of bands and members.
+_SHADE = 0.25
+
+#: Largest magnitude of a Nyquist plot relative to the distance 1 of the critical point; the rest of an
+#: integrator is cut off.
+_LARGEST = 10.0
+
+
+def draw_linear_system(system: StateSpace, kind: str = "bode") -> Figure:
+    """Draw a figure of a linear system; ``kind`` is a key of `LINEAR_FIGURES`."""
+    return lookup(LINEAR_FIGURES, kind, "figure")(system)
+
+
+@house_style()
+def draw_bode(system: StateSpace) -> Figure:
+    """Draw magnitude and phase from every input to every output, with 90 % bands if they are known.
+
+    The frequencies end at the Nyquist frequency. Resonances are marked with their damping ratio.
+
+    Parameters
+    ----------
+    system : StateSpace
+
+    Returns
+    -------
+    Figure
+        Two axes. A line for each input and output; none of an input without an effect.
+    """
+    response = system.frequency_response()
+    frequencies = response.points
+    figure = blank(4.2, _write_title(system))
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1))
+    set_log_scale(above)
+    above.set_xscale("log")
+    write_plain_numbers(below.xaxis)
+    banded = len(response.members) > 1
+    if banded:
+        # The phases of the members differ from that of the system by less than a turn.
+        relative = response.members / np.where(response.values == 0.0, 1.0, response.values)
+        magnitudes = response.band()
+        shifts = [np.degrees(each) for each in replace(response, members=relative).band(of=np.angle)]
+    for place, (name, output, channel) in enumerate(_list_channels(system)):
+        values, style = response.values[output, channel], _choose_style(place)
+        if not values.any():
+            above.plot([], [], color=FRAME, label=f"{name}: no effect")
+            continue
+        phase = np.degrees(np.unwrap(np.angle(values)))
+        above.plot(frequencies, np.abs(values), label=name, **style)
+        below.plot(frequencies, phase, label=name, **style)
+        if banded:
+            limits = [each[output, channel] for each in magnitudes]
+            above.fill_between(frequencies, *limits, color=style["color"], alpha=_SHADE, lw=0)
+            turned = [phase + each[output, channel] for each in shifts]
+            below.fill_between(frequencies, *turned, color=style["color"], alpha=_SHADE, lw=0)
+    below.set_xlim(frequencies[0], frequencies[-1])
+    hertz = _name_frequencies(system)
+    if not system.is_continuous:
+        _mark_resonances(above, below, find_resonances(system.poles, system.step), hertz)
+    units = {(output, unit) for output in system.output_units for unit in system.input_units}
+    above.set_ylabel(f"magnitude ({'/'.join(units.pop())})" if _have_one_quotient(units) else "magnitude")
+    above.legend(loc="best")
+    below.set_ylabel("phase (degrees)")
+    below.yaxis.set_major_locator(MaxNLocator(steps=[1, 1.5, 3, 4.5, 9, 10], nbins=6))
+    below.set_xlabel(f"frequency ({hertz})")
+    figure.align_ylabels()
+    return finish(figure)
+
+
+@house_style()
+def draw_nyquist(system: StateSpace) -> Figure:
+    """Draw the frequency response in the complex plane, with the critical point -1 and its members."""
+    response = system.frequency_response()
+    figure = blank(4.2, _write_title(system))
+    axes = figure.subplots()
+    for place, (name, output, channel) in enumerate(_list_channels(system)):
+        style = _choose_style(place)
+        for member in response.members[:, output, channel]:
+            shown = _cut(member)
+            axes.plot(shown.real, shown.imag, color=style["color"], alpha=_SHADE, lw=0.6)
+        shown = _cut(response.values[output, channel])
+        axes.plot(shown.real, shown.imag, label=name, **style)
+    axes.plot(-1.0, 0.0, "+", color=FRAME, ms=9, label="critical point")
+    axes.axhline(0.0, color=FRAME, lw=0.6)
+    axes.axvline(0.0, color=FRAME, lw=0.6)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("real part")
+    axes.set_ylabel("imaginary part")
+    axes.legend(loc="best")
+    return finish(figure)
+
+
+def _cut(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return a response without the points that would leave no room for the critical point."""
+    finite = values[np.isfinite(values)]
+    largest = _LARGEST * max(1.0, float(np.median(np.abs(finite))) if finite.size else 1.0)
+    return np.where(np.abs(values) <= largest, values, np.nan)
+
+
+@house_style()
+def draw_pole_map(system: StateSpace) -> Figure:
+    """Draw poles and zeros in the complex plane with the limit of stability, and the poles of the members."""
+    figure = blank(4.2, _write_title(system))
+    axes = figure.subplots()
+    if system.is_continuous:
+        axes.axvline(0.0, color=FRAME, lw=0.8, ls=":")
+    else:
+        turn = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361))
+        axes.plot(turn.real, turn.imag, color=FRAME, lw=0.8, ls=":")
+    if system.members:
+        poles = np.concatenate([each.poles for each in system.members])
+        axes.plot(poles.real, poles.imag, ".", color=_COLOURS[1], alpha=_SHADE, label="poles of the ensemble")
+    poles = system.poles
+    axes.plot(poles.real, poles.imag, "x", color=_COLOURS[0], label="poles")
+    if system.D.shape[0] == system.D.shape[1]:
+        zeros = system.zeros
+        axes.plot(zeros.real, zeros.imag, "o", mfc="none", color=_COLOURS[2], label="zeros")
+    axes.axhline(0.0, color=FRAME, lw=0.6)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("real part (1/s)" if system.is_continuous else "real part")
+    axes.set_ylabel("imaginary part (1/s)" if system.is_continuous else "imaginary part")
+    axes.legend(loc="best")
+    return finish(figure)
+
+
+@house_style()
+def draw_unit_step(system: StateSpace) -> Figure:
+    """Draw the responses to a unit step of every input, with 90 % bands if they are known."""
+    response = system.step_response()
+    figure = blank(3.4, _write_title(system))
+    axes = figure.subplots()
+    for place, (name, output, channel) in enumerate(_list_channels(system)):
+        style = _choose_style(place)
+        axes.step(response.points, response.values[output, channel], where="post", label=name, **style)
+        if len(response.members) > 1:
+            low, high = (each[output, channel] for each in response.band(of=np.real))
+            axes.fill_between(
+                response.points, low, high, step="post", color=style["color"], alpha=_SHADE, lw=0
+            )
+    axes.set_xlim(response.points[0], response.points[-1])
+    axes.set_xlabel("samples after the step" if system.dt is None else "time after the step (s)")
+    axes.set_ylabel("response to a unit step")
+    axes.legend(loc="best")
+    return finish(figure)
+
+
+#: Figures of a linear system by name.
+LINEAR_FIGURES: Mapping[str, Callable[[StateSpace], Figure]] = MappingProxyType(
+    {"bode": draw_bode, "nyquist": draw_nyquist, "pole-map": draw_pole_map, "unit-step": draw_unit_step}
+)
+
+
+def _write_title(system: StateSpace) -> str:
+    return f"linear part about {system.describe_point()}"
+
+
+def _list_channels(system: StateSpace) -> list[tuple[str, int, int]]:
+    """Return the label, the output and the input of every transfer function."""
+    outputs, inputs = system.D.shape
+    return [
+        (
+            " over ".join(
+                (
+                    _label_signal(system.output_names, system.output_units, output, "y"),
+                    _label_signal(system.input_names, system.input_units, channel, "u"),
+                )
+            ),
+            output,
+            channel,
+        )
+        for output in range(outputs)
+        for channel in range(inputs)
+    ]
+
+
+def _label_signal(names: Sequence[str], units: Sequence[str], place: int, otherwise: str) -> str:
+    return label(names[place], units[place] if units else "") if names else f"{otherwise}{place + 1}"
+
+
+def _choose_style(place: int) -> dict[str, Any]:
+    return {"color": _COLOURS[place % len(_COLOURS)], "ls": _STYLES[place % len(_STYLES)], "lw": 1.4}
+
+
+def _name_frequencies(system: StateSpace) -> str:
+    return "cycles per sample" if system.dt is None else "Hz"
+
+
+def _have_one_quotient(units: set[tuple[str, str]]) -> bool:
+    return len(units) == 1 and all(map(all, units))
+
+
+def _mark_resonances(above: Axes, below: Axes, resonances: Sequence[tuple[float, float]], hertz: str) -> None:
+    """Mark the frequencies of resonances in both axes, with their damping ratios above."""
+    first, last = np.log(above.get_xlim())
+    for row, (frequency, damping) in enumerate(resonances):
+        place = float((np.log(frequency) - first) / (last - first))
+        for axes in (above, below):
+            axes.axvline(frequency, color=FRAME, lw=0.8, ls=":")
+        above.annotate(
+            f"{frequency:.4g} {hertz}, damping ratio {damping:.3g}",
+            (frequency, 1.0),
+            xytext=(0, 4 + 10 * row),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="left" if place < _NEAR else "right" if place > 1.0 - _NEAR else "center",
+            fontsize=REMARK,
+            annotation_clip=False,
+        )
