@@ -10,14 +10,12 @@ import pytest
 from numpy.lib import format as npy
 
 from support.service import (
-    columns,
     csv,
     matlab_5,
     matlab_73,
     nothing_stored,
     problem_of,
     served,
-    spec,
 )
 
 #: Memory budget of the inspection process, in bytes.
@@ -139,27 +137,6 @@ def test_unusable_file_is_rejected_and_not_stored(service, case):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", ["a.npz", "a.exe", "a"])
-def test_a_text_file_is_read_whatever_its_name(service, name):
-    stored = service.upload(csv(), name)
-    assert stored.status_code == 201
-    assert service.submit(**spec(stored.json()["id"])).status_code == 202
-
-
-@pytest.mark.ci
-def test_longest_column_name_is_accepted_and_longer_ones_are_shortened(service):
-    """Messages and lists of data sets would repeat a long name many times."""
-    name = "y" * 199
-    stored = service.upload(csv().replace(b"y_um", name.encode() + b"1")).json()["id"]
-    assert service.submit(**{**spec(stored), "output": name + "1"}).status_code == 202
-    longer = csv().replace(b"y_um", name.encode() + b"12")
-    for given in ({}, {"output": "force"}, {"inputs": ["u_V"], "output": "force"}):
-        detail = problem_of(service.upload(longer, "a.csv", **given), 422, "invalid-record")
-        assert "whose name has 201 characters" in detail
-        assert len(detail) < 200
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("declared", "reason"), [(None, "a.npz unpacks to more than 1 GiB"), (1000, "a.npz")]
 )
@@ -168,14 +145,3 @@ def test_zip_bomb_is_refused_whether_its_directory_is_true_or_not(service, decla
     assert len(packed) < 3_000_000
     assert reason in problem_of(service.upload(packed, "a.npz"), 422, "invalid-record")
     assert nothing_stored(service)
-
-
-@pytest.mark.ci
-def test_decimal_comma_is_read_with_a_warning_in_the_preview(service):
-    stored = service.upload(csv(200, ";", ","), "a.csv").json()
-    assert stored["preview"]["warnings"] == [
-        "the comma in a.csv, line 2, column t_s (0,000000) is read as a decimal mark"
-    ]
-    mean = next(each["mean"] for each in stored["preview"]["columns"] if each["name"] == "u_V")
-    assert mean == pytest.approx(columns()["u_V"].mean(), abs=1e-6)
-    assert service.submit(**spec(stored["id"])).status_code == 202

@@ -134,14 +134,6 @@ def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(imp
     assert not receiving(impatient)
 
 
-def test_a_declared_length_above_the_quota_is_refused_before_the_body(service):
-    headers = service.key()
-    with started(service, headers, 6_000_000) as connection:
-        status, kind, detail, _ = answer(connection)
-    assert (status, kind) == (429, "quota-exceeded")
-    assert "this one has 5.9 MB, and 5.0 MB is the most" in detail
-
-
 def test_a_body_of_undeclared_length_ends_at_the_quota(service):
     sent = 0
     with started(service, service.key(), None) as connection:
@@ -166,17 +158,6 @@ def test_bodies_in_progress_are_on_the_disk_and_not_in_memory(service):
                 connection.sendall(block)
         eventually(lambda: sum(map(size, receiving(service))) > 3 * 4_500_000)
         assert resident_bytes() - before < 6_000_000
-    eventually(lambda: not receiving(service))
-
-
-def test_the_file_of_a_request_is_in_the_data_folder_only(service):
-    eventually(lambda: not receiving(service))
-    before = spooled()
-    with started(service, service.key(), 3_000_000) as connection:
-        connection.sendall(b"0,1,2\n" * 300_000)
-        eventually(lambda: len(receiving(service)) == 1)
-        assert set(spooled()) == {*before, *receiving(service)}
-        assert not [path for path in service.settings.blobs.glob("*") if path.is_file()]
     eventually(lambda: not receiving(service))
 
 

@@ -12,7 +12,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
-from islands.records.split import MIN_RECORDING_SAMPLES, estimation_part
+from islands.records.split import MIN_RECORDING_SAMPLES
 from islands.report.documents.extension_json import extended_document
 from support.joined_oscillator import SIGMA, oscillator_recordings
 
@@ -101,12 +101,3 @@ def test_short_recording_is_rejected() -> None:
     ):
         islands.diagnose(record, "second-order")
     assert count_fitted_samples(islands.join((first, second[:MIN_RECORDING_SAMPLES]))) == 240
-
-
-@pytest.mark.parametrize(
-    ("lengths", "expected"),
-    [((400,), 300), ((300, 100), 300), ((310, 90), 310), ((285, 115), 285), ((320, 80), 300)],
-)
-def test_holdout_part_does_not_cut_off_a_few_samples(lengths: tuple[int, ...], expected: int) -> None:
-    record = islands.join(oscillator_recordings(1, lengths))
-    assert estimation_part(record).samples == expected

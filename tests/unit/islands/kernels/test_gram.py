@@ -25,7 +25,6 @@ TEXTS = [
     "1/(2 + abs(y(k-1)))",
 ]
 TERMS = [*(regressor(parse(text))[1] for text in TEXTS), Lagged(0, 0)]
-SQUARE = np.array([(i, j) for i in range(len(TERMS)) for j in range(len(TERMS))])
 WARM_UP = 3
 
 #: Rows of the segments: a short record, whole chunks, and segments that end anywhere in a chunk.
@@ -89,15 +88,6 @@ def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
         for j, b in enumerate(psi.tolist()):
             products = [left * right for left, right in zip(a, b, strict=True)]
             assert abs(found[i, j] - math.fsum(products)) <= 1e-15 * math.fsum(map(abs, products))
-
-
-def test_all_pairs_are_computed_if_several_passes_are_needed():
-    data = record((5, 2))
-    one = products_of(TERMS, data, SQUARE)
-    repeats = (1 << 20) // len(SQUARE) + 2
-    many = products_of(TERMS, data, np.tile(SQUARE, (repeats, 1)))
-    assert many.size > 1 << 20
-    assert np.array_equal(many, np.tile(one, repeats))
 
 
 @pytest.mark.parametrize("terms", [0, 3, 4, 7])

@@ -153,15 +153,6 @@ def test_processors_with_different_features_do_not_share_a_folder(start):
     assert plain != wider
 
 
-def test_change_in_any_kernel_source_gives_another_folder(start, tmp_path):
-    package = tmp_path / "islands" / "kernels"
-    folders = []
-    for text in ("X = 1\n", "X = 2\n", "X = 1\n"):
-        (package / "inlined.py").write_text(text)
-        folders.append(get_output(start(FOLDER)))
-    assert folders[0] == folders[2] != folders[1]
-
-
 def test_checkouts_with_equal_sources_share_their_kernels(start, tmp_path):
     # The toys are a module of the package here: other kernels are stored by the path of their source.
     code = READY.replace("from toys", "from islands.kernels.toys")
@@ -270,26 +261,6 @@ def test_kernels_stay_in_memory_if_the_folder_cannot_be_created(start, tmp_path)
         assert (found["compiled"], found["value"], found["hits"]) == (True, 1.5, 0)
         assert "ISLANDS_CACHE_DIR" in found["messages"][0]
     assert not stored_kernels(tmp_path)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")
-@pytest.mark.parametrize("full", ["at first", "later"])
-def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
-    # A file size limit of zero has the effect of a full disk or quota in one process.
-    code = """if True:
-        import json, resource, sys
-        fill = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-        if sys.argv[1] == "at first":
-            fill()
-        import toys
-        from islands.kernels.jit_cache import ready
-        fill()
-        compiled = ready(lambda: toys.ratio(3.0, 2.0), lambda line: None)
-        folder = toys.cache_folder()
-        print(json.dumps([compiled, folder is None, folder is not None and (folder / "complete").exists()]))
-    """
-    assert get_output(start(code, full)) == [True, full == "at first", False]
-    assert get_output(start(READY))["compiled"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")

@@ -195,22 +195,6 @@ def same(left, right):
     return strip[0] == strip[1]
 
 
-@pytest.mark.parametrize("constrained", [False, True])
-@given(drawn=population, earlier=population)
-def test_results_do_not_depend_on_the_table_or_on_other_individuals(constrained, drawn, earlier):
-    structures, pruned = zip(*drawn, strict=True)
-    together = evaluated(structures, pruned, constrained=constrained)
-    alone = [evaluated([one], [each], constrained=constrained)[0] for one, each in drawn]
-    assert same(together, alone)
-    pairs = table()
-    evaluated(*zip(*earlier, strict=True), constrained=constrained, pairs=pairs)
-    assert same(together, evaluated(structures, pruned, constrained=constrained, pairs=pairs))
-    taken = pairs.taken[0]
-    assert taken == np.count_nonzero(pairs.keys != FREE)
-    assert same(together, evaluated(structures, pruned, constrained=constrained, pairs=pairs))
-    assert pairs.taken[0] == taken
-
-
 @given(positions, st.booleans(), st.floats(0.0, 2.0))
 def test_allowed_error_abandons_only_larger_errors(structure, pruned, share):
     (whole,) = evaluated([structure], [pruned])

@@ -6,7 +6,6 @@ import pytest
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Lagged
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK
 from islands.models.regressor import regressor
@@ -61,12 +60,6 @@ def test_every_row_of_every_segment_is_the_value_of_the_expression(signals):
     terms = [made(text) for text in TERMS]
     found = evaluated(terms, signals, first, rows, 9)
     assert np.array_equal(found, oracle([term.expression for term in terms], signals, first, rows))
-
-
-def test_term_may_read_the_present(signals):
-    target = Lagged(0, 0)
-    assert np.array_equal(evaluated([target, made("y(k-1)")], signals, [1], [500], 1)[0], signals[0, 1:501])
-    assert np.array_equal(evaluated([target], signals, [0], [500], 0)[0], signals[0, :500])
 
 
 @pytest.mark.parametrize("name", [name for name in PRIMITIVES if name not in ("phi1", "phi2")])

@@ -11,14 +11,10 @@ from islands.kernels import simd
 from islands.kernels.simd import (
     VECTOR,
     address,
-    any_outside,
     fold,
     gather,
     load,
-    outer,
-    outer_upper,
     read,
-    repeat,
     store,
     write,
 )
@@ -79,26 +75,6 @@ def gathered(x, a, b, c, d, out):
 
 
 @njit
-def repeated(x, out):
-    store(out, 0, repeat(load(x, 0, 1)))
-
-
-@njit
-def products(x, y, whole, upper):
-    store(whole, 0, outer(load(x, 0, 4), load(y, 0, 4)))
-    store(upper, 0, outer_upper(load(x, 0, 4)))
-
-
-@cache
-def bounded(count):
-    @njit
-    def run(x, bound):
-        return any_outside(load(x, 0, count), bound)
-
-    return run
-
-
-@njit
 def folded(x):
     return fold(load(x, 0, 1))
 
@@ -132,20 +108,6 @@ def test_gathered_vectors_start_at_the_offsets():
     assert out.tolist() == [*range(3, 11), *range(50, 58), *range(8), *range(17, 25)]
 
 
-@given(st.data())
-def test_outer_products_are_ordered_row_by_row(data):
-    x, y = data.draw(rows(4, 2))
-    whole, upper, four = np.empty(128), np.empty(80), np.empty(32)
-    products(x, y, whole, upper)
-    repeated(x, four)
-    with np.errstate(all="ignore"):
-        one, other = x.reshape(4, 1, 8), y.reshape(1, 4, 8)
-        assert same(whole, (one * other).reshape(-1))
-        squares = (one * x.reshape(1, 4, 8))[np.triu_indices(4)]
-        assert same(upper, squares.reshape(-1))
-    assert same(four, np.tile(x[:8], 4))
-
-
 @given(rows(1, 1))
 def test_fold_adds_halves_until_one_value_is_left(drawn):
     (x,) = drawn
@@ -153,14 +115,6 @@ def test_fold_adds_halves_until_one_value_is_left(drawn):
         a, b, c, d = x[:4] + x[4:]
         expected = (a + c) + (b + d)
     assert same(np.array([folded(x)]), np.array([expected]))
-
-
-@pytest.mark.parametrize("count", COUNTS)
-@given(st.data())
-def test_any_outside_finds_a_lane_outside_the_bounds(count, data):
-    (x,) = data.draw(rows(count, 1))
-    bound = data.draw(st.floats(0.0, allow_nan=False))
-    assert (bounded(count)(x, bound) != 0) == (not np.all(np.abs(x) <= bound))
 
 
 @pytest.mark.parametrize("move", [moved, moved_by_address], ids=["offset", "address"])

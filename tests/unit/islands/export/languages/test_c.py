@@ -14,7 +14,6 @@ from islands.errors import ModelError
 from islands.export import export
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
-from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from lab.speed.compiled_c import compile_model
@@ -81,15 +80,6 @@ def test_simulate_does_not_write_outside_its_range(samples, folder):
     written = slice(3, max(samples, 3))
     assert np.delete(y, written).tolist() == np.delete(np.arange(1.0, 9.0), written).tolist()
     assert not np.isin(y[written], np.arange(1.0, 9.0)).any()
-
-
-@pytest.mark.ci
-@needs_compiler
-@pytest.mark.parametrize("name", HOSTILE_NAMES)
-def test_a_column_name_cannot_break_the_file(name, folder):
-    exported = islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name)
-    data = Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
-    assert run_c(exported, data, folder).tolist() == [0.5, 2.0]
 
 
 @pytest.mark.parametrize("kind", ["c", "matlab"])

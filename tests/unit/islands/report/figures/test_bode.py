@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.records.dataset import Dataset
 from islands.report.figures.bode import draw_bode
-from support.latent_systems import SPRING, make_model, spring_record
+from support.latent_systems import make_model, spring_record
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("without_layout")]
@@ -32,14 +31,3 @@ def test_a_resonance_is_marked_with_its_damping_ratio():
     frequencies, magnitude = above.lines[0].get_data()
     # Damping moves the peak of the magnitude below the frequency of the mode.
     assert frequencies[magnitude.argmax()] == pytest.approx(5.189, rel=0.1)
-
-
-def test_an_input_without_an_effect_has_no_line():
-    parameters = {f"{name}_1" if name in ("b1", "b2") else name: value for name, value in SPRING.items()}
-    model = make_model(parameters, input_names=("u_V", "load_N"), operating_inputs=(0.0, 0.0))
-    record = Dataset(np.zeros((50, 2)), np.zeros(50), 0.01, ("u_V", "load_N"), "y_mm", ("V", "N"), "mm")
-    above, below = draw_bode(model, record).axes
-    labels = [line.get_label() for line in above.lines if not line.get_label().startswith("_")]
-    assert labels == ["y (mm) over u (V)", "y (mm) over load (N): no effect"]
-    assert [line.get_label() for line in below.lines if not line.get_label().startswith("_")] == labels[:1]
-    assert above.get_ylabel() == "magnitude"
