@@ -168,6 +168,7 @@ def test_selected_jobs_are_deleted_after_a_confirmation(
     assert {job["id"] for job in desk.ask("GET", "/v1/jobs").json()["items"]} == {ended[2], waiting}
 
 
+@pytest.mark.nightly
 def test_selected_jobs_are_cancelled_and_compared(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:

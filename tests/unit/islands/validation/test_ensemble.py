@@ -164,7 +164,7 @@ def test_noise_of_initial_outputs_does_not_exclude_the_law_of_a_slow_process():
     assert sum(lost) >= 3
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_terms_of_a_recommended_law_are_certain():
     """y(k-1) had a probability of 0.50, because y(k) = 0.73 y(k-3) + ... is the same law."""
     found = fit(first_order(0.02, 1))

@@ -31,7 +31,7 @@ def summarise(found: Diagnosis) -> str:
     return DiagnosisResult.from_diagnosis(found).summary
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis: Diagnosis) -> None:
     # Without an extension, the equations of the terms are all that is known.
     as_cause = replace(diagnosis, verdict=Verdict.DISCOVERED, discovery=EQUATIONS, trial=None)
