@@ -9,6 +9,12 @@ from support.processes import eventually
 from support.service import problem_of, queued
 
 
+@pytest.fixture(scope="module")
+def shared(serve):
+    with serve(require_keys=True, rate=0.0, max_active=3, max_running_islands=5) as running:
+        yield running
+
+
 @pytest.fixture
 def admin(service):
     return service.key("admin", owner="operator")

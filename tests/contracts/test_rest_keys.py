@@ -83,6 +83,12 @@ GUARDED = {
 OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
 
 
+@pytest.fixture(scope="module")
+def shared(serve):
+    with serve(require_keys=True, rate=0.0, max_active=3, max_stored=20_000) as running:
+        yield running
+
+
 def send_request(service, method, path, headers):
     """Send a request, with a body if the route needs one."""
     ids = dict.fromkeys(("job", "dataset", "webhook", "monitor", "fmu"), "0" * 32)

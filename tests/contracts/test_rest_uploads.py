@@ -20,6 +20,13 @@ from support.service import csv, problem_of
 START = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\nt_s,u_V,y_um\r\n'
 
 
+@pytest.fixture(scope="module")
+def shared(serve):
+    limits = {"max_uploads": 3, "max_uploads_per_owner": 2, "max_stored": 5_000_000, "max_upload": 9_000_000}
+    with serve(require_keys=True, rate=0.0, **limits) as running:
+        yield running
+
+
 @pytest.fixture
 def impatient(service):
     """The service with short times for a body."""

@@ -18,7 +18,6 @@ from islands.expressions.parsing import parse
 from islands.kernels.summation import total
 from islands.models.narx import make_model
 from islands.records.dataset import Dataset, join
-from islands.simulation.layout import WIDTHS, layout
 from islands.simulation.linked import LinkedModel
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 
@@ -150,22 +149,6 @@ def test_functions_of_the_mathematical_library_agree_to_rounding():
     for interval in (1, 20, None):
         found, expected = multiple_shooting(chosen, data, interval).y, recursion(chosen, data, interval)
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.ci
-@every_model
-@pytest.mark.parametrize("interval", [1, 7, None])
-@pytest.mark.parametrize("width", WIDTHS)
-def test_result_does_not_depend_on_the_block_width(monkeypatch, name, interval, width):
-    data = record(MODELS[name])
-    usual = multiple_shooting(MODELS[name], data, interval)
-    assert usual.outcome
-    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (width,))
-    layout.cache_clear()
-    assert layout(data, MODELS[name].maximum_lag, interval).width == width
-    other = multiple_shooting(MODELS[name], data, interval)
-    assert equal_bits(usual.y, other.y)
-    assert usual.mean_squared_error == other.mean_squared_error
 
 
 # One-step-ahead prediction and free run as special cases.

@@ -178,22 +178,6 @@ def test_misconfigured_role_ends_all_roles_and_the_supervisor(supervised: Start)
     assert running.order("signalled", "end") == ["work signalled", "work end"]
 
 
-def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: Start) -> None:
-    """For example the API whose last key has expired: jobs continue."""
-    script = (
-        "count = open(os.environ['JOURNAL']).read().count('api start')\n"
-        "if count in (1, 2): note('start'); sys.exit(2)\n"
-        "stay()"
-    )
-    running = supervised(role("api", script), role("work"), _FIRST_BACKOFF=0.05)
-    running.started(1, "work")
-    os.kill(running.started(1, "api")[0][3], signal.SIGKILL)
-    running.started(4, "api")
-    assert len(running.entries("start", "work")) == 1
-    assert running.end().count("api ended (2): it is started again") == 2
-    assert running.process.returncode == 0
-
-
 @pytest.mark.parametrize("heartbeat", ["heartbeat(); ", ""])
 def test_role_that_always_fails_at_its_start_ends_the_supervisor(supervised: Start, heartbeat: str) -> None:
     """A coordinator sends heartbeats before its first error."""

@@ -7,7 +7,7 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.kernels.gram import gram, gram_of_residual, inner_products
+from islands.kernels.gram import gram, gram_of_residual
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
@@ -47,12 +47,6 @@ def record(rows, seed=7):
     return arrange_rows(signals, list(zip(begin[:-1] + WARM_UP, rows, strict=True)), WARM_UP)
 
 
-def products_of(terms, rows, pairs):
-    out = np.full(len(pairs), np.nan)
-    inner_products(link(terms), rows, np.asarray(pairs), out)
-    return out
-
-
 def gram_of(terms, rows):
     out = np.full((len(terms), len(terms)), np.nan)
     gram(link(terms), rows, out)
@@ -63,14 +57,6 @@ def columns_of(terms, rows):
     out = np.empty((len(terms), rows.count))
     columns(link(terms), rows, out)
     return out
-
-
-@pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
-@pytest.mark.parametrize("rows", ROWS)
-def test_inner_products_of_some_pairs_equal_the_gram_matrix(rows, terms):
-    square = np.array([(i, j) for i in range(len(terms)) for j in range(len(terms))])
-    some = products_of(terms, record(rows), square[::-1])[::-1]
-    assert np.array_equal(some.reshape(len(terms), len(terms)), gram_of(terms, record(rows)))
 
 
 @pytest.mark.parametrize("rows", ROWS)

@@ -126,14 +126,6 @@ def stored_kernels(folder: Path) -> set[str]:
     return {path.name.split("-")[0] for path in folder.rglob("*.nbc")}
 
 
-def test_kernels_are_stored_in_the_chosen_folder_only(start, tmp_path):
-    found = get_output(start(READY))
-    folder = Path(found["folder"])
-    assert folder.parent == tmp_path / "cache" / "kernels"
-    assert stored_kernels(folder) == stored_kernels(tmp_path) == {"toys.ratio"}  # half is called by it alone
-    assert [path.parent.parent for path in tmp_path.rglob("*.nbi")] == [folder]
-
-
 @pytest.mark.parametrize("kind", ["start", "start_new"])
 def test_second_process_loads_the_kernels_of_the_first_silently(request, kind):
     start = request.getfixturevalue(kind)
@@ -178,25 +170,6 @@ def test_folder_of_another_version_is_deleted_after_a_month_without_use(start, t
     assert old.exists()  # only a process that compiles deletes folders
     get_output(start(READY))
     assert old.exists() == (days < 30)
-
-
-@pytest.mark.parametrize("users", ["", "theirs"])
-def test_numba_cache_dir_applies_to_other_functions(start, tmp_path, users):
-    chosen = str(tmp_path / users) if users else ""
-    (tmp_path / "other.py").write_text("import numba\n@numba.njit(cache=True)\ndef other(x):\n    return x\n")
-    code = """if True:
-        import json, numba, toys
-        from other import other
-        other(1.0), toys.ratio(1.0, 2.0)
-        settings = [toys.set_before, numba.config.CACHE_DIR]
-        print(json.dumps([*settings, other.stats.cache_path, str(toys.cache_folder())]))
-    """
-    before, after, theirs, ours = get_output(start(code, **({"NUMBA_CACHE_DIR": chosen} if users else {})))
-    assert before == after == chosen
-    assert Path(theirs).is_relative_to(chosen or tmp_path / "__pycache__")
-    assert stored_kernels(Path(theirs)) == {"other.other"}
-    assert stored_kernels(Path(ours)) == {"toys.ratio"}
-    assert Path(ours).is_relative_to(tmp_path / "cache")
 
 
 def test_concurrent_saves_lose_and_mix_nothing(start, tmp_path):

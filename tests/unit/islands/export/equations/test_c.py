@@ -207,3 +207,15 @@ def test_maps_act_in_the_order_of_the_simulation(names, folder):
         compare(run_c(spec, record, folder), expected)
         outputs.append(expected)
     assert np.ptp(outputs[0] - outputs[1]) > 1e-3 * np.ptp(outputs[0])
+
+
+@needs_compiler
+@pytest.mark.parametrize("unit", ["*/ int broken = ;", "/* u", "\n#error", "\\\n", "µ°??/\n"])
+def test_a_name_or_unit_cannot_break_the_file(unit, folder):
+    spec, record = make_example("second-order")
+    document = json.loads(spec.model_dump_json())
+    document["name"] = f"{unit} {'long ' * 8}{unit}"
+    document["parameters"]["m"]["unit"] = unit
+    extended, expected = extend(make_simulator(OdeSpec.model_validate(document), record), record)
+    compare(run_c(extended, record, folder), expected)
+    assert export_extended(extended, "matlab").isascii()
