@@ -63,11 +63,6 @@ def test_the_stated_defaults_are_those_of_the_commands(page: str) -> None:
         assert value in (parameter.default, parameter.show_default), (name, option)
 
 
-def test_a_wrong_option_is_found() -> None:
-    command, rest = find_command(shlex.split("islands jobs submit piezo.csv --input u_V --outputs y_um"))
-    assert set(used_options(rest)) - option_names(command) == {"--outputs"}
-
-
 class ScriptCommand(NamedTuple):
     """Command that runs a script or tests of the repository."""
 

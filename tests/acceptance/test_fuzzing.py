@@ -3,7 +3,6 @@
 import io
 import subprocess
 import sys
-import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +14,6 @@ import pytest
 
 from islands.errors import RecordError
 from islands.records.reading import read_record
-from support.fuzzing import corpus, mutate, run_cases
 from support.odd_files import write_workbook
 from support.repository import ROOT
 
@@ -73,27 +71,3 @@ def test_a_damage_that_libraries_do_not_expect_is_refused(
     write(tmp_path / name)
     with pytest.raises(RecordError, match=r"damaged|write it again|save it again"):
         read_record(tmp_path / name, ["u_V"], "y_um")
-
-
-def test_a_case_is_the_same_at_every_run() -> None:
-    for suffix in (".csv", ".npz", ".xlsx", ".mat"):
-        cases = [mutate(suffix, SEED, case) for case in range(40)]
-        corpus.cache_clear()
-        time.sleep(0.01 if suffix == ".csv" else 1.1)  # formats have the time of writing in seconds
-        assert cases == [mutate(suffix, SEED, case) for case in range(40)]
-        assert len(set(cases)) > 30
-
-
-def test_another_exception_than_a_refusal_is_a_defect(tmp_path: Path) -> None:
-    def read(path: Path) -> None:
-        content = path.read_bytes()
-        if len(content) % 3 == 0:
-            raise RecordError("r.csv is damaged")
-        if len(content) % 3 == 1:
-            raise ValueError("planted")
-
-    found = list(run_cases(read, ".csv", SEED, range(30), tmp_path))
-    sizes = [len(mutate(".csv", SEED, case)) % 3 for case in range(30)]
-    assert [defect is not None for defect in found] == [size == 1 for size in sizes]
-    assert all("planted" in defect.reason for defect in found if defect is not None)
-    assert {0, 1, 2} == set(sizes)

@@ -160,12 +160,6 @@ def test_two_effects_are_both_named(pair: tuple[str, str]) -> None:
     assert are_both_named(found), found
 
 
-@pytest.mark.nightly
-def test_two_effects_are_both_named_in_a_short_record() -> None:
-    found = run("thermal-drift", "dead-zone", band=(1.0, 4.0), seconds=8.0)
-    assert are_both_named(found), found
-
-
 @pytest.mark.ci
 def test_two_effects_are_both_named_with_a_recorded_output() -> None:
     found = run("coulomb-friction", "periodic-disturbance", band=(1.0, 3.0), core="column", seconds=6.0)

@@ -65,35 +65,5 @@ def test_no_file_installs_the_project_by_name():
     assert found == composed
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "pip install 'islands[service]'",
-        "pip install --upgrade islands",
-        "RUN /opt/islands/bin/pip install --no-deps islands",
-        "uv pip install islands-sysid==0.2.0",
-        "uv tool install islands_sysid",
-        "(`pip install islands`).",
-        "install islands[fmi] to simulate an FMU",
-        "| `islands-sysid[service,oidc]` |",
-    ],
-)
-def test_an_installation_by_name_is_found(text):
-    assert BY_NAME.search(text)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "pip install 'dist/islands_sysid-0.2.0-py3-none-any.whl[all]'",
-        '/opt/islands/bin/pip install --no-deps "$(echo "$PWD"/dist/islands_sysid-*.whl)"',
-        "python3 deploy/packages/install.py /opt/islands --extra server",
-        "archipelago.islands[index]",
-    ],
-)
-def test_an_installation_of_a_file_is_allowed(text):
-    assert not BY_NAME.search(text)
-
-
 def test_the_distribution_has_the_name_and_the_version_of_the_project():
     assert (NAME, islands.__version__) == (PROJECT["name"], PROJECT["version"])

@@ -244,14 +244,6 @@ def test_every_secret_file_of_a_setting_is_mounted(objects):
     assert checked == 5
 
 
-def test_the_coordinators_connect_to_the_head_of_the_ray_cluster(objects):
-    (cluster,) = (each for each in objects if each["kind"] == "RayCluster")
-    (settings,) = (each["data"] for each in objects if each["kind"] == "ConfigMap")
-    (head,) = cluster["spec"]["headGroupSpec"]["template"]["spec"]["containers"]
-    ports = {port["name"]: port["containerPort"] for port in head["ports"]}
-    assert settings["ISLANDS_RAY_ADDRESS"] == f"{cluster['metadata']['name']}-head-svc:{ports['gcs']}"
-
-
 def test_the_guide_of_kubernetes_creates_every_secret():
     guide = (ROOT / "docs/how-to/deploy-on-kubernetes.md").read_text()
     for entry in read(KUBERNETES / "kustomization.yaml")["secretGenerator"]:

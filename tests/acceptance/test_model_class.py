@@ -6,8 +6,6 @@ import pytest
 import islands
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import ModelError
-from islands.export import export
-from islands.simulation.predictors import free_run
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
 from support.command_line import succeed
@@ -59,29 +57,6 @@ def test_a_band_contains_new_samples_with_its_probability(result):
     known = ~np.isnan(band.y)
     inside = (band.lower <= fresh.y) & (fresh.y <= band.upper)
     assert 0.85 <= inside[known].mean() <= 0.95
-
-
-def test_equations_have_the_values_of_the_parameters(record):
-    model = model_of(record)
-    assert export(model, "plain").splitlines() == [
-        "y(k) = x1(k) + 10",
-        "x1(k) = 0.9*x1(k-1) + (1 - 0.9)*(2 - 0.4*u(k-1))*u(k-1)",
-    ]
-    assert "x_{1,k-1}" in export(model, "latex")
-    assert "<mi>x</mi><mrow><mn>1</mn><mo>,</mo><mi>k</mi>" in export(model, "mathml")
-
-
-def test_a_model_of_deviations_reads_the_record_as_measured(record):
-    centred = islands.preprocess(record, detrend="constant")
-    model = islands.fit(centred, model="gain-scheduled").best.model
-    assert model.preprocessing.output_offset == pytest.approx(record.y.mean())
-    error = (free_run(model, record).y - record.y)[1:]
-    assert np.sqrt(np.mean(error**2)) < 0.1
-    module, program = {}, export(model, "python")
-    assert f"where y is the deviation from {model.preprocessing.output_offset:.8g} K" in program
-    exec(program, module)
-    found = module["simulate"](record.u[:, 0].tolist(), record.y[:1].tolist())
-    np.testing.assert_allclose(found[1:], free_run(model, record).y[1:], rtol=1e-12)
 
 
 def test_a_damaged_file_names_the_class(record, tmp_path):

@@ -71,17 +71,6 @@ def test_every_command_runs_and_the_shown_outputs_are_those_of_the_commands(tmp_
         subprocess.run([sys.executable, "program.py"], check=True, timeout=120)
 
 
-def test_a_shown_output_is_an_excerpt_of_that_of_its_command() -> None:
-    page = "Try\n\n    islands diagnose a.csv  # now\n\n```text\n{}```\n\nEnd\n"
-    output = "In short\n\nIt lacks 2\n    of 3.\nSo it\n  goes on\nOn the 2nd\n  half\nEnd\n"
-    old = page.format("It lacks 1.\nOn the first half\n")
-    assert update(old, lambda _: output) == page.format(
-        "It lacks 2\n    of 3.\n...\nOn the 2nd\n  half\n...\n"
-    )
-    with pytest.raises(ValueError, match="the output has no paragraph"):
-        update(page.format("No such line\n"), lambda _: output)
-
-
 def check_first_model(page: Path) -> None:
     """Compare the record and the program of a page with those in the current folder."""
     record, *_ = (code for language, code in pages.blocks(page) if language == "text")

@@ -5,8 +5,6 @@ Writing environment variables is allowed: it configures libraries and child proc
 
 import ast
 
-import pytest
-
 from support.repository import ROOT
 
 READER = "services/islands_service/settings.py"
@@ -49,33 +47,3 @@ def _write_targets(statement):
 
 def test_only_the_settings_module_reads_the_environment():
     assert [path for path in SOURCES if reads((ROOT / path).read_text())] == [READER]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "import os\nos.environ['A']",
-        "import os\nx = os.environ.get('A')",
-        "import os\nx = os.environ.setdefault('A', 'b')",
-        "import os\nx = {**os.environ}",
-        "import os\ny['A'] = os.environ['A']",
-        "import os as o\no.getenv('A')",
-        "from os import environ",
-        "from os import getenv as get",
-        "import os\ngetattr(os, 'environ')",
-    ],
-)
-def test_environment_reads_are_detected(text):
-    assert reads(text)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "import os\nos.environ['A'] = 'b'",
-        "import os\nos.environ.setdefault('A', 'b')",
-        "import os\nos.getpid()",
-    ],
-)
-def test_environment_writes_are_not_reads(text):
-    assert not reads(text)

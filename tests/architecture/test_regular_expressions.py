@@ -4,29 +4,11 @@ Texts come from users: cells and names of files, options, headers of requests.
 """
 
 import ast
-import re
 
 import pytest
 
-from support.regular_expressions import FOLDERS, Expression, find_slow_text, list_expressions
+from support.regular_expressions import FOLDERS, find_slow_text, list_expressions
 from support.repository import ROOT
-
-
-@pytest.mark.parametrize(
-    ("pattern", "method"),
-    [
-        (r"\d+([.,])?\d*", "fullmatch"),
-        (r"(\w+)+!", "match"),
-        (r"\s*(\S)!", "search"),
-        (r",(?![^\[]*\])", "split"),
-        (r"(?:a|b|ab)*c", "fullmatch"),
-        (rb"<.*>", "sub"),
-        (r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]", "fullmatch"),
-        (r"(?i:.*(?:time|age))(?:_.*)?", "fullmatch"),
-    ],
-)
-def test_an_expression_that_backtracks_is_found(pattern: str, method: str) -> None:
-    assert find_slow_text(Expression("", re.compile(pattern), frozenset({method})))
 
 
 def test_expressions_of_the_readers_take_linear_time() -> None:

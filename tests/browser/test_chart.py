@@ -90,13 +90,6 @@ def test_every_series_has_its_line_and_its_last_value_in_the_legend(page: Any) -
     assert chart.locator(".legend data").last.get_attribute("value") == "1.5"
 
 
-def test_a_line_is_interrupted_at_missing_or_nonpositive_values(page: Any) -> None:
-    points = [[0, 1.0], [1, None], [2, 0.1], [3, 0.0], [4, 0.01], [5, -1.0]]
-    parts = get_lines(draw(page, [make_series("a", points)], **LOG))["a"]
-    assert [len(part) for part in parts] == [1, 1, 1]
-    assert all(math.isfinite(each) for part in parts for point in part for each in point)
-
-
 def test_arrow_keys_move_the_pointer_and_announce_the_values(page: Any) -> None:
     series = [make_series("a", [[at, 1.0 / (at + 1)] for at in range(0, 50, 5)])]
     plot = draw(page, series, **LOG).get_by_role("slider", name="Errors")
@@ -117,15 +110,6 @@ def test_the_name_of_a_series_is_not_interpreted_as_markup(page: Any) -> None:
     chart = draw(page, [make_series(name, [[0, 1.0], [1, 2.0]])])
     assert chart.locator(".legend li").text_content() == f"{name} 2.00"
     assert page.locator("img[src=x]").count() == 0
-
-
-def test_downsampling_keeps_the_ends_and_the_extremes(page: Any) -> None:
-    values = [math.sin(at / 300) for at in range(10_000)]
-    values[4321], values[8765] = 50.0, -50.0
-    places = call(page, "components/chart_drawing.js", "downsample", values, 100)
-    assert len(places) <= 2 * 100 + 2
-    assert {0, 4321, 8765, 9999} <= set(places)
-    assert places == sorted(set(places))
 
 
 @pytest.mark.parametrize(

@@ -166,19 +166,3 @@ def test_selected_jobs_are_deleted_after_a_confirmation(
     expect(bar).to_be_hidden()
     assert set(shown(page)) == {ended[2], waiting}
     assert {job["id"] for job in desk.ask("GET", "/v1/jobs").json()["items"]} == {ended[2], waiting}
-
-
-def test_selected_jobs_are_cancelled_and_compared(
-    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
-) -> None:
-    ended = [end(desk, desk.submit(500, name=f"ended {number}")) for number in range(2)]
-    waiting = [desk.submit(500, name=f"waiting {number}") for number in range(2)]
-    page = quiet(desk.url).go()
-    page.get_by_role("checkbox", name="Select all jobs of this page").check()
-    bar = page.get_by_role("group", name="Selected jobs")
-    compare = bar.get_by_role("link", name="Compare").get_attribute("href")
-    assert set(compare.removeprefix("#/compare?jobs=").split(",")) == set(ended)
-    bar.get_by_role("button", name="Cancel 2 jobs").click()
-    for job in waiting:
-        expect(row(page, job).locator(".state")).to_have_text("cancelled")
-    assert {desk.job(job)["state"] for job in waiting} == {"cancelled"}

@@ -94,17 +94,3 @@ def test_the_page_of_a_job_continues_after_a_broken_stream(
     eventually(lambda: [count_segments(parts) for parts in get_lines(chart).values()] == [150, 150])
     shown = page.locator(".convergence figure.chart data").first.get_attribute("value")
     assert float(shown) == pytest.approx(squared_error(150, 0) ** 0.5)
-
-
-@pytest.mark.nightly
-def test_the_page_recovers_automatically_from_a_killed_service(
-    screens: Callable[..., Screen], desk: Service, expect: Any
-) -> None:
-    job = desk.submit(500)
-    page = screens(desk.url).go(f"#/jobs/{job}")
-    expect(page.locator(".title .state")).to_have_text("queued")
-    kill(desk.one("api"))
-    desk.ready()
-    with stored(desk) as store:
-        advance(store, taken(store, job), 0, 7)
-    expect(page.locator(".status .progress-text")).to_have_text("7 / 500")

@@ -4,10 +4,15 @@ from contextlib import ExitStack
 
 import pytest
 
-from islands_api.admin_schemas import CreatedKey, KeyPage, KeyView, OwnerPage, OwnerView
+from islands_api.admin_schemas import CreatedKey, KeyPage, KeyView
 from support.processes import eventually
-from support.service import kept, problem_of, queued, spec
-from support.stores import claimed
+from support.service import problem_of, queued
+
+
+@pytest.fixture(scope="module")
+def shared(serve):
+    with serve(require_keys=True, rate=0.0, max_active=3, max_running_islands=5) as running:
+        yield running
 
 
 @pytest.fixture
@@ -64,21 +69,6 @@ def test_invalid_key_is_refused(service, admin, body, kind):
     before = service.store.keys.all()
     problem_of(service.client.post("/v1/admin/keys", json=body, headers=admin), 422, kind)
     assert service.store.keys.all() == before
-
-
-def test_owners_are_listed_with_their_quotas_and_use(service, admin, change):
-    dataset = kept(service.store, "me")
-    for _ in range(2):
-        queued(service.store, "me", spec=spec(dataset))
-    claimed(service.store)
-    assert change(weight=250, max_running=0).status_code == 200
-    answer = service.client.get("/v1/admin/owners", headers=admin)
-    me, operator = OwnerPage.model_validate(answer.json()).items
-    assert (operator.name, operator.weight, operator.queued) == ("operator", 100, 0)
-    assert me == OwnerView(
-        name="me", weight=250, max_running=0, queued=1, running=1, running_islands=1, stored=7
-    )
-    assert service.client.get("/v1/admin/owners/me", headers=admin).json() == answer.json()["items"][0]
 
 
 @pytest.mark.parametrize(

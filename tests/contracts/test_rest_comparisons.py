@@ -6,7 +6,7 @@ from islands_api.client import Client
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.store.blobs import Blobs
 from support.job_runs import make_run
-from support.service import csv, problem_of
+from support.service import csv
 from support.stores import LONG, taken
 
 pytestmark = pytest.mark.ci
@@ -43,10 +43,6 @@ def jobs(service, tmp_path):
     return found
 
 
-def ask(service, *models):
-    return service.client.get("/v1/comparisons/report", params={"model": models})
-
-
 def test_models_of_two_jobs_are_compared_in_one_file(service, jobs):
     first, second = jobs
     with Client(service.url, timeout=PATIENCE) as client:
@@ -62,12 +58,3 @@ def test_models_of_two_jobs_are_compared_in_one_file(service, jobs):
     assert '<th scope="row">seed</th><td>1</td><td>2</td><td>2</td>' in settings
     # The free run of the model that is not recommended is kept for the next request.
     assert service.store.results.artefact(second.id, f"{other}/free-run.json")
-
-
-def test_models_that_are_missing_or_equal_are_refused_with_advice(service, jobs):
-    first, second = (job.id for job in jobs)
-    assert "given twice" in problem_of(ask(service, first, second, first), 422, "invalid-settings")
-    assert "no model 99" in problem_of(ask(service, first, f"{second}:99"), 404, "not-found")
-    problem_of(ask(service, first, "0" * 32), 404, "no-such-job")
-    for models in ([first], [f"{first}:{rank}" for rank in range(1, 8)]):
-        assert ask(service, *models).status_code == 422

@@ -2,11 +2,7 @@
 
 import pytest
 
-from islands_api import Client
-from islands_service.domain.job import EXTENDED, JobOutcome, JobState
-from islands_service.store.blobs import Blobs
-from support.extended_simulations import extended
-from support.service import hidden, problem_of, run_diagnosis
+from support.service import hidden, run_diagnosis
 
 pytestmark = pytest.mark.ci
 
@@ -49,26 +45,3 @@ def test_the_extremes_are_those_of_all_samples(finished):
 def test_invalid_requests_say_what_exists(finished, query, detail):
     answer = ask(finished, query)
     assert (answer.status_code, detail in answer.text) == (422, True), answer.text
-
-
-@pytest.mark.nightly
-def test_an_extended_linear_simulation_is_exported_as_a_model(service, order):
-    linear = {"kind": "linear", "order": 0, "numerator": [2.0]}
-    spec = extended(linear, {"dead-zone": {"d": 0.25}})
-    blob = Blobs(service.settings.blobs).write(spec.model_dump_json(by_alias=True).encode())
-    job = service.client.post("/v1/discrepancies", json=order).json()["id"]
-    outcome = JobOutcome(JobState.SUCCEEDED, {"verdict": "named"}, artefacts={EXTENDED: blob})
-    service.store.leases.finish(service.store.leases.claim("test", 600.0), outcome)
-    with Client(str(service.client.base_url)) as client:
-        assert "double" in client.export_extended(job, "c")
-        assert "0.25" in client.export_extended(job, "plain")
-    answer = service.client.get(f"/v1/jobs/{job}/extended/export", params={"format": "mathml"})
-    assert answer.headers["content-type"] == "application/mathml+xml"
-    assert answer.headers["content-disposition"] == f'inline; filename="extended-{job[:8]}.xml"'
-
-
-def test_differential_equations_are_no_difference_equation(finished):
-    service, job = finished
-    assert "equation" not in service.client.get(f"/v1/jobs/{job}").json()["summary"]
-    answer = service.client.get(f"/v1/jobs/{job}/extended/export")
-    assert "is not one difference equation" in problem_of(answer, 404, "not-found")

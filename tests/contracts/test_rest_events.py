@@ -6,7 +6,6 @@ import time
 import pytest
 
 from islands_api.web import event_hub
-from islands_api.web.routes import events as routes
 from islands_service.store import leases
 from support.processes import eventually
 from support.service import PATIENCE, emptied, parse_events, queued
@@ -110,18 +109,6 @@ def test_a_stream_after_the_last_event_returns_204(service, last):
     service.store.leases.finish(claimed(service.store), FOUND)
     answer = service.client.get(f"/v1/jobs/{job}/events", headers={"Last-Event-ID": str(last)})
     assert (answer.status_code, answer.content) == (204, b"")
-
-
-def test_an_idle_stream_has_comments(service, monkeypatch):
-    monkeypatch.setattr(routes, "_KEEP_ALIVE_SECONDS", 0.05)
-    job = queued(service.store).id
-    with service.client.stream("GET", f"/v1/jobs/{job}/events") as answer:
-        text = ""
-        for piece in answer.iter_text():
-            text += piece
-            if text.count(": alive\n\n") >= 3:
-                break
-    assert [number for number, _, _ in parse_events(text)] == [1]
 
 
 def test_a_long_stream_omits_the_oldest_progress_events(service, monkeypatch):

@@ -16,7 +16,7 @@ from islands_api.web.routes import figures
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError
 from support.databases import server
-from support.disks import filled, read_only
+from support.disks import filled
 from support.processes import eventually
 from support.service import PATIENCE, csv, parse_events, problem_of, run_identification, served, spec
 from support.stores import FOUND, claimed
@@ -98,33 +98,6 @@ def test_a_full_disk_during_an_upload_is_reported_as_such(disk, serve, monkeypat
         problem_of(service.upload(csv(100)), 507, "storage-full")
         problem_of(service.submit(**spec(dataset, rows="0:100")), 507, "storage-full")
         assert service.submit(**spec(dataset)).status_code == 202
-
-
-@pytest.mark.nightly
-def test_a_read_only_data_folder_rejects_writes_until_it_is_writable(disk, serve, tmp_path):
-    """As after an error of the disk; SQLite is on another one, as PostgreSQL would be."""
-    folder = tmp_path / "data"
-    folder.mkdir()
-    (folder / "blobs").symlink_to(disk)
-    with serve(folder) as service:
-        dataset = service.upload(csv()).json()["id"]
-        finished = run_identification(service)
-        figure = f"/v1/jobs/{finished}/models/1/figures/hold.svg"
-        with read_only(disk):
-            for ask in (
-                partial(service.upload, csv(500)),
-                partial(service.upload, csv()),
-                partial(service.client.get, figure),
-                partial(service.client.get, "/readyz"),
-            ):
-                answer = ask()
-                assert "try again" in problem_of(answer, 503, "data-folder-unavailable")
-                assert str(disk) not in answer.text
-            job = service.submit(**spec(dataset)).json()["id"]
-            assert service.client.get(f"/v1/jobs/{job}").json()["state"] == "queued"
-        assert service.client.get("/readyz").status_code == 200
-        assert service.upload(csv(500)).status_code == 201
-        assert service.client.get(figure).status_code == 200
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """FMUs over REST: upload, list, deletion, previews and diagnoses."""
 
 import io
-import itertools
 import zipfile
 
 import numpy as np
@@ -9,8 +8,6 @@ import pytest
 import scipy
 
 from islands_api import Client
-from islands_service.coordinator.heartbeat import JobCancelled
-from islands_service.domain.job import JobOutcome, JobState
 from support.oscillator_fmus import write_oscillator
 from support.service import execute_diagnosis, npz, problem_of
 
@@ -140,27 +137,6 @@ def test_an_fmu_is_kept_until_the_jobs_that_name_it_have_ended(shared, dataset, 
     assert {("upload-dataset", fmu), ("delete-dataset", fmu)} <= set(recorded)
     problem_of(shared.client.post(f"/v1/jobs/{job['id']}/resume"), 409, "dataset-deleted")
     assert send(shared, content).status_code == 201
-
-
-@pytest.mark.nightly
-def test_a_diagnosis_of_an_fmu_can_be_cancelled_during_a_simulation(shared, fmu):
-    from islands_service.coordinator.diagnosis_job import run_diagnosis_job
-    from islands_service.store.blobs import Blobs
-    from support.job_runs import make_run
-
-    dataset = shared.upload(make_axis(0.02, 240), "axis.npz").json()["id"]
-    job = shared.client.post("/v1/discrepancies", json=of_fmu(dataset, fmu)).json()
-    lease = shared.store.leases.claim("test", 600.0)
-    assert lease.job.id == job["id"]
-    calls = itertools.count()
-
-    def check():
-        if next(calls) > 300:
-            raise JobCancelled
-
-    with pytest.raises(JobCancelled):
-        run_diagnosis_job(make_run(lease, shared.store, Blobs(shared.settings.blobs), check))
-    shared.store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
 
 
 @pytest.fixture(scope="module")

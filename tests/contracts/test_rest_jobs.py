@@ -5,10 +5,8 @@ import time
 
 import pytest
 
-from islands_api import Client
 from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import JobState, Submission
-from islands_service.store.keys import SCOPES
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
 
@@ -85,14 +83,6 @@ def test_a_waiting_request_is_answered_at_the_change(service):
     answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": '"1"'})
     assert (answer.status_code, answer.json()["state"]) == (200, "running")
     assert 0.3 <= time.monotonic() - began < 15.0
-
-
-def test_a_waiting_request_times_out_with_304(service):
-    path = f"/v1/jobs/{queued(service.store).id}"
-    began = time.monotonic()
-    answer = service.client.get(path, params={"wait": 0.4}, headers={"If-None-Match": '"1"'})
-    assert answer.status_code == 304
-    assert 0.4 <= time.monotonic() - began < 15.0
 
 
 def read_all_pages(service, path, limit, between=lambda: None, **params):
@@ -189,9 +179,3 @@ def test_figures_of_a_job_of_another_version_are_rejected(service):
     detail = problem_of(answer, 422, "invalid-settings")
     assert "this version of islands cannot read the job (colour: " in detail
     assert "submit it again" in detail
-
-
-def test_a_caller_knows_its_owner_and_its_scopes(service):
-    with Client(str(service.client.base_url)) as client:
-        found = client.caller()
-    assert (found.owner, set(found.scopes)) == (LOCAL_OWNER, set(SCOPES))

@@ -1,6 +1,5 @@
 """API keys over REST: authentication, scopes, owners, quotas and rate limits."""
 
-import socket
 import time
 
 import pytest
@@ -82,6 +81,12 @@ GUARDED = {
 
 #: Public routes.
 OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
+
+
+@pytest.fixture(scope="module")
+def shared(serve):
+    with serve(require_keys=True, rate=0.0, max_active=3, max_stored=20_000) as running:
+        yield running
 
 
 def send_request(service, method, path, headers):
@@ -216,14 +221,3 @@ def test_the_rate_of_invalid_keys_of_an_address_is_limited(strict, wrong, least)
     assert int(answer.headers["retry-after"]) >= 1
     assert strict.client.get("/v1/jobs", headers=mine).status_code == 200
     assert strict.client.get("/healthz").status_code == 200
-
-
-@pytest.mark.parametrize("path", ["/v1/datasets", "/v1/jobs"])
-def test_a_request_without_a_key_is_rejected_before_its_body(service, path):
-    """The response must arrive before the body is complete."""
-    with socket.create_connection(("127.0.0.1", service.port), PATIENCE) as client:
-        client.sendall(
-            f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000\r\n"
-            "Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n".encode()
-        )
-        assert client.recv(100).startswith(b"HTTP/1.1 401 ")

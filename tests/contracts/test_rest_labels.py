@@ -10,12 +10,6 @@ def order(service):
     return spec(kept(service.store), name="first")
 
 
-def ids(service, **filters):
-    answer = service.client.get("/v1/jobs", params=filters)
-    assert answer.status_code == 200, answer.text
-    return [job["id"] for job in answer.json()["items"]]
-
-
 def test_name_and_tags_are_changed_separately(service, order):
     path = service.submit(**order).headers["location"]
     renamed = service.client.patch(path, json={"name": "Bühne 3"})
@@ -50,18 +44,6 @@ def test_unusable_labels_are_refused(service, body):
     path = f"/v1/jobs/{queued(service.store).id}"
     problem_of(service.client.patch(path, json=body), 422, "invalid-request")
     assert service.client.get(path).headers["etag"] == '"1"'
-
-
-def test_the_list_is_searched(service, order):
-    first = service.submit(**order, tags=["Rig 2"]).json()["id"]
-    second = service.submit(**{**order, "name": "second 100%"}).json()["id"]
-    assert ids(service, q="FIRST rig") == [first]
-    assert ids(service, q="record.CSV") == [second, first]
-    assert ids(service, q="100%") == [second]
-    assert ids(service, q="  ") == [second, first]
-    assert ids(service, q="first second") == ids(service, q="f_rst") == []
-    assert ids(service, tag="Rig 2", state="queued") == [first]
-    assert ids(service, tag="Rig") == []
 
 
 def test_a_search_with_many_words_is_refused(service):

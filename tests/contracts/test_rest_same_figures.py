@@ -1,12 +1,8 @@
 """A model with preprocessing has the same figures over REST, in its downloaded folder and in a monitor."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import islands
 from islands.persistence.models import model_from_json
 from islands.report.text.facts import BEFORE_REFIT
 from islands.validation.metrics import metrics
@@ -15,14 +11,11 @@ from islands_api.web.auth import LOCAL_OWNER
 from islands_api.web.routes import figures
 from islands_api.web.routes.figures import FigureError
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.domain.job import REPORT, JobState
+from islands_service.domain.job import REPORT
 from islands_service.figure_worker import read_search_result, render_figures
 from islands_service.store.blobs import Blobs
-from support.command_line import succeed
 from support.job_runs import make_run
-from support.monitoring_jobs import analyse_next
 from support.stores import LONG, taken
-from support.undrawn import undrawn_figures
 
 pytestmark = pytest.mark.ci
 
@@ -95,38 +88,3 @@ def test_errors_and_figures_of_a_job_belong_to_the_model_before_its_refit(servic
     assert metrics(measured, simulated).rmse == pytest.approx(summary["metrics"]["rmse"])
     assert "Refit: the parameters were estimated again on all 1200 samples" in summary["words"]
     assert BEFORE_REFIT.encode() in render_figures(stored, rebuilt)[REPORT]
-
-
-def test_a_model_of_deviations_has_the_same_figures_in_a_monitor(service, client, path, tmp_path):
-    with undrawn_figures():
-        options = (
-            *("--set", "detrend=constant", "--max-terms", 3, "--set", "average=1"),
-            *("--out", tmp_path / "result"),
-        )
-        succeed("fit", path, "--input", "u_V", "--output", "y_um", *options)
-    best = islands.read_result(tmp_path / "result").best
-    assert best.model.preprocessing.output_offset == pytest.approx(40.0, abs=1.0)
-    record = islands.read_record(path, *COLUMNS)
-    expected = metrics(record.y, best.simulate(record).y).rmse
-    files = (tmp_path / "result/models").iterdir()
-    file = next(each for each in files if islands.read_model(each) == best.model)
-    model = {"kind": "model", "model": json.loads(file.read_text(encoding="utf-8"))}
-    monitor = client.create_monitor(simulation=model, input="u_V", output="y_um", training=12)
-    client.add_record(monitor, client.upload(path))
-    analysed = analyse_next(service)
-    assert analysed.state == JobState.SUCCEEDED, analysed.problem
-    found = analysed.document["record"]["rmse"]
-    # The monitor estimates the parameters of the model again.
-    assert 0.95 * expected < found < 1.02 * expected
-    monitored(path, file, tmp_path / "monitored", succeed)
-    state = json.loads((tmp_path / "monitored/monitor.json").read_text(encoding="utf-8"))
-    assert [each["rmse"] for each in state["records"]] == [pytest.approx(found, rel=1e-9)]
-
-
-def monitored(path: Path, file: Path, out: Path, run) -> str:
-    """Return what ``islands monitor`` prints about the folder of a record."""
-    simulation = ("--simulation", f"model:{file}", "--input", "u_V", "--output", "y_um")
-    printed = run(
-        "monitor", path.parent, *simulation, "--set", "training=12", "--set", "settle=0", "--out", out
-    )
-    return " ".join(printed.split())

@@ -36,16 +36,6 @@ def test_no_peak_is_lost_whatever_the_number_of_points(service, dataset):
 
 
 @pytest.mark.ci
-def test_an_answer_is_valid_for_ever(service, dataset):
-    first = ask(service, dataset, "column=y")
-    assert "immutable" in first.headers["cache-control"]
-    tag = first.headers["etag"]
-    again = ask(service, dataset, "column=y", **{"if-none-match": tag})
-    assert (again.status_code, again.content) == (304, b"")
-    assert ask(service, dataset, "column=y&points=5", **{"if-none-match": tag}).status_code == 200
-
-
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("query", "status", "detail"),
     [

@@ -2,7 +2,6 @@
 
 import pytest
 
-from islands.simulators.specification.table import SIMULATORS
 from islands_service.intake import job_inputs
 from support.service import problem_of
 
@@ -31,15 +30,6 @@ def test_the_list_says_why_fmus_are_refused(service, monkeypatch):
     assert get_refusal() == ""
     monkeypatch.setattr(job_inputs, "find_gaps", lambda: ("Landlock", "seccomp"))
     assert "a machine that can confine them, which needs Landlock and seccomp" in get_refusal()
-
-
-def test_the_list_has_all_simulations(service):
-    *items, fmu = service.client.get("/v1/simulations").json()["items"]
-    assert [each["kind"] for each in items] == [each.name for each in SIMULATORS.values() if each.is_remote]
-    assert {each["refusal"] for each in items} == {""}
-    assert fmu["kind"] == "fmu"
-    for each in items:
-        assert {entry["name"] for entry in each["parameters"]} == SIMULATORS[each["kind"]].parameters.keys()
 
 
 def test_a_listed_default_is_the_value_of_an_absent_parameter(service):

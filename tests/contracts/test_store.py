@@ -26,12 +26,6 @@ from support.stores import (
 )
 
 
-def test_floats_are_stored_bit_for_bit(store):
-    spec = {"values": [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0]}
-    job = submitted(store, spec=spec)
-    assert repr(store.jobs.get(ALICE, job.id).spec) == repr(spec)
-
-
 @pytest.mark.parametrize(
     "change", [{"spec": {"seed": 8}}, {"kind": "other"}, {"name": "other"}, {"priority": 1}]
 )

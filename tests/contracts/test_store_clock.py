@@ -22,22 +22,6 @@ def test_job_of_a_lost_coordinator_is_taken_over_after_the_clock_has_gone_back(s
         store.leases.renew(lost, LEASE)
 
 
-def test_running_coordinator_keeps_its_job_after_the_clock_has_gone_back(store):
-    submitted(store)
-    lease = claimed(store, LEASE)
-    turn_clock(store, -HOUR)
-    store.leases.renew(lease, LEASE)
-    assert store.leases.claim("second", LEASE) is None
-
-
-def test_postponed_job_is_tried_after_the_clock_has_gone_back(store):
-    job = submitted(store)
-    store.leases.postpone(claimed(store), "in this test", 10.0)
-    assert store.leases.claim("second", LEASE) is None
-    turn_clock(store, -HOUR)
-    assert claimed(store).job.id == job.id
-
-
 def test_job_is_taken_over_once_after_the_clock_has_gone_forward(store):
     job = submitted(store)
     lost = claimed(store, LEASE)

@@ -3,11 +3,9 @@
 import threading
 
 import pytest
-from sqlalchemy import update
 
 from islands_service.domain.job import DISCREPANCY, JobState, JobStateError
 from islands_service.store.leases import ATTEMPTS
-from islands_service.store.tables import jobs
 from support.stores import (
     ALICE,
     EXPIRED,
@@ -116,32 +114,6 @@ def test_reader_that_continues_from_the_last_number_misses_nothing(database):
             assert seen == list(range(1, last + 1))
 
 
-def test_reader_that_sees_a_version_finds_its_event(database):
-    with open_stores(database, 2) as (writer, reader):
-        job = submitted(writer)
-        lease = claimed(writer)
-        over = threading.Event()
-
-        def write():
-            try:
-                for generation in range(100):
-                    writer.leases.report(lease, brought_on(generation))
-            finally:
-                over.set()
-
-        def read():
-            looks = 0
-            while not over.wait(0.001):
-                version = reader.jobs.versions([job.id])[job.id]
-                assert reader.jobs.events(job.id, version - 1)[0].number == version
-                looks += 1
-            return looks
-
-        written, looks = at_once([write, read])
-        assert written is None
-        assert looks > 0
-
-
 @pytest.mark.parametrize("waiting", [0, 3])
 def test_queue_statistics_count_the_jobs_of_all_owners(store, waiting):
     before = store.jobs.queue_statistics()
@@ -171,16 +143,3 @@ def test_queue_statistics_count_the_jobs_of_all_owners(store, waiting):
 def claimed_as(store, submission):
     store.jobs.submit(submission)
     return claimed(store)
-
-
-def test_waiting_time_of_a_released_job_begins_at_its_release(store):
-    """The job may have run for days before."""
-    submitted(store)
-    lease = claimed(store)
-    aged = update(jobs).values(created=jobs.c.created - LONG, updated=jobs.c.updated - LONG)
-    store.database.write(lambda connection: connection.execute(aged))
-    store.leases.release(lease)
-    assert 0.0 < store.jobs.queue_statistics().oldest < LONG / 2
-    store.database.write(lambda connection: connection.execute(aged))
-    submitted(store)
-    assert LONG <= store.jobs.queue_statistics().oldest < 1.5 * LONG

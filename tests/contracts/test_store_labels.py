@@ -1,11 +1,8 @@
 """Contract of the store with clients that name, tag, filter and search their jobs, on every database."""
 
-import json
-
 import pytest
 
-from islands_service.domain.job import JobOutcome, JobState, Requester
-from islands_service.store.audit import Action
+from islands_service.domain.job import JobOutcome, JobState
 from support.stores import ALICE, BLOB, BOB, claimed, job_in, kinds, submitted
 
 
@@ -29,14 +26,6 @@ def test_a_job_is_labelled_in_every_state(store, state):
     assert (changed.state, changed.spec, changed.summary) == (state, job.spec, job.summary)
     assert store.jobs.get(ALICE, job.id) == changed
     assert kinds(store, job.id) == [*before, "labelled"]
-
-
-def test_a_label_is_in_the_audit_trail(store):
-    job = submitted(store, name="name")
-    store.jobs.label(ALICE, job.id, tags=("a",), by=Requester("192.0.2.1", "key"))
-    (entry,) = store.audit.entries()
-    assert (entry.action, entry.owner, entry.subject, entry.key_id) == (Action.LABEL, ALICE, job.id, "key")
-    assert json.loads(entry.details) == {"name": "name", "tags": ["a"]}
 
 
 def test_a_tag_selects_the_jobs_that_have_exactly_it(store):

@@ -1,6 +1,5 @@
 """Contract of the store with coordinators: order of claims, duration of leases, number of attempts."""
 
-from contextlib import ExitStack
 from uuid import uuid4
 
 import pytest
@@ -13,26 +12,11 @@ from support.stores import (
     LONG,
     MANY,
     at_once,
-    child,
     claimed,
     kinds,
     open_stores,
     submitted,
 )
-
-CLAIM = """
-import sys
-from islands_service.store import Store
-url, name = sys.argv[1:]
-with Store(url) as store:
-    print("ready", flush=True)
-    sys.stdin.readline()
-    claims = 0
-    # A new name for each claim: a job leased under the same name would be claimed again.
-    while (lease := store.leases.claim(f"{name} {claims}", 3600.0)) is not None:
-        claims += 1
-        print(lease.job.id, lease.epoch)
-"""
 
 
 @pytest.mark.parametrize("own", [None, 2])
@@ -57,19 +41,6 @@ def test_owner_with_its_quota_of_running_jobs_waits_and_others_do_not(store, own
     assert other.id in {lease.job.id for lease in leases}
 
 
-def test_concurrent_claims_do_not_exceed_the_quota_of_running_jobs(database):
-    with open_stores(database) as stores:
-        for _ in range(MANY):
-            submitted(stores[0])
-        answers = at_once(
-            [
-                lambda store=stores[i % 4], i=i: store.leases.claim(f"{i}", LONG, most_running=3)
-                for i in range(MANY)
-            ]
-        )
-        assert sum(lease is not None for lease in answers) == 3
-
-
 def test_every_job_is_claimed_once_by_concurrent_claimers(database):
     with open_stores(database) as stores:
         jobs = [submitted(stores[0], priority=each % 3) for each in range(24)]
@@ -89,24 +60,6 @@ def test_every_job_is_claimed_once_by_concurrent_claimers(database):
             assert priorities == sorted(priorities, reverse=True)
         for job in jobs:
             assert kinds(stores[0], job.id) == ["queued", "running"]
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize(
-    "database", ["sqlite", pytest.param("postgresql", marks=pytest.mark.ci)], indirect=True
-)
-def test_jobs_are_not_claimed_by_two_processes(store, database):
-    jobs = [submitted(store).id for _ in range(60)]
-    with ExitStack() as stack:
-        processes = [stack.enter_context(child(CLAIM, database, name)) for name in ("one", "two")]
-        for process in processes:
-            assert process.stdout.readline() == "ready\n"
-        for process in processes:
-            process.stdin.write("\n")
-            process.stdin.flush()
-        said = [process.communicate(timeout=60)[0].split() for process in processes]
-    assert sorted(job for each in said for job in each[::2]) == sorted(jobs)
-    assert {epoch for each in said for epoch in each[1::2]} == {"1"}
 
 
 def test_claim_and_renewal_contain_the_request_to_stop_the_search(store):

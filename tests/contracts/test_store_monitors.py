@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from islands_service.domain.job import MONITORING, JobOutcome, JobState, LeaseLostError, QuotaError, Requester
+from islands_service.domain.job import MONITORING, JobOutcome, JobState, LeaseLostError, Requester
 from islands_service.domain.monitoring import MonitorNotFoundError, MonitorStatus
 from support.monitor_updates import make_entry, make_update
 from support.stores import (
     ALICE,
     BOB,
     EXPIRED,
-    FAILED,
     LONG,
     at_once,
     claimed,
@@ -72,19 +71,6 @@ def test_a_record_whose_coordinator_ended_is_claimed_before_later_ones(store):
     assert lost.job.id == again.job.id == job.id
     store.leases.postpone(again, "the disk is slow", LONG)
     assert store.leases.claim("another", LONG) is None
-
-
-def test_a_failed_record_that_is_resumed_waits_for_the_one_that_runs(store):
-    monitor = created(store)
-    first = added(store, monitor)
-    store.leases.finish(claimed(store), FAILED)
-    second = added(store, monitor)
-    lease = claimed(store)
-    assert lease.job.id == second.id
-    store.jobs.resume(ALICE, first.id)
-    assert store.leases.claim("another", LONG) is None
-    store.leases.finish(lease, analysed(store, lease))
-    assert claimed(store).job.id == first.id
 
 
 def test_the_state_of_a_monitor_and_the_end_of_the_job_appear_together(store):
@@ -205,13 +191,6 @@ def test_deletion_of_a_monitor_cancels_its_waiting_records(store):
     assert store.monitors.page(ALICE)[0] == (store.monitors.get(ALICE, other.id),)
     (entry,) = store.audit.entries(limit=1)
     assert (entry.action, entry.subject) == ("delete-monitor", monitor.id)
-
-
-def test_one_more_monitor_than_the_limit_is_refused(store):
-    created(store, most=1)
-    created(store, BOB, most=1)
-    with pytest.raises(QuotaError, match="1 monitors exist, and 1 is the most"):
-        created(store, most=1)
 
 
 @pytest.mark.ci

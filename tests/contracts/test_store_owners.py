@@ -6,7 +6,6 @@ from islands_service.domain.job import JobNotFoundError, JobState, JobStateError
 from support.stores import (
     ALICE,
     BOB,
-    FAILED,
     FOUND,
     brought_on,
     claimed,
@@ -26,19 +25,6 @@ ALLOWED = {
 }
 
 UNKNOWN = "0" * 32
-
-
-def pages(store, owner, limit, state=None, between=lambda: None):
-    """Read a list to its end, and call a function between two pages."""
-    after, found = None, []
-    while True:
-        assert len(found) < 100, "the list has no end"
-        page = store.jobs.page(owner, state, after, limit)
-        found.append([job.id for job in page.jobs])
-        if page.after is None:
-            return found
-        after = page.after
-        between()
 
 
 @pytest.mark.parametrize("state", JobState)
@@ -91,20 +77,3 @@ def test_job_of_another_owner_is_not_found_and_unchanged(store, ask, state):
     # The message does not reveal that the job exists.
     assert messages[0] == messages[1]
     assert contents(store) == before
-
-
-def test_list_read_during_changes_contains_every_other_job_once(store):
-    jobs = [submitted(store, priority=-each) for each in range(12)]
-    deleted = store.jobs.cancel(ALICE, submitted(store).id)
-    events = [
-        lambda: submitted(store, priority=-50),
-        lambda: claimed(store),
-        lambda: store.leases.finish(claimed(store), FAILED),
-        lambda: store.jobs.cancel(ALICE, jobs[5].id),
-        lambda: (store.jobs.delete(ALICE, deleted.id), submitted(store, priority=-50)),
-    ]
-    found = pages(store, ALICE, 2, between=lambda: events.pop(0)() if events else None)
-    assert not events
-    listed = [each for page in found for each in page]
-    assert len(listed) == len(set(listed))
-    assert {job.id for job in jobs} <= set(listed)

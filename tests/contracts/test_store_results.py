@@ -162,14 +162,6 @@ def test_failed_finish_leaves_the_job_running(store, lease, outcome):
     store.leases.finish(lease, FOUND)
 
 
-def test_artefacts_of_a_result_are_stored_and_referenced(store, lease):
-    job = lease.job.id
-    whole = JobOutcome(JobState.SUCCEEDED, {"found": 1}, artefacts={"a": BLOB, "b": "c" * 64})
-    store.leases.finish(lease, whole)
-    assert [store.results.artefact(job, name) for name in "abc"] == [BLOB, "c" * 64, None]
-    assert {BLOB, "c" * 64} <= store.retention.named_blobs()
-
-
 def test_new_result_replaces_the_whole_old_one(store, lease):
     job = lease.job.id
     lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))

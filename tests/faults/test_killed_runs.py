@@ -92,13 +92,3 @@ def test_stopped_run_stores_the_best_and_resumes_to_the_same_result(
     shortened(out, last)
     succeed("identify", "--resume", out)
     assert found(out) == undisturbed(record, last)
-
-
-@pytest.mark.nightly
-def test_run_ended_by_wall_time_is_reported_as_not_reproducible(record: Path) -> None:
-    out = record.parent / "clock"
-    running = started(record, out, 1_000_000, "--engine", "serial", "--wall-time", "2")
-    _, complained = running.communicate(timeout=60)
-    assert running.returncode == 0, complained
-    assert "not reproducible" in complained
-    assert stored(out)["search"]["ended_by"] == "stopped"

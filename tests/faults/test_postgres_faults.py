@@ -116,17 +116,6 @@ def test_frozen_postgresql_delays_jobs_only(shared: Fleet, undisturbed: list[byt
     check_survival(shared, undisturbed, f"frozen {seconds}", fault)
 
 
-def test_slow_network_delays_jobs_only(shared: Fleet, undisturbed: list[bytes]) -> None:
-    def fault() -> None:
-        for proxy in shared.proxies:
-            proxy.delay = 0.05
-        time.sleep(10.0)
-        for proxy in shared.proxies:
-            proxy.delay = 0.0
-
-    assert 503 not in check_survival(shared, undisturbed, "slow", fault).statuses
-
-
 def test_connections_that_are_cut_at_any_moment_lose_no_job(shared: Fleet, undisturbed: list[bytes]) -> None:
     def fault() -> None:
         for turn in range(30):
@@ -141,17 +130,6 @@ def test_connections_that_are_cut_at_any_moment_lose_no_job(shared: Fleet, undis
 
     check_survival(shared, undisturbed, "cut", fault)
     assert all(proxy.cuts > 5 for proxy in shared.proxies)
-
-
-def test_network_that_swallows_every_packet_delays_jobs_only(shared: Fleet, undisturbed: list[bytes]) -> None:
-    def fault() -> None:
-        for proxy in shared.proxies:
-            proxy.withhold()
-        time.sleep(16.0)
-        for proxy in shared.proxies:
-            proxy.resume()
-
-    assert check_survival(shared, undisturbed, "swallowed", fault).statuses[503]
 
 
 def test_coordinator_cut_off_for_longer_than_its_lease_writes_nothing(

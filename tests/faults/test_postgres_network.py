@@ -108,20 +108,3 @@ def test_claim_whose_commit_is_cut_off_is_repeated_by_the_same_coordinator_only(
     assert store.leases.claim("second", LONG) is None
     again = store.leases.claim("first", LONG)
     assert (again.job.id, again.epoch) == (job.id, 2)
-
-
-def test_slow_network_delays_and_fails_nothing(store, proxy):
-    proxy.delay = 0.02
-    job = submitted(store)
-    lease = claimed(store)
-    for generation in range(3):
-        store.leases.report(lease, brought_on(generation))
-    assert kinds(store, job.id) == ["queued", "running", *["progress"] * 3]
-
-
-def test_statement_of_a_migration_may_take_longer_than_the_timeout(store):
-    with store.database.exclusive() as connection:
-        connection.exec_driver_sql("SELECT pg_sleep(0.8)")
-    with store.database.snapshot() as connection:
-        connection.exec_driver_sql("SELECT pg_sleep(0.8)")
-    fails_within(5.0, lambda: store.database.write(lambda each: each.exec_driver_sql("SELECT pg_sleep(3)")))

@@ -1,6 +1,5 @@
 """Discrepancy jobs of a running service: the injected effect is found, also after kills and cancellations."""
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from support.command_line import succeed
 from support.processes import descendants, eventually, kill
 from support.report_pages import without_origin
 from support.service import HIDDEN, KNOWN, held, hidden
@@ -18,9 +16,6 @@ pytestmark = pytest.mark.nightly
 
 #: Seconds of a record whose analysis takes a while.
 LONG = 150.0
-
-COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--simulation", "bouc-wen-piezo")
-TOLERANCES = [word for name, value in KNOWN.items() for word in ("--tolerance", f"{name}={value}")]
 
 
 @pytest.fixture(scope="module")
@@ -48,27 +43,6 @@ def found(service: Service, job: str) -> tuple[dict[str, Any], bytes, bytes]:
     result = document.json()
     assert result.pop("wall_s") > 0
     return result, without_origin(report.content), extended.content
-
-
-def test_injected_effect_is_found_as_by_the_command_line(service: Service, tmp_path: Path) -> None:
-    hidden(tmp_path)
-    where = ("--url", service.url)
-    others = {each["id"] for each in json.loads(succeed("jobs", "show", "--json", *where))["items"]}
-    said = succeed("jobs", "diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--watch", *where)
-    assert f"{HIDDEN}: k = " in said
-    listed = json.loads(succeed("jobs", "show", "--json", *where))["items"]
-    (job,) = [each for each in listed if each["id"] not in others]
-    assert (job["kind"], job["summary"]["effects"]) == ("discrepancy", [HIDDEN])
-    succeed("jobs", "show", job["id"], "--out", tmp_path / "there", *where)
-    succeed("diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--out", tmp_path / "here")
-    results = [json.loads((tmp_path / each / "discrepancy.json").read_text()) for each in ("there", "here")]
-    assert [result.pop("wall_s") > 0 for result in results] == [True, True]
-    assert results[0] == results[1]
-    assert [effect["name"] for effect in results[0]["effects"]] == [HIDDEN]
-    extended, report = "extended.json", "report.html"
-    assert (tmp_path / "there" / extended).read_bytes() == (tmp_path / "here" / extended).read_bytes()
-    there, here = (without_origin((tmp_path / each / report).read_bytes()) for each in ("there", "here"))
-    assert there == here
 
 
 def wait_for_checkpoint(service: Service, job: str) -> None:
@@ -111,19 +85,6 @@ def test_running_diagnosis_is_cancelled_within_seconds_and_continues(
     assert [effect["name"] for effect in found(service, job)[0]["effects"]] == [HIDDEN]
     (known,) = known_fits(service, job)
     assert known > 0
-
-
-def test_cancelled_step_without_checks_is_abandoned(service: Service, tmp_path: Path) -> None:
-    """The coordinator restarts in its process and runs the next job."""
-    files = {"file": ("hidden.csv", hidden(tmp_path, LONG))}
-    dataset = service.ask("POST", "/v1/datasets", files=files).json()["id"]
-    coordinator = service.one("coordinator")
-    job = service.submit(5, dataset=dataset, preset="auto")
-    eventually(lambda: "fit of" in str((service.job(job)["progress"] or {}).get("phase")))
-    assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
-    assert service.ended(job, seconds=5.0)["state"] == "cancelled"
-    assert service.found(service.submit(5))
-    assert service.one("coordinator") == coordinator
 
 
 def test_idle_service_keeps_no_worker_of_ray(service: Service, tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from support.object_stores import ACCESS, CuttingProxy, authentication, make_bucket, s3_server
+from support.object_stores import ACCESS, CuttingProxy, make_bucket, s3_server
 from support.processes import eventually
-from support.service_processes import free_port, serving, started
+from support.service_processes import serving
 
 pytestmark = pytest.mark.nightly
 
@@ -49,42 +49,3 @@ def test_a_search_survives_the_absence_of_the_object_store(
             log = service.log.read_text()
             assert ACCESS["AWS_SECRET_ACCESS_KEY"] not in log
             assert not (service.folder / "blobs").exists()
-
-
-def test_refused_credentials_end_the_start_with_a_message(tmp_path: Path, endpoint: str) -> None:
-    with authentication(endpoint):
-        process = started("--data-dir", tmp_path / "data", "--port", free_port(), ISLANDS_COORDINATORS="0")
-        try:
-            _, said = process.communicate(timeout=60)
-        finally:
-            process.kill()
-    assert process.returncode == 2, said
-    assert "refuses access to s3://bucket/prefix (InvalidAccessKeyId): check the credentials" in said
-    assert "Traceback" not in said
-    assert ACCESS["AWS_SECRET_ACCESS_KEY"] not in said
-
-
-def test_a_service_starts_without_its_object_store(
-    tmp_path: Path, endpoint: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    host, _, port = endpoint.removeprefix("http://").partition(":")
-    with CuttingProxy((host, int(port)), refuse=True) as proxy:
-        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{proxy.port}")
-        network = free_port()
-        process = started("--data-dir", tmp_path / "data", "--port", network, ISLANDS_COORDINATORS="0")
-        try:
-            url = f"http://127.0.0.1:{network}"
-
-            def status(path: str) -> int:
-                try:
-                    return httpx.get(url + path, trust_env=False).status_code
-                except httpx.TransportError:
-                    return 0
-
-            eventually(lambda: status("/healthz") == 200)
-            assert status("/readyz") == 503
-            proxy.refuse = False
-            eventually(lambda: status("/readyz") == 200)
-        finally:
-            process.terminate()
-            process.communicate(timeout=60)

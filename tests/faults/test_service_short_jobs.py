@@ -63,22 +63,6 @@ def test_coordinator_lost_during_a_short_search_loses_no_job(
 
 
 @pytest.mark.nightly
-def test_cancelled_short_search_keeps_its_models_and_resumes_to_the_same_result(
-    service: Service, models: list[Any]
-) -> None:
-    coordinator = service.one("coordinator")
-    job = under_way(service)
-    assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
-    cancelled = service.ended(job, seconds=5.0)
-    assert cancelled["state"] == "cancelled"
-    assert 0 < cancelled["progress"]["generation"] < GENERATIONS
-    assert json.loads(service.models(job))["items"] not in ([], models)
-    assert service.one("coordinator") == coordinator  # it was not abandoned
-    assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
-    assert find_models(service, job) == models
-
-
-@pytest.mark.nightly
 def test_short_search_continues_after_a_restart_of_the_service(models: list[Any], tmp_path: Path) -> None:
     with serving(tmp_path / "data", environment=SHORT) as first:
         job = under_way(first)

@@ -1,11 +1,7 @@
 """PostgreSQL servers that stop and restart, and processes that are suspended while they hold locks."""
 
 import os
-import shutil
 import signal
-import subprocess
-import sys
-import threading
 import time
 
 import pytest
@@ -16,7 +12,6 @@ from islands_service.store.database import StoreUnavailableError
 from islands_service.store.job_rows import append_event, update_job
 from support.databases import emptied, is_available, server
 from support.processes import eventually
-from support.repository import ROOT
 from support.stores import ALICE, EXPIRED, LONG, brought_on, claimed, kinds, stopped_writer, submitted
 
 
@@ -41,36 +36,6 @@ def test_postgresql_ends_the_transaction_of_a_stopped_process(prepared_postgres)
             # The process notices at the commit, and cannot know that nothing was written.
             assert process.stdout.readline().startswith("CommitUnknownError")
             assert store.jobs.get(ALICE, job.id).progress is None
-
-
-#: Runs in a separate network namespace, and cuts its network.
-CUT = """
-import subprocess, sys, time
-sys.path.insert(0, sys.argv[1])
-from support.databases import server
-from support.stores import ALICE, submitted
-from islands_service.store import Store
-from islands_service.store.database import StoreUnavailableError
-def network(state):
-    subprocess.run(["ip", "link", "set", "lo", state], check=True)
-def measure(ask):
-    began = time.monotonic()
-    try:
-        ask()
-    except StoreUnavailableError:
-        print(time.monotonic() - began, flush=True)
-network("up")
-with server(listen_addresses="127.0.0.1") as far:
-    with Store("postgresql+psycopg://islands@127.0.0.1/postgres") as store:
-        job = submitted(store)
-        network("down")
-        measure(lambda: store.jobs.get(ALICE, job.id))
-        measure(lambda: submitted(store))
-        network("up")
-        assert store.jobs.get(ALICE, job.id) == job
-        submitted(store)
-        print("back", flush=True)
-"""
 
 
 @pytest.fixture(scope="module")
@@ -122,37 +87,6 @@ def test_stopped_postgresql_raises_errors_and_is_used_after_a_restart(restartabl
         assert kinds(store, submitted(store).id) == ["queued"]
 
 
-@pytest.mark.ci
-def test_acknowledged_jobs_survive_a_crash_of_postgresql(restartable):
-    over, acknowledged, failed = threading.Event(), [], []
-    with Store(restartable.url) as store:
-
-        def submit():
-            while not over.is_set():
-                try:
-                    acknowledged.append(submitted(store).id)
-                except StoreUnavailableError:
-                    failed.append(1)
-                    over.wait(0.01)
-
-        threads = [threading.Thread(target=submit) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for _ in range(3):
-            seen = len(acknowledged)
-            eventually(lambda seen=seen: len(acknowledged) >= seen + 30)
-            restartable.stop(signal.SIGQUIT)
-            seen_failures = len(failed)
-            eventually(lambda seen=seen_failures: len(failed) > seen)
-            restartable.start()
-        over.set()
-        for thread in threads:
-            thread.join()
-        assert failed
-        for job in acknowledged:
-            assert kinds(store, job) == ["queued"]
-
-
 def test_read_only_postgresql_counts_as_unavailable(prepared_postgres):
     """After a failover the former primary server may be a standby."""
     with Store(emptied(prepared_postgres)) as store:
@@ -179,20 +113,3 @@ def test_lease_expired_during_an_outage_is_valid_until_the_next_claim(restartabl
         assert taken.job.id == lease.job.id
         with pytest.raises(LeaseLostError):
             store.leases.renew(lease, LONG)
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(
-    os.getuid() != 0 or shutil.which("unshare") is None or shutil.which("ip") is None,
-    reason="a network to cut needs root, unshare and ip",
-)
-def test_cut_network_to_postgresql_raises_errors_within_seconds(servers):
-    """No packet comes back, not even a refusal: TCP alone would wait for many minutes."""
-    tests = ROOT / "tests"
-    command = ["unshare", "--net", sys.executable, "-c", CUT, tests]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 0, done.stderr
-    read, written, back = done.stdout.split()
-    assert back == "back"
-    assert float(read) < 20
-    assert float(written) < 20

@@ -6,12 +6,12 @@ from math import inf
 
 import pytest
 
-from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import _abandon_threshold, _thresholds_by_size, first_generation, step
 from islands.evolution.individual import Individual
 from islands.evolution.problem import make_problem
 from islands.simulation.outcome import Status
-from support.searches import SMALL, exactly, islands_of, record
+from support.searches import SMALL, islands_of, record
 
 pytestmark = pytest.mark.ci
 
@@ -83,33 +83,6 @@ def test_abandonment_does_not_change_halls_elites_and_genes(setting, history):
                 assert repr(each) == repr(known)
     # The test is meaningful only if individuals are abandoned.
     assert sum(len(abandoned(island)) for island in history) > 5
-
-
-def test_abandoned_individuals_exceed_the_threshold_when_evaluated(setting, history):
-    warm = Evaluator(record(), setting)
-    cold = Evaluator(record(), setting, Limits(pairs=1 << 16), abandon=False)
-    for island in history:
-        abandoned_individuals = abandoned(island)
-        evaluated = warm.evaluate_abandoned(abandoned_individuals)
-        exact, _ = cold.evaluate([(Individual(each.genes), False) for each in abandoned_individuals])
-        assert repr(evaluated) == repr(exact)
-        assert all(each.fitness > island.abandon_threshold for each in evaluated)
-        assert all(each.outcome or "interval" in each.outcome.reason for each in evaluated)
-        # Elite and hall of fame contain only individuals with a known fitness.
-        assert all(each.outcome.verdict is not Status.ABANDONED for each in island.elite)
-        assert all(each.fitness < inf for each in island.hall_of_fame.entries)
-
-
-def test_cache_contents_do_not_affect_abandonment(setting, history):
-    """This includes individuals whose exact fitness is cached."""
-    warm = Evaluator(record(), setting)
-    for island in history:
-        warm.evaluate_abandoned([Individual(each.genes) for each in island.population])
-    islands_of(warm, 3, seed=99)
-    tiny_cache = Evaluator(record(), setting, Limits(pairs=0, genes=0, structures=0))
-    for evaluator in (warm, tiny_cache):
-        again = islands_of(evaluator, GENERATIONS)
-        assert [exactly(island) for island in again] == [exactly(island) for island in history]
 
 
 def test_abandonment_does_not_change_a_search_with_a_library():

@@ -5,11 +5,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.expressions.parsing import parse
-from islands.expressions.primitives import MUL
-from islands.expressions.tree import Apply, Lagged, content
 from islands.models.clusters import OUTPUT_AT_REST, clusters, steady_state
 from islands.models.regressor import regressor
-from support.strategies import grid, leaves, nearly, phi_factors, regressors, settled_value, signals
+from support.strategies import grid, nearly, regressors, settled_value, signals
 
 
 def make_regressor(expression):
@@ -26,24 +24,6 @@ def test_weighted_steady_state_is_the_value_for_constant_signals(item, signal):
     found = settled_value(state, rest)
     assume(expected is not None and found is not None)
     assert nearly(weight * found, expected)
-
-
-@given(st.lists(leaves(), max_size=3), phi_factors(), st.integers(1, 4), st.lists(phi_factors(), max_size=2))
-def test_regressor_with_a_phi_factor_belongs_to_no_cluster(factors, phi, power, others):
-    item = make_regressor(Apply(MUL, (*factors, *[phi] * power, *others, Lagged(0, 1))))
-    assert steady_state(item)[0] == 0.0
-    assert clusters([item]) == ()
-
-
-@given(st.lists(regressors(height=2), max_size=8), st.randoms(use_true_random=False))
-def test_clusters_partition_the_regressors_that_do_not_vanish(found, rng):
-    partition = clusters(found)
-    members = sorted(member for cluster in partition for member in cluster.members)
-    assert members == [position for position, item in enumerate(found) if steady_state(item)[0]]
-    states = [content(cluster.steady_state) for cluster in partition]
-    assert states == sorted(set(states))
-    shuffled = clusters(rng.sample(found, len(found)))
-    assert [cluster.steady_state for cluster in shuffled] == [cluster.steady_state for cluster in partition]
 
 
 @pytest.mark.ci

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from islands.errors import SettingsError
 from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.constraints.conditions import Constraint
 from islands.estimation.constraints.parts import ClusterSums
@@ -39,30 +38,8 @@ MODEL_14 = make_regressors(
 )
 
 
-def rows(constrained):
-    """Return every constraint as ({regressor's text: weight}, target)."""
-    names = [plain(item.expression) for item in constrained.regressors]
-    return [
-        ({name: weight for name, weight in zip(names, row, strict=True) if weight}, total)
-        for row, total in zip(constrained.S.tolist(), constrained.c.tolist(), strict=True)
-    ]
-
-
 def hysteresis(*texts):
     return CONSTRAINTS["hysteresis"].constrain(make_regressors(*texts))
-
-
-def test_several_lags_of_y_sum_to_one():
-    found = hysteresis("y(k-1)", "y(k-2)", "phi1(u(k-1), u(k-2))")
-    assert rows(found) == [({"y(k-1)": 1.0, "y(k-2)": 1.0}, 1.0)]
-    assert len(found.regressors) == 3
-
-
-@pytest.mark.parametrize("lone", ["u(k-1)", "u(k-1)*y(k-3)", "y(k-2)^2", "1", "exp(u(k-1) - u(k-2))"])
-def test_single_regressor_of_another_cluster_is_dropped(lone):
-    found = hysteresis(lone, "y(k-1)", "y(k-1)*y(k-3)*u(k-2)", "phi1(u(k-1), u(k-2))")
-    assert [plain(item.expression) for item in found.regressors] == ["y(k-1)", "u(k-1) - u(k-2)"]
-    assert rows(found) == [({"y(k-1)": 1.0}, 1.0)]
 
 
 @pytest.mark.parametrize("texts", [["u(k-1)", "u(k-2)"], ["y(k-1)^2", "y(k-2)^2"], ["phi1(u(k-1), u(k-2))"]])
@@ -92,12 +69,6 @@ def test_constrained_estimate_has_every_output_as_equilibrium():
 def test_constraints_are_found_by_name(name):
     assert constraint(name) is CONSTRAINTS[name]
     assert constraint(name).description
-
-
-def test_unknown_constraint_raises_settings_error():
-    with pytest.raises(SettingsError) as caught:
-        constraint("backlash")
-    assert str(caught.value).startswith("unknown constraints 'backlash': take one of none, hysteresis, odd")
 
 
 # User-defined constraints.

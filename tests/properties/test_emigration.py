@@ -52,22 +52,6 @@ def test_number_of_emigrants_follows_the_schedule(policy):
     assert len(select_migrants(replace(island, generation=8), many)) == len(population)
 
 
-@given(islands(), st.integers(1, 5))
-def test_best_policy_selects_the_fittest(island, count):
-    emigrants = SELECTION_POLICIES["best"](island.elite, count, Stream(0, 0, 0, Purpose.EMIGRATION))
-    fitness = {each.key: each.fitness for each in island.elite if isfinite(each.fitness)}
-    assert [each.fitness for each in emigrants] == sorted(fitness.values())[:count]
-
-
-@pytest.mark.parametrize("policy", ["best", "random"])
-def test_first_of_two_equal_structures_is_selected(policy):
-    one = next(each for each in models() if each.size > 1)
-    copy = replace(one, genes=one.genes[::-1])
-    assert copy != one
-    emigrants = SELECTION_POLICIES[policy]((one, copy), 2, Stream(0, 0, 0, Purpose.EMIGRATION))
-    assert emigrants == (one,)
-
-
 def pareto_reference(elite):
     """Return the non-dominated members of the elite, the first of equals."""
     size_and_fitness = {
@@ -112,18 +96,6 @@ def test_random_policies_select_every_member_of_their_pool(policy):
         for generation in range(1, 7)
     ]
     assert set(keys(everywhere)) == set(keys(pool))
-
-
-def test_emigration_stream_depends_on_island_generation_and_seed():
-    elite = select_elite(models(), 20, True)
-    setting = replace(SETTINGS, emigrants="random", migrants=6, migrate_every=1)
-    island = Island(0, 3, 1, (), elite, HallOfFame())
-    others = (replace(island, index=1), replace(island, generation=2), replace(island, seed=4))
-    # There are 20 * 19 * ... * 15 orders, so equal ones by chance are improbable.
-    assert len({select_migrants(each, setting) for each in (island, *others, island)}) == 4
-    for purpose in Purpose:
-        drawn = SELECTION_POLICIES["random"](elite, 6, Stream(3, 0, 1, purpose))
-        assert (drawn == select_migrants(island, setting)) == (purpose is Purpose.EMIGRATION)
 
 
 @pytest.mark.ci

@@ -5,13 +5,12 @@ from dataclasses import replace
 import pytest
 
 from islands.evolution.archipelago import Island
-from islands.evolution.engine import next_stop, receive_migrants, run_epoch, select_migrants
+from islands.evolution.engine import receive_migrants, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.generation import first_generation, step
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.problem import GeneEvolution, make_problem
 from support.migrations import (
-    SETTINGS,
     every_replacement_policy,
     recorded,
     run_next_epoch,
@@ -94,15 +93,6 @@ def test_epochs_without_immigrants_compose(search_problem):
     assert exactly(whole.island) == exactly(second.island)
     assert whole.steps == first.steps + second.steps
     assert whole.emigrants == second.emigrants
-
-
-def test_epoch_ends_at_the_next_stop_or_with_the_run():
-    setting = replace(SETTINGS, migrate_every="3,7:2", generations=12)
-    assert [next_stop(generation, setting) for generation in range(-1, 12)] == [
-        *(0, 3, 3, 3, 6, 6, 6, 7, 9, 9, 11, 11, 12)
-    ]
-    assert next_stop(-1, replace(setting, generations=0)) == 0
-    assert next_stop(0, replace(setting, generations=2)) == 2
 
 
 @pytest.mark.parametrize("calls", [1, 2, 3])

@@ -14,9 +14,8 @@ from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
-from islands.expressions.tree import Constant, Lagged
 from islands.simulation.outcome import Status
-from support.searches import SMALL, evolved, record
+from support.searches import record
 from support.variation import random_genes
 
 FREE = Settings(
@@ -135,16 +134,6 @@ def test_abandoned_individuals_have_a_fitness_above_the_threshold(name, threshol
 # Batches.
 
 
-def test_batch_equals_single_evaluations():
-    population = [(each, bool(place % 3)) for place, each in enumerate(evolved(2).population)]
-    together, duplicates = Evaluator(record(), SMALL).evaluate(population)
-    one_by_one = [Evaluator(record(), SMALL, Limits(pairs=0)).evaluate([pair])[0][0] for pair in population]
-    assert repr(list(together)) == repr(one_by_one)
-    backwards, others = Evaluator(record(), SMALL).evaluate(population[::-1])
-    assert list(backwards[::-1]) == one_by_one
-    assert duplicates == others > 0
-
-
 @pytest.fixture
 def batches(monkeypatch):
     """Sizes of the batches whose inner products are computed: of selections, then of evaluations."""
@@ -195,30 +184,6 @@ def test_abandoned_evaluation_answers_only_lower_thresholds():
 
 
 # Emptied caches, and zero genes.
-
-
-def test_clear_caches_empties_all_and_keeps_results():
-    evaluator = Evaluator(record(), FREE)
-    population = [(each, False) for each in POOL]
-    first = evaluator.evaluate(population)
-    assert evaluator.evaluate(population)[1] == len(POOL)
-    assert all(taken > 0 for taken, _ in evaluator.memory.values())
-    evaluator.clear_caches()
-    assert all(taken == 0 for taken, _ in evaluator.memory.values())
-    assert repr(evaluator.evaluate(population)) == repr(first)
-
-
-def test_zero_genes_are_removed_and_constants_are_kept():
-    """phi of equal lags is zero; an individual with no other genes is infeasible."""
-    zero = parse("phi1(q2(u(k-1)), q2(u(k-1)))")
-    evaluator = Evaluator(record(), replace(SMALL, constraints="none"))
-    (nothing, something), _ = evaluator.evaluate(
-        [(Individual((zero,)), False), (Individual((zero, Constant(3.0), Lagged(0))), False)]
-    )
-    assert (nothing.outcome.verdict.name, nothing.outcome.reason) == ("INFEASIBLE", "no gene is left")
-    assert nothing.genes == (zero,)
-    assert something.genes == (Constant(3.0), Lagged(0))
-    assert something.key == ("y(k-1)", "1")
 
 
 @pytest.mark.parametrize("name", SETTINGS)

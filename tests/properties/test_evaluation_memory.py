@@ -2,15 +2,11 @@
 
 import gc
 import tracemalloc
-from dataclasses import replace
 
 import pytest
 
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.generation import first_generation, step
-from islands.evolution.individual import Individual
-from islands.expressions.parsing import parse
-from islands.expressions.tree import Lagged
 from support.searches import SMALL, evolved, islands_of, record
 
 LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)
@@ -53,16 +49,3 @@ def test_measured_memory_of_an_evaluator_is_bounded():
     finally:
         tracemalloc.stop()
     assert max(measured) < 3 * (LIMITS.genes + LIMITS.structures)
-
-
-def test_pair_table_has_room_for_one_individual_at_any_limit():
-    """60 genes and y(k) have 1891 pairs; the smallest table has 1024 places."""
-    texts = [f"y(k-{1 + place % 10})*u(k-{1 + place // 10})" for place in range(60)]
-    setting = replace(SMALL, constraints="none", structure="free", max_terms=60, fitness="one-step")
-    large = [(Individual(tuple(map(parse, texts))), True)]
-    expected = Evaluator(record(), setting).evaluate(large)
-    assert expected[0][0].outcome
-    evaluator = Evaluator(record(), setting, Limits(pairs=0))
-    for _ in range(3):
-        evaluator.evaluate([(Individual((Lagged(0), parse(texts[0]))), False)])
-        assert repr(evaluator.evaluate(large)[0]) == repr(expected[0])

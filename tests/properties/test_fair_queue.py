@@ -103,15 +103,6 @@ def test_no_owner_waits_longer_than_its_bound(fair, weighted, earlier, data):
     assert bound > most or late in served
 
 
-def test_idle_owner_gets_no_credit(fair):
-    start(fair, {})
-    submit(fair, *"a" * 20, "b")
-    claims(fair, 11)
-    submit(fair, *"b" * 10, first=100)
-    got = Counter(claims(fair, 8))
-    assert max(got.values()) - min(got.values()) <= 1
-
-
 @few
 @given(weights, st.lists(st.sampled_from(OWNERS), min_size=1, max_size=20), st.integers(0, 19))
 def test_positions_are_the_order_of_the_claims(fair, weighted, queued, before):

@@ -4,7 +4,6 @@ Oracle: a textbook forward selection by modified Gram-Schmidt on columns, in ext
 """
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from islands.estimation.least_squares import least_squares
 from islands.estimation.structure_selection.froe import froe
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.kernels import err_selection
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix
 from islands.records.dataset import Dataset
@@ -25,13 +23,6 @@ from support.regressions import problem, seeds, squares
 def inner_products(psi, y):
     stacked = np.vstack([psi, y])
     return stacked @ stacked.T
-
-
-def prune(gram, tolerance):
-    """Return the positions that pruning keeps."""
-    terms = len(gram) - 1
-    kept = np.full(terms, -1)
-    return tuple(kept[: err_selection.prune(gram, terms, tolerance, kept)].tolist())
 
 
 def textbook(psi, y):
@@ -79,32 +70,6 @@ def test_error_reduction_ratios_sum_to_the_explained_fraction(seed, terms):
     assert sum(found.err) == pytest.approx(explained, abs=1e-9)
 
 
-@given(seeds)
-def test_selections_of_different_lengths_are_nested(seed):
-    gram = inner_products(*problem(seed, 7, noise=1.0))
-    selections = [froe(gram, max_terms=terms) for terms in range(9)]
-    assert [len(selection.order) for selection in selections] == [0, 1, 2, 3, 4, 5, 6, 7, 7]
-    for shorter, longer in pairwise(selections):
-        assert longer.order[: len(shorter.order)] == shorter.order
-        assert longer.err[: len(shorter.err)] == shorter.err
-
-
-@given(seeds, st.floats(1e-6, 0.3))
-def test_tolerance_truncates_the_selection(seed, tolerance):
-    gram = inner_products(*problem(seed, 7, noise=1.0))
-    full, stopped = froe(gram), froe(gram, tolerance)
-    count = len(stopped.order)
-    assert stopped.order == full.order[:count]
-    assert all(err > tolerance for err in stopped.err)
-    assert count == 7 or full.err[count] <= tolerance
-
-
-def test_candidate_that_explains_nothing_is_not_selected():
-    gram = np.array([[4.0, 0.0, 1.0, 2.0], [0.0, 9.0, 0.0, 0.0], [1.0, 0.0, 1.0, 3.0], [2.0, 0.0, 3.0, 25.0]])
-    assert froe(gram).order == (2, 0)
-    assert prune(gram, 0.0) == (0, 2)
-
-
 @pytest.mark.parametrize("value", [math.inf, math.nan])
 def test_overflowed_candidate_is_not_selected_and_has_no_effect(value):
     psi, y = problem(16, 4)
@@ -114,21 +79,6 @@ def test_overflowed_candidate_is_not_selected_and_has_no_effect(value):
     found = froe(gram)
     assert found.order == tuple(item + (item > 1) for item in usual.order)
     assert found.err == usual.err
-
-
-def test_pruning_orthogonalises_all_terms_before_removing_any():
-    # The second term alone explains 1 % and is selected first; then the first term explains the rest.
-    a, b, c = np.linalg.qr(np.random.default_rng(17).normal(size=(50, 3)))[0].T
-    y = a
-    psi = np.array([c + 0.05 * a, 0.1 * a + c + 0.01 * b])
-    gram = inner_products(psi, y)
-    found = froe(gram)
-    assert found.order == (1, 0)
-    assert found.err[0] == pytest.approx(0.0099, abs=1e-3)
-    assert found.err[1] > 0.9
-    assert prune(gram, 0.05) == (0,)
-    assert prune(gram, 1e-3) == (0, 1)
-    assert prune(gram, 0.9999) == ()
 
 
 # Units.

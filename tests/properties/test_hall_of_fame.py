@@ -1,14 +1,13 @@
 """Properties of the hall of fame: merging is commutative, associative and idempotent."""
 
 from collections import Counter
-from itertools import pairwise
 from math import inf, nan
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.hall_of_fame import HallOfFame, merge, pareto_front, with_entries
+from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
 from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged, Shift
@@ -100,27 +99,10 @@ def test_hall_keeps_the_best_distinct_structures_of_every_size(found):
     assert [entry.size for entry in hall.entries] == sorted(entry.size for entry in hall.entries)
 
 
-@given(halls)
-def test_fitness_improves_along_the_pareto_front(hall):
-    best = pareto_front(hall.entries)
-    assert all(one.size < other.size and one.fitness > other.fitness for one, other in pairwise(best))
-    for entry in hall.entries:
-        assert min(each.fitness for each in best if each.size <= entry.size) <= entry.fitness
-    assert hall.best() == {
-        size: next(entry for entry in hall.entries if entry.size == size)
-        for size in {entry.size for entry in hall.entries}
-    }
-
-
 def entry(fitness, *texts, theta=None):
     genes = tuple(parse(text) for text in texts)
     regressors = tuple(canonical_order(make_regressor(gene) for gene in genes))
     return Individual(genes, regressors, theta or (1.0,) * len(genes), fitness)
-
-
-def test_ties_of_fitness_and_structure_are_broken_by_parameters():
-    one, other = entry(1.0, "y(k-1)", theta=(0.5,)), entry(1.0, "y(k-1)", theta=(0.25,))
-    assert with_entries(HallOfFame(), [one, other]).entries[0].theta == (0.25,)
 
 
 @pytest.mark.parametrize("fitness", [nan, inf, -inf])

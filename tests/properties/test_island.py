@@ -15,16 +15,16 @@ import pytest
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.generation import first_generation, select_elite, step
+from islands.evolution.generation import first_generation, step
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, make_regressor, unique_niches
+from islands.evolution.individual import unique_niches
 from islands.evolution.problem import make_problem
 from islands.evolution.rng import Purpose, Stream
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
 from islands.persistence.checkpoints import write_checkpoint
 from support.repository import ROOT
-from support.searches import SMALL, distinct_genes, evolved, exactly, islands_of, record
+from support.searches import SMALL, evolved, exactly, islands_of, record
 from support.variation import breed_compiled, find_structure
 
 
@@ -84,14 +84,6 @@ def test_settings_of_an_island_override_those_of_the_evaluator():
 # Statistics of a step.
 
 
-def test_step_info_does_not_depend_on_the_evaluator():
-    """Evaluators with a full and with an empty cache, as after a resume, give equal statistics."""
-    warm = Evaluator(record(), SMALL)
-    islands = islands_of(warm, 4)
-    for island in islands[:-1]:
-        assert step(island, warm)[1] == step(island, Evaluator(record(), SMALL))[1]
-
-
 @pytest.mark.ci
 def test_ten_generations_give_equal_bits_in_other_processes():
     command = "import runpy, sys; print(runpy.run_path(sys.argv[1])['digest']())"
@@ -142,21 +134,6 @@ def test_hall_of_fame_keeps_models_that_the_population_has_lost():
 # Seeds, elites, failures.
 
 
-def test_first_population_begins_with_the_seeds():
-    setting = replace(SMALL, prune=0.0, library="phi-polynomial", library_degree=3, library_lags=3)
-    search_problem = make_problem(record(), setting)
-    assert [len(genes) for genes in search_problem.seeds] == sorted(
-        len(genes) for genes in search_problem.seeds
-    )
-    assert len(search_problem.seeds) > 2
-    island, _ = first_generation(0, 1, Evaluator(search_problem.record, setting), search_problem.seeds)
-    for each, genes in zip(island.population, search_problem.seeds, strict=False):
-        assert each.genes == genes
-        assert set(each.regressors) == set(distinct_genes(genes))
-    unseeded, _ = first_generation(0, 1, Evaluator(search_problem.record, setting))
-    assert island.population[len(search_problem.seeds) :] == unseeded.population[: -len(search_problem.seeds)]
-
-
 def test_seeds_are_repaired_and_truncated():
     setting = replace(SMALL, prune=0.0, max_terms=3, initial_terms=(1, 3))
     given_seeds = [
@@ -192,19 +169,6 @@ def test_elite_is_the_best_of_previous_elite_and_offspring(distinct):
             assert len(island.elite) == 6
             assert fitness == sorted(each.fitness for each in union)[: len(fitness)]
         assert len(island.population) == setting.population
-
-
-def test_ties_for_the_elite_are_broken_by_size_and_then_by_text():
-    def each(*texts):
-        regressors = tuple(make_regressor(parse(text)) for text in texts)
-        return Individual(tuple(map(parse, texts)), regressors, (1.0,) * len(texts), 0.5)
-
-    large, late, early = each("y(k-1)", "u(k-1)"), each("y(k-3)"), each("y(k-2)")
-    assert select_elite((large, late, early), 3, False) == (early, late, large)
-    assert select_elite((large, late, early, early), 2, False) == (early, early)
-    assert select_elite((large, late, early, early), 2, True) == (early, large)
-    assert select_elite((large, late, early, early), 3, True) == (early, late, large)
-    assert select_elite((large, late, early, early), 2, True, niches=False) == (early, late)
 
 
 @pytest.mark.parametrize("crossover", [0.0, 1.0])

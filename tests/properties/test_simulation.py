@@ -18,7 +18,6 @@ from islands.expressions.parsing import parse
 from islands.kernels.summation import total
 from islands.models.narx import make_model
 from islands.records.dataset import Dataset, join
-from islands.simulation.layout import WIDTHS, layout
 from islands.simulation.linked import LinkedModel
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 
@@ -152,22 +151,6 @@ def test_functions_of_the_mathematical_library_agree_to_rounding():
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.ci
-@every_model
-@pytest.mark.parametrize("interval", [1, 7, None])
-@pytest.mark.parametrize("width", WIDTHS)
-def test_result_does_not_depend_on_the_block_width(monkeypatch, name, interval, width):
-    data = record(MODELS[name])
-    usual = multiple_shooting(MODELS[name], data, interval)
-    assert usual.outcome
-    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (width,))
-    layout.cache_clear()
-    assert layout(data, MODELS[name].maximum_lag, interval).width == width
-    other = multiple_shooting(MODELS[name], data, interval)
-    assert equal_bits(usual.y, other.y)
-    assert usual.mean_squared_error == other.mean_squared_error
-
-
 # One-step-ahead prediction and free run as special cases.
 
 
@@ -186,16 +169,6 @@ def test_intervals_of_one_sample_are_one_step_ahead_predictions(name):
                 for weight, item in zip(chosen.theta, chosen.regressors, strict=True)
             ]
             assert found.y[k] == sum(terms, 0.0)
-
-
-@every_model
-@pytest.mark.parametrize("more", [0, 1, 10**9])
-def test_interval_as_long_as_the_record_is_the_free_run(name, more):
-    data = record(MODELS[name])
-    found = multiple_shooting(MODELS[name], data, data.samples + more)
-    expected = free_run(MODELS[name], data)
-    assert equal_bits(found.y, expected.y)
-    assert found.mean_squared_error == expected.mean_squared_error
 
 
 # Predicted samples.
@@ -245,17 +218,6 @@ def test_joined_recordings_are_predicted_independently(name, interval):
     assert equal_bits(together, np.concatenate(alone))
 
 
-def test_recordings_without_a_boundary_are_not_independent():
-    # Shows that the previous test can fail: the same samples as one recording have other predictions.
-    chosen, data = MODELS["linear"], record(MODELS["linear"], (40, 60))
-    whole = replace(data, segments=(100,), recordings=())
-    apart, joined = (free_run(chosen, item).y for item in (data, whole))
-    assert equal_bits(apart[:40], joined[:40])
-    assert np.isnan(apart[40])
-    assert np.isfinite(joined[40])
-    assert apart[45] != joined[45]
-
-
 # Linked models.
 
 
@@ -281,15 +243,6 @@ def test_linked_model_has_the_free_runs_of_the_model(data):
         for run, parameters, each in zip(found, theta, drawn, strict=True):
             expected = free_run(chosen.with_parameters(parameters), mask_after_warm_up(each, warm_up)).y
             assert equal_bits(run, expected)
-
-
-def test_linked_model_diverges_where_the_model_diverges():
-    chosen, data = MODELS["linear"], record(MODELS["linear"], (300,))
-    theta = 3.0 * np.array(chosen.theta)
-    (found,) = LinkedModel(chosen.regressors).free_runs(theta[None], [data.u.T], data.y[None, :2])
-    assert np.isnan(found[-1])
-    assert np.isfinite(found[2])
-    assert equal_bits(found, free_run(chosen.with_parameters(theta), mask_after_warm_up(data, 2)).y)
 
 
 def test_unpickled_linked_model_is_linked_again():

@@ -30,7 +30,7 @@ from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.diagnosis_documents import CAUSE, GAIN, make_document
 from support.searches import record
 from support.stated_results import list_texts, make_cases
-from support.statements import EXCLUSIVE, find_contradictions
+from support.statements import find_contradictions
 
 OK = EvaluationOutcome(Status.OK, "")
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 17")
@@ -313,29 +313,3 @@ def test_no_two_sentences_about_a_record_contradict_each_other(name):
     """In the summary, in a notebook, over REST and in the report, from the run and from its folder."""
     for where, text in list_texts(name, CASES[name]()).items():
         assert not find_contradictions(text), where
-
-
-def test_the_checker_finds_the_contradictions_that_were_printed():
-    """Each pair can be found: a checker that finds none shows nothing."""
-    assert find_contradictions("As a simulation: good. Fails at: the drift. ")
-    assert find_contradictions("As a simulation: usable, with limits. Fails at: none of the checks. ")
-    assert find_contradictions(
-        "no structure is left in the free-run residual; 94 % of the free-run residual is predictable"
-    )
-    assert find_contradictions(
-        "93 % of the residual of the free run is predictable; 94 % of the free-run residual is predictable"
-    )
-    assert find_contradictions(
-        "no structure is left in the residual of y1 and y2. 94 % of the residual of y2 is predictable"
-    )
-    assert find_contradictions(
-        "RMSE at the noise level of y. Fails at: simulation from the inputs alone: R2 0.3"
-    )
-    assert find_contradictions(
-        "RMSE at the noise level of y2, 0.1; simulation from the inputs alone: R2 0.3 of y2"
-    )
-    assert not find_contradictions(
-        "RMSE at the noise level of y2, 0.1; simulation from the inputs alone: R2 0.300 of y1"
-    )
-    assert len(set(EXCLUSIVE)) == len(EXCLUSIVE)
-    assert not find_contradictions("As a simulation: good. Fails at: none of the checks. ")

@@ -161,14 +161,6 @@ def test_children_of_a_crossover_are_valid(drawn, seed, high_level):
 
 
 @given(parents(2), seeds)
-def test_children_of_an_inner_mutation_are_valid(drawn, seed):
-    setting, inputs, couple = drawn
-    mutating = replace(setting, crossover=0.0, mutation=1.0, outer=0.0)
-    for child in breed_compiled(couple, mutating, inputs, stream(seed)):
-        assert faults(child, setting, inputs) == []
-
-
-@given(parents(2), seeds)
 def test_children_of_an_outer_mutation_are_valid(drawn, seed):
     setting, inputs, couple = drawn
     mutating = replace(setting, crossover=0.0, mutation=1.0, outer=1.0)

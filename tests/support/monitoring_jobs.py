@@ -4,12 +4,7 @@ from pathlib import Path
 
 from islands.records.dataset import Dataset
 from islands.records.writer import write_record
-from islands_service.coordinator.monitoring_job import run_monitoring_job
-from islands_service.domain.job import JobOutcome
-from islands_service.store.blobs import Blobs
-from support.job_runs import make_run
 from support.monitored_oscillator import SIMULATION
-from support.service import Service
 
 #: Body of a monitor of the records of `monitored_oscillator`.
 OSCILLATOR = {
@@ -27,13 +22,3 @@ def write_records(records: tuple[Dataset, ...], folder: Path) -> list[Path]:
     for record, path in zip(records, paths, strict=True):
         write_record(record, path)
     return paths
-
-
-def analyse_next(service: Service) -> JobOutcome:
-    """Claim the next record, analyse it and store the outcome."""
-    lease = service.store.leases.claim("test", 600.0)
-    assert lease is not None
-    blobs = Blobs(service.settings.blobs)
-    outcome = run_monitoring_job(make_run(lease, service.store, blobs))
-    service.store.leases.finish(lease, outcome)
-    return outcome

@@ -73,6 +73,21 @@ CASES = {
 }
 
 
+#: Smallest argument whose quotients with the others are finite.
+_SMALLEST = 1e-300
+
+#: Arguments at which primitives jump, are protected or clipped, and their neighbours.
+_EDGES = [0.0, -0.0, 1.0, -1.0, _SMALLEST, -_SMALLEST, 1e-9, -1e-9, 49.9, 50.1, 700.0, -700.0]
+
+
+def at_the_edges(name):
+    """Return a model of one primitive, and a record with every pair of edge values."""
+    pairs = np.array([(a, b) for a in _EDGES for b in _EDGES])
+    u = np.vstack([pairs, [0.0, 0.0]])
+    arguments = "u1(k-1), u2(k-1)" if PRIMITIVES[name].arity == 2 else "u1(k-1)"
+    return model({f"{name}({arguments})": 1.0}, ("a", "b")), Dataset(u, np.zeros(len(u)), 0.1)
+
+
 def record_of(name):
     """Return the record of a case."""
     return record(CASES[name].inputs, dt=CASES[name].dt or 0.1)

@@ -133,16 +133,6 @@ def problem_of(response: httpx.Response, status: int, kind: str) -> str:
     return str(document["detail"])
 
 
-def nothing_stored(service: Service) -> bool:
-    """Return whether there is no job, no data set and no blob."""
-    files = [path for path in service.settings.blobs.rglob("*") if path.is_file()]
-    return not (
-        files
-        or service.client.get("/v1/datasets").json()["items"]
-        or service.client.get("/v1/jobs").json()["items"]
-    )
-
-
 def columns(samples: int = 200) -> dict[str, np.ndarray]:
     """Make a record with a time, an input and an output that depends on it."""
     rng = np.random.default_rng(1)
@@ -174,27 +164,6 @@ def npz(**arrays: Any) -> bytes:
     """Make an archive of NumPy."""
     stream = io.BytesIO()
     np.savez(stream, **arrays)
-    return stream.getvalue()
-
-
-def matlab_5() -> bytes:
-    """Make a record in the default format of MATLAB."""
-    import scipy.io
-
-    stream = io.BytesIO()
-    scipy.io.savemat(stream, columns())
-    return stream.getvalue()
-
-
-def matlab_73() -> bytes:
-    """Make a record in the HDF5 format of MATLAB (7.3)."""
-    import h5py
-
-    stream = io.BytesIO()
-    with h5py.File(stream, "w") as file:
-        for name, values in columns().items():
-            file[name] = values[None]
-            file[name].attrs["MATLAB_class"] = np.bytes_("double")
     return stream.getvalue()
 
 

@@ -78,15 +78,6 @@ def regressors(inputs=INPUTS, height=3):
 
 
 @st.composite
-def phi_factors(draw):
-    """Draw phi1 or phi2 of two lags of one input, as a factor of a product (the paper, section 3)."""
-    channel = draw(st.integers(1, INPUTS))
-    first, second = draw(st.lists(st.integers(1, DEEPEST), min_size=2, max_size=2, unique=True))
-    name = draw(st.sampled_from(["phi1", "phi2"]))
-    return Apply(PRIMITIVES[name], (Lagged(channel, first), Lagged(channel, second)))
-
-
-@st.composite
 def signals(draw):
     """Draw a function (channel, lag) -> number on the grid, for every lag that an expression can reach."""
     seed = draw(st.integers(0, 2**32 - 1))

@@ -62,6 +62,7 @@ def test_error_names_the_invalid_effect(record: Dataset, case: str) -> None:
     assert str(raised.value).endswith(".py or remove the effect from the catalogue")
 
 
+@pytest.mark.nightly
 def test_effect_without_starting_points_is_skipped(record: Dataset) -> None:
     effect = replace(VALID, starting_points=lambda _context, _residual: ())
     found = diagnose(record, make_piezo(), catalogue=(effect, CATALOGUE["jump"]))

@@ -58,24 +58,6 @@ def test_fractions_are_those_of_the_whole_by_the_shares_of_the_phases() -> None:
     assert [fraction for _, fraction in reported] == pytest.approx([0.0, 1 / 8, 5 / 8, 7 / 8])
 
 
-def test_a_phase_that_an_earlier_one_replaces_is_no_part_of_the_whole() -> None:
-    phases = (
-        *(Phase("read", 1.0), Phase("refine", 2.0)),
-        *(Phase("search", 4.0, unless="refine"), Phase("search", 1.0)),
-    )
-    progress, reported = phased(phases)
-    for message in ("read", "refine"):
-        progress(message)
-    assert reported[-1][1] == pytest.approx(1 / 4)
-    assert progress.rest == pytest.approx(0.5)
-    progress("search")
-    assert reported[-1][1] == pytest.approx(3 / 4)
-    without, seen = phased(phases)
-    for message in ("read", "search"):
-        without(message)
-    assert seen[-1][1] == pytest.approx(1 / 6)
-
-
 def test_messages_and_calls_of_a_phase_increase_the_fraction() -> None:
     progress, reported = phased()
     progress("trial of a")
@@ -115,20 +97,6 @@ def test_time_left_decreases_between_reports_until_it_is_unknown() -> None:
     assert left.at(110.0) is None  # the same fraction is no progress
     left.update(0.8, 120.0)
     assert left.at(120.0) == pytest.approx(5.0)
-
-
-def test_time_left_begins_again_with_a_smaller_fraction() -> None:
-    left = TimeLeft(0.0, least=0.3)
-    left.update(0.2, 10.0)
-    assert left.at(10.0) is None
-    left.update(0.5, 20.0)
-    assert left.at(20.0) == pytest.approx(20.0)
-    left.update(0.0, 30.0)
-    assert left.at(30.0) is None
-    left.update(0.5, 34.0)
-    assert left.at(34.0) == pytest.approx(4.0)
-    left.expect(60.0, 34.0)
-    assert left.at(35.0) == pytest.approx(59.0)
 
 
 def test_parts_of_a_computation_share_the_time_that_is_left() -> None:

@@ -52,13 +52,3 @@ def test_a_store_that_fails_again_and_again_is_logged_once_a_minute(outage: Outa
             outage.succeed()
             clock.now += 0.5
     assert [entry["event"] for entry in logs] == ["store away", "store back"]
-
-
-def test_a_failure_long_after_the_last_one_begins_another_outage(outage: OutageLog, clock: Clock) -> None:
-    """A request that fails and is not repeated is no outage that lasts until the next failure."""
-    retry(outage, clock, 5.0)
-    clock.now += 3600.0
-    with structlog.testing.capture_logs() as logs:
-        retry(outage, clock, 5.0)
-        outage.succeed()
-    assert [(entry.get("failures"), entry.get("seconds")) for entry in logs] == [(None, None), (10, 5.0)]

@@ -1,9 +1,7 @@
 """Addresses: the public ones, in every notation, and the resolution of names."""
 
 import asyncio
-import socket
 import ssl
-import threading
 
 import pytest
 import trustme
@@ -180,29 +178,6 @@ def test_the_name_is_resolved_once_and_the_next_address_is_tried(names):
     assert asked == ["hooks.lan"]
 
 
-def test_names_that_are_not_resolved_delay_no_other_request(monkeypatch):
-    """The threads of an event loop are six on two cores."""
-    released = threading.Event()
-
-    def resolve(host, *arguments, **named):
-        if host == "slow.example.org":
-            released.wait(30.0)
-        return getaddrinfo("127.0.0.1", *arguments, **named)
-
-    getaddrinfo = socket.getaddrinfo
-    monkeypatch.setattr(socket, "getaddrinfo", resolve)
-
-    async def run():
-        slow = [asyncio.create_task(LOCAL.check_host("https://slow.example.org/", 30.0)) for _ in range(50)]
-        await asyncio.sleep(0)
-        await LOCAL.check_host("https://127.0.0.1/", 5.0)
-        assert not any(task.done() for task in slow)
-        released.set()
-        await asyncio.gather(*slow, return_exceptions=True)
-
-    asyncio.run(run())
-
-
 def test_a_proxy_of_the_environment_is_not_used(monkeypatch):
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     assert exchange(LOCAL, OK)[0].status_code == 200
@@ -228,11 +203,6 @@ def test_a_slow_answer_ends_at_the_limit_whatever_part_is_slow(part):
 def test_an_answer_that_is_no_http_is_an_error_with_the_host(answer):
     with pytest.raises(OutboundFailedError, match=r"the request to 127\.0\.0\.1 failed"):
         exchange(LOCAL, answer)
-
-
-def test_a_body_above_its_limit_is_an_error():
-    with pytest.raises(OutboundFailedError, match="more than 3 bytes"):
-        exchange(LOCAL, OK, most=3)
 
 
 @pytest.mark.parametrize("name", ["hooks.example.org", "others.example.org"])

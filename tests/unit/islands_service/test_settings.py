@@ -62,26 +62,6 @@ def test_value_out_of_range_is_refused_with_the_name_of_its_setting(monkeypatch,
         service_settings()
 
 
-def test_child_process_has_the_same_settings(monkeypatch, tmp_path):
-    given = ServiceSettings(
-        data_dir=tmp_path,
-        database="postgresql+psycopg://me@host/islands",
-        port=9000,
-        lease=2.5,
-        require_keys=True,
-        tls_key=tmp_path / "key.pem",
-        log_format="json",
-        rate=0.0,
-        lifeline=7,
-        readers=8,
-    )
-    environment = given.environment()
-    assert not {"ISLANDS_LIFELINE", "ISLANDS_READERS"} & environment.keys()
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    assert service_settings() == given.model_copy(update={"lifeline": None, "readers": None})
-
-
 def test_database_is_read_from_a_file_which_child_processes_read_again(monkeypatch, tmp_path):
     path = tmp_path / "database"
     path.write_text("postgresql+psycopg://me:secret@host/islands\n")

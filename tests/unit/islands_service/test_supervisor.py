@@ -170,56 +170,12 @@ def test_other_roles_wait_for_the_first_heartbeat_of_the_api(supervised: Start) 
     assert running.order("start", "ready")[:2] == ["api start", "api ready"]
 
 
-#: Needs another role while the journal has an odd number of demands.
-NEEDY = """
-def live():
-    demands = open(os.environ["JOURNAL"]).read().count("demand")
-    os.write(int(os.environ["ISLANDS_LIFELINE"]), b"n" if demands % 2 else b".")
-LIVE = live
-stay()
-"""
-
-
-def test_role_is_restarted_with_a_role_that_it_uses(supervised: Start) -> None:
-    roles = (role("api"), role("work", NEEDY, needs=["ray"]), role("other", needs=["ray"]), role("ray"))
-    running = supervised(*roles)
-    running.started(4)
-    running.note("demand")
-    time.sleep(0.3)
-    before = {name: pid for _, name, _, pid in running.entries("start")}
-    os.kill(before["ray"], signal.SIGKILL)
-    running.started(2, "ray")
-    running.started(2, "work")
-    assert not alive([before["work"], before["ray"]])
-    assert alive([before["api"], before["other"]]) == [before["api"], before["other"]]
-    # In the other direction no other role is affected.
-    os.kill(running.entries("start", "work")[-1][3], signal.SIGKILL)
-    running.started(3, "work")
-    assert len(running.entries("start", "ray")) == 2
-
-
 def test_misconfigured_role_ends_all_roles_and_the_supervisor(supervised: Start) -> None:
     refusing = role("api", "note('start'); heartbeat(); wait('work start'); sys.exit(2)")
     running = supervised(refusing, role("work"))
     assert "started again" not in running.said()
     assert running.process.returncode == 2
     assert running.order("signalled", "end") == ["work signalled", "work end"]
-
-
-def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: Start) -> None:
-    """For example the API whose last key has expired: jobs continue."""
-    script = (
-        "count = open(os.environ['JOURNAL']).read().count('api start')\n"
-        "if count in (1, 2): note('start'); sys.exit(2)\n"
-        "stay()"
-    )
-    running = supervised(role("api", script), role("work"), _FIRST_BACKOFF=0.05)
-    running.started(1, "work")
-    os.kill(running.started(1, "api")[0][3], signal.SIGKILL)
-    running.started(4, "api")
-    assert len(running.entries("start", "work")) == 1
-    assert running.end().count("api ended (2): it is started again") == 2
-    assert running.process.returncode == 0
 
 
 @pytest.mark.parametrize("heartbeat", ["heartbeat(); ", ""])

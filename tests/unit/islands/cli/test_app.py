@@ -244,15 +244,6 @@ def test_deliberate_error_is_printed_as_a_message(run, monkeypatch, error, code,
     assert err.strip() == message
 
 
-def test_programming_error_is_not_hidden(run, monkeypatch):
-    def stop(*_):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr("islands.cli.commands.show.term_table", stop)
-    with pytest.raises(ZeroDivisionError):
-        run("show", "published:12")
-
-
 def test_interrupt_exits_with_code_130(run, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt

@@ -52,14 +52,6 @@ def test_stopped_command_without_a_result_says_so(
     assert capsys.readouterr().err == said
 
 
-def test_result_from_which_nothing_was_left_out_is_complete(capsys: pytest.CaptureFixture[str]) -> None:
-    with stop_requests() as stop:
-        signal.raise_signal(signal.SIGINT)
-    with pytest.raises(typer.Exit):
-        stop.end(None, [], "repeat it")
-    assert capsys.readouterr().err == "stopped: the result so far is above, which is complete\n"
-
-
 def test_limit_without_a_signal_is_an_error_of_the_command() -> None:
     with pytest.raises(StoppedError), stop_requests():
         raise StoppedError("first populations")

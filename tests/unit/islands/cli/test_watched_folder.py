@@ -41,22 +41,6 @@ def test_a_file_that_grows_is_not_read(tmp_path):
     assert names(watched, NOW + 4.0) == ["a.csv"]
 
 
-def test_a_file_with_an_old_time_that_still_grows_is_not_read(tmp_path):
-    """Some programs copy the time of modification before the content."""
-    watched = WatchedFolder(tmp_path, 2.0)
-    path = write(tmp_path / "a.csv", "1", age=1.0)
-    assert names(watched) == []
-    write(path, "12", age=100.0)
-    assert names(watched, NOW + 1.0) == []
-    assert names(watched, NOW + 3.0) == ["a.csv"]
-
-
-def test_the_interval_is_that_of_the_names(tmp_path):
-    for hour in (1, 2, 3, 7):
-        write(tmp_path / f"2026-11-01T{hour:02d}-00.csv")
-    assert WatchedFolder(tmp_path, 2.0).interval == 3600.0
-
-
 @pytest.mark.parametrize(
     ("name", "time"),
     [

@@ -27,15 +27,3 @@ def test_names_are_withdrawn_that_slow_noise_hides_in_the_rmse() -> None:
     assert found.verdict == Verdict.UNKNOWN
     everywhere = islands.diagnose(recorded(u, theirs + noise + law), "column:theirs", **options)
     assert everywhere.verdict not in (Verdict.UNKNOWN, Verdict.NOTHING)
-
-
-@pytest.mark.ci
-def test_verdict_of_coloured_noise_alone_is_noise() -> None:
-    """Properties of the noise are no cause of a discrepancy."""
-    rng = np.random.default_rng(0)
-    u = lfilter([1.0], [1.0, -0.6], rng.standard_normal(2000))
-    theirs = lfilter([0.3], [1.0, -0.7], u)
-    noise = 0.05 * lfilter([1.0], [1.0, -0.7], rng.standard_normal(2000))
-    found = islands.diagnose(recorded(u, theirs + noise), "column:theirs", columns={"theirs": theirs})
-    assert [each.name for each in found.effects] == ["coloured-noise"]
-    assert found.verdict == Verdict.NOISE

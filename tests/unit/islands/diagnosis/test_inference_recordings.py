@@ -11,7 +11,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import cross_validate_gain
 from islands.diagnosis.inference.noise_detectors import DETECTORS, NoiseFinding
-from islands.diagnosis.inference.noise_floor import explainable_variance
 from islands.diagnosis.inference.residual_structure import find_residual_structure
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import choose_reference_fit
@@ -65,20 +64,6 @@ def test_first_samples_of_recordings_are_no_outliers() -> None:
     assert detect("outliers", slow, slow, (1000,)) is not None
     assert detect("outliers", slow, slow, lengths) is None
     assert detect("heteroscedastic-noise", np.ones(1000), slow, lengths) is None
-
-
-def test_past_of_another_recording_does_not_explain_a_residual() -> None:
-    parts = draw_inputs()
-    u = np.concatenate(parts)
-    # What the end of a recording leaves behind in a joined record decays in the next one.
-    left_behind = scipy.signal.lfilter([0.05], [1.0, -0.95], u - u[0])
-    left_behind -= np.concatenate(
-        [scipy.signal.lfilter([0.05], [1.0, -0.95], part - part[0]) for part in parts]
-    )
-    residual = left_behind + 0.03 * np.random.default_rng(5).standard_normal(SAMPLES)
-    across = explainable_variance(residual, u, u, np.random.default_rng(0))
-    within = explainable_variance(residual, u, u, np.random.default_rng(0), LENGTHS)
-    assert within < across
 
 
 def test_steps_between_recordings_are_no_rate() -> None:

@@ -12,8 +12,7 @@ from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
-from islands.records.split import MIN_RECORDING_SAMPLES, estimation_part
-from islands.report.documents.extension_json import extended_document
+from islands.records.split import MIN_RECORDING_SAMPLES
 from support.joined_oscillator import SIGMA, oscillator_recordings
 
 #: Effects that are searched for in a fast test.
@@ -40,17 +39,6 @@ def test_effect_is_named_and_predicts_whole_recordings(found: Diagnosis) -> None
     assert found.gain is not None
     assert found.gain.after.rmse == pytest.approx(SIGMA, rel=0.2)
     assert found.gain.before.rmse > 3 * SIGMA
-
-
-@pytest.mark.nightly
-def test_extended_simulation_fits_the_initial_states_of_new_recordings(
-    stiffened: Dataset, found: Diagnosis
-) -> None:
-    document = extended_document(found.best, stiffened)
-    assert [list(each["parameters"]) for each in document["effects"]] == [["k"]]
-    other = islands.join(oscillator_recordings(2, (150, 100), "cubic-stiffness", 300.0))
-    error = other.y - islands.simulate(document, other).y
-    assert np.sqrt(np.mean(error**2)) == pytest.approx(SIGMA, rel=0.2)
 
 
 @pytest.mark.ci
@@ -101,12 +89,3 @@ def test_short_recording_is_rejected() -> None:
     ):
         islands.diagnose(record, "second-order")
     assert count_fitted_samples(islands.join((first, second[:MIN_RECORDING_SAMPLES]))) == 240
-
-
-@pytest.mark.parametrize(
-    ("lengths", "expected"),
-    [((400,), 300), ((300, 100), 300), ((310, 90), 310), ((285, 115), 285), ((320, 80), 300)],
-)
-def test_holdout_part_does_not_cut_off_a_few_samples(lengths: tuple[int, ...], expected: int) -> None:
-    record = islands.join(oscillator_recordings(1, lengths))
-    assert estimation_part(record).samples == expected

@@ -27,11 +27,6 @@ def test_harmonic_of_the_input_is_no_disturbance(order: int) -> None:
     assert all(abs(each - order * INPUT) > 1.0 / 15.0 for each in find_frequencies(U, order * INPUT))
 
 
-@pytest.mark.parametrize("frequency", [1.5 * INPUT, 2.5 * INPUT, 7.3])
-def test_line_between_the_harmonics_of_the_input_is_a_disturbance(frequency: float) -> None:
-    assert find_frequencies(U, frequency) == pytest.approx([frequency], abs=0.02)
-
-
 def make_two_inputs(seed: int, gain: float, coupled: float = 0.0) -> islands.Dataset:
     """Return a record of a linear system with two forces; the second one may couple into the output."""
     rng = np.random.default_rng(seed)

@@ -1,7 +1,5 @@
 """Forces and errors of the sensor that are periodic in the measured position."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -54,20 +52,6 @@ def test_a_cyclic_error_has_its_line_over_the_simulated_position(seed: int) -> N
     noise = 0.5 * np.std(error) * np.random.default_rng(seed).standard_normal(x.size)
     found = find_frequencies(CYCLIC_ERROR, x + error + noise, error + noise)
     assert np.min(np.abs(np.array(found) - 1.0 / pitch)) < 0.25 / RANGE
-
-
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
-def test_a_measured_position_that_changes_is_needed(effect: Effect) -> None:
-    assert effect.is_applicable(make_axis_context(move_back_and_forth()))
-    assert not effect.is_applicable(make_axis_context(np.ones(TIME.size)))
-    assert not effect.is_applicable(make_axis_context(None))
-
-
-def test_cogging_needs_a_position_that_is_the_output() -> None:
-    context = make_axis_context(move_back_and_forth())
-    driven = replace(context, force_coordinate=replace(context.force_coordinate, is_output=False))
-    assert not COGGING.is_applicable(driven)
-    assert CYCLIC_ERROR.is_applicable(driven)
 
 
 @pytest.mark.ci

@@ -5,11 +5,8 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import islands
-from islands.effects.interface.context import SimulationContext
 from islands.effects.sweep import (
-    SWEPT_DISTURBANCE,
     find_sweep,
-    measure_line,
 )
 
 DT, SAMPLES = 0.005, 2000
@@ -43,30 +40,6 @@ def test_a_sweep_is_found_in_noise(first: float, last: float, samples: int) -> N
     assert found.frequency / DT == pytest.approx(first, abs=1.5 * resolution)
     end = found.frequency / DT + found.rate / DT**2 * samples * DT
     assert end == pytest.approx(last, abs=2.0 * resolution)
-
-
-def test_noise_and_a_steady_line_are_no_sweep() -> None:
-    noise = np.random.default_rng(2).standard_normal(SAMPLES)
-    assert measure_line(noise) < 0.05
-    steady = np.cos(2 * np.pi * 7.0 * DT * np.arange(SAMPLES))
-    assert measure_line(steady) > 0.9
-    found = find_sweep(steady, None, 4.0)
-    assert found is not None
-    assert found.power < 0.4 * SAMPLES / 2
-    assert find_sweep(np.zeros(SAMPLES), None, 4.0) is None
-
-
-def make_context(u: np.ndarray, measured: np.ndarray) -> SimulationContext:
-    return SimulationContext(u, DT, {}, {}, 1.0, 1.0, "N", "mm", 7.5, measured=measured)
-
-
-def test_a_sweep_behind_a_resonance_starts_with_the_force_that_acts() -> None:
-    u, wave = draw_input(4), 0.4 * make_wave(0.5, 15.0)
-    residual = move(wave)
-    point, *_ = SWEPT_DISTURBANCE.starting_points(make_context(u, move(u) + residual), residual)
-    cosine, sine, frequency, rate = point
-    assert (frequency, rate) == (pytest.approx(0.5, abs=0.15), pytest.approx(1.45, abs=0.02))
-    assert np.hypot(cosine, sine) == pytest.approx(0.4, rel=0.2)
 
 
 def diagnose(u: np.ndarray, y: np.ndarray) -> islands.DiagnosisResult:

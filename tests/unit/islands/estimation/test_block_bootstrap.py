@@ -5,7 +5,6 @@ import pytest
 
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimate import estimate
-from islands.estimation.refinement import refine
 from islands.expressions.parsing import parse
 from islands.models.regressor import regressor
 from islands.records.dataset import Dataset
@@ -16,7 +15,6 @@ def terms(*texts):
 
 
 LINEAR = terms("y(k-1)", "u(k-1)")
-HYSTERESIS = terms("y(k-1)", "phi1(u(k-1), u(k-2))", "y(k-1)*phi1(u(k-1), u(k-2))", "y(k-1)*u(k-1)")
 
 
 def record(samples=900, noise=0.1, seed=0, scale=1.0):
@@ -53,25 +51,6 @@ def test_a_draw_minimises_the_weighted_squares_of_the_blocks():
     psi = np.column_stack([data.y[:-1], data.u[:-1, 0]])
     expected = np.linalg.solve(psi.T @ (weights * psi), psi.T @ (weights[:, 0] * data.y[1:]))
     assert found == pytest.approx(expected, rel=1e-7)
-
-
-def test_every_draw_meets_the_constraints():
-    data = record()
-    model = estimate(HYSTERESIS[:3], data, "hysteresis").model
-    drawn = draw(model, data, constraints="hysteresis")
-    assert np.ptp(drawn[:, 0]) == 0.0
-    assert drawn[0, 0] == pytest.approx(1.0, abs=1e-15)
-    assert (np.std(drawn[:, 1:], axis=0) > 0.0).all()
-
-
-def test_draws_of_refined_parameters_scatter_about_them():
-    data = record()
-    start = estimate(LINEAR, data).model
-    refined = refine(start, data, 30).model
-    drawn = draw(refined, data, interval=30)
-    deviation = np.std(drawn, axis=0)
-    assert np.abs(drawn.mean(axis=0) - refined.parameters) == pytest.approx(0.0, abs=0.3 * deviation.min())
-    assert (deviation > 0.0).all()
 
 
 def test_no_draw_has_an_excluded_sign():

@@ -46,26 +46,6 @@ def test_noise_terms_remove_the_bias_of_least_squares():
     assert variance == pytest.approx(0.25, rel=0.03)
 
 
-def test_white_noise_needs_no_noise_terms():
-    """Then the estimate is that of least squares, bit for bit."""
-    psi, y = make_problem(noise=())
-    found, expected = estimate(psi, y), least_squares(psi, y)
-    assert found.noise == ()
-    assert np.array_equal(found.estimate.theta, expected.theta)
-    assert np.array_equal(found.estimate.standard_errors, expected.standard_errors)
-
-
-def test_extended_least_squares_meets_its_constraints():
-    psi, y = make_problem()
-    S, c = np.array([[1.0, 2.0]]), np.array([1.8])
-    found = estimate(psi, y, S, c)
-    assert found.noise
-    np.testing.assert_allclose(S @ found.estimate.theta, c, rtol=1e-12)
-    assert (found.estimate.standard_errors > 0.0).all()
-    free = estimate(psi, y)
-    assert found.estimate.residual_variance >= free.estimate.residual_variance * (1.0 - 1e-3)
-
-
 def test_constraints_that_determine_all_parameters_leave_nothing_to_estimate():
     psi, y = make_problem()
     found = estimate(psi, y, np.eye(2), np.array([0.8, 0.5]))
@@ -81,19 +61,6 @@ def test_failures_are_those_of_constrained_least_squares():
     assert estimate(psi[:, :2], y[:2]).verdict is Status.TOO_FEW_ROWS
     S, c = np.zeros((1, 2)), np.zeros(1)
     assert estimate(psi, y, S, c).verdict is Status.INFEASIBLE
-
-
-def test_segments_are_filtered_separately():
-    """A first recording of one row only shifts the start of the recursion."""
-    psi, y = make_problem()
-    joined = np.hstack([psi[:, :1], psi]), np.append(y[0], y)
-    found = estimate(*joined, segments=[1, y.size])
-    np.testing.assert_allclose(found.estimate.theta, estimate(psi, y).estimate.theta, atol=2e-3)
-    swapped = np.roll(np.arange(y.size), 700)
-    parts = estimate(psi[:, swapped], y[swapped], segments=[700, y.size - 700])
-    np.testing.assert_allclose(
-        parts.estimate.theta, estimate(psi, y, segments=[y.size - 700, 700]).estimate.theta, rtol=1e-6
-    )
 
 
 def test_sensitivities_are_the_derivatives_of_the_prediction():

@@ -8,7 +8,7 @@ import pytest
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.latent_refit import refit_latent
 from islands.records.dataset import join
-from islands.records.flat_extremes import NO_LIMITS, SensorLimits, find_limits
+from islands.records.flat_extremes import find_limits
 from islands.simulation.predictors import free_run
 from support.latent_systems import SPRING, make_model, spring_record
 
@@ -49,15 +49,6 @@ def test_a_limited_sensor_does_not_bias_the_parameters():
     assert errors[1] < 1.1 * errors[0] < 1.3e-4
     # The limit belongs to the model, whose output is limited as that of the sensor.
     assert free_run(refit(limited, clipped), clipped, 60).mean_squared_error < errors[0]
-
-
-def test_the_limits_become_those_of_the_record():
-    record = spring_record(600)
-    lower = float(np.quantile(record.y, 0.1))
-    wrong = replace(make_model(), limits=SensorLimits(None, float(np.quantile(record.y, 0.6))))
-    found = refit(wrong, replace(record, y=np.maximum(record.y, lower)))
-    assert found.limits == (lower, None)
-    assert free_run(replace(found, limits=NO_LIMITS), record, 60).mean_squared_error < 1e-6
 
 
 @pytest.mark.parametrize("offset", [0.0, 500.0])

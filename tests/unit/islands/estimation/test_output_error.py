@@ -9,9 +9,9 @@ from scipy.signal import lfilter
 from islands.estimation.estimate import estimate
 from islands.estimation.output_error import fit_output_error
 from islands.estimation.refinement import refine
-from islands.records.dataset import Dataset, join
+from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_inputs
-from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, TANK_NOISE, make_battery, make_tank
+from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, make_battery, make_tank
 
 
 def poles(model):
@@ -51,13 +51,6 @@ def test_poles_of_a_battery_are_found_where_least_squares_fails():
     assert poles(estimate(best.model.regressors, record).model)[0] < 0.7
 
 
-def test_level_of_a_tank_has_two_terms():
-    best = fit_output_error(make_tank(0, 500))[0]
-    assert best.model.parameter_names == ("y(k-1)", "u1(k-1)")
-    assert best.model.theta == pytest.approx((1.0, 0.02), abs=2e-4)
-    assert best.residual_variance**0.5 == pytest.approx(TANK_NOISE, rel=0.1)
-
-
 def test_law_of_a_noise_free_record_is_exact():
     record = make_record(1, [0.1, 0.15], [1.0, -1.5, 0.7], 0.0)
     found = {each.model.size: each.model for each in fit_output_error(record)}
@@ -72,14 +65,6 @@ def test_model_has_a_constant_only_if_the_output_has_an_offset():
         assert dict(zip(found.parameter_names, found.theta, strict=True))["y(k-1)"] == pytest.approx(
             0.9, abs=0.01
         )
-
-
-def test_initial_states_differ_between_segments():
-    parts = [make_tank(seed, 120) for seed in range(4)]
-    record = join(tuple(replace(part, y=part.y + 5.0 * place) for place, part in enumerate(parts)))
-    found = fit_output_error(record)[0]
-    assert found.model.theta == pytest.approx((1.0, 0.02), abs=3e-4)
-    assert found.residual_variance**0.5 == pytest.approx(TANK_NOISE, rel=0.15)
 
 
 def test_dead_times_shift_the_lags_of_their_inputs():
@@ -129,16 +114,6 @@ def test_intervals_contain_the_true_parameters():
         inside.append(np.abs(np.subtract(model.theta, true)) <= 1.96 * np.array(model.standard_errors))
     # Of 240 intervals with a probability of 0.95.
     assert 0.9 < np.mean(inside) < 0.99
-
-
-@pytest.mark.ci
-def test_whitened_error_of_coloured_noise_has_the_smaller_variance():
-    true = np.array([1.5, -0.7, 0.1, 0.15])
-    pairs = [pair for pair in (fit_pair(make_coloured_record(seed)) for seed in range(30)) if len(pair) == 2]
-    assert len(pairs) > 25
-    errors = np.array([[np.array(each.model.theta[:4]) - true for each in pair] for pair in pairs])
-    first, second = np.sqrt(np.mean(errors**2, axis=0))
-    assert (second < 0.8 * first).all()
 
 
 @pytest.mark.ci

@@ -14,13 +14,12 @@ from islands.estimation.refinement import RefinedModel, begin_refinement, refine
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Apply, Lagged
-from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums
-from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record
+from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 
 HYSTERESIS = {
     "y(k-1)": 1.0,
@@ -112,33 +111,6 @@ def test_model_without_free_directions_is_unchanged():
     assert found.before == found.after
 
 
-def test_standard_errors_match_a_monte_carlo():
-    """With measurement noise only, compare the standard errors with the spread over 60 records."""
-    clean = make_record(HYSTERESIS, samples=400)
-    rng = np.random.default_rng(12)
-    found = []
-    for _ in range(60):
-        # The first two samples, the initial values of a run, are free of noise.
-        noise = np.where(np.arange(400) < 2, 0.0, 0.02 * rng.normal(size=400))
-        found.append(refine_model(model(HYSTERESIS), replace(clean, y=clean.y + noise), None).model)
-    spread = np.std([each.parameters for each in found], axis=0)
-    predicted = np.mean([each.standard_errors for each in found], axis=0)
-    # The standard deviation of 60 draws has a relative error of 9 %; allow three times that.
-    assert predicted == pytest.approx(spread, rel=0.28)
-    mean = np.mean([each.parameters for each in found], axis=0)
-    assert np.all(np.abs(mean - model(HYSTERESIS).parameters) < 4 * predicted / np.sqrt(60))
-
-
-@pytest.mark.parametrize("constraints", ["none", "hysteresis"])
-def test_one_step_ahead_refinement_equals_least_squares(constraints):
-    """The one-step-ahead error is linear in the parameters; the record has only 14 samples."""
-    record = make_record(CLUSTERED, samples=14, noise=0.05)
-    start = estimate(model(CLUSTERED).regressors, record, constraints).model
-    found = refine_model(start, record, 1, constraints)
-    assert found.model.parameters == pytest.approx(start.parameters, rel=1e-6)
-    assert found.model.standard_errors == pytest.approx(start.standard_errors, rel=1e-6)
-
-
 @pytest.mark.parametrize("interval", [30, None])
 def test_jacobian_matches_higher_order_finite_differences(interval):
     record = make_record(HYSTERESIS, noise=0.02)
@@ -219,21 +191,6 @@ def test_the_parameters_of_several_outputs_are_within_their_standard_errors(coup
         found = refine(coupled, record, None, warm_up=2).model
         deviations.append((np.array(found.parameters) - coupled.parameters) / found.standard_errors)
     assert 0.88 < (np.abs(deviations) < 1.96).mean() < 0.99
-
-
-def test_the_equations_of_several_outputs_keep_their_constraint():
-    true = CoupledModel(
-        (
-            equation({"y(k-1)": 0.7, "y(k-2)": 0.3, "phi1(u1(k-1), u1(k-2))": 0.5}, ("u", "y2"), "y1"),
-            equation({"y(k-1)": 0.6, "y(k-2)": 0.4, "phi1(u2(k-1), u2(k-2))": 0.3}, ("u", "y1"), "y2"),
-        )
-    )
-    record = make_coupled_record(true, noise=0.02)
-    start = true.with_parameters((0.6, 0.4, 0.4, 0.5, 0.5, 0.2))
-    found = refine(start, record, None, "hysteresis")
-    assert found.after < 0.1 * found.before
-    for single in found.model.models:
-        assert all(cluster.met for cluster in cluster_sums(single))
 
 
 # Failures and invalid arguments.

@@ -9,10 +9,8 @@ from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, make_regressor
-from islands.evolution.presets import PRESETS
 from islands.evolution.settings import ERR_TARGETS, Settings
 from islands.expressions.parsing import parse
-from islands.expressions.tree import height
 from islands.kernels.err_selection import INCREMENT, OUTPUT, OUTPUT_SINGLE
 from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
@@ -84,27 +82,7 @@ def test_theta_and_fitness_equal_estimation_and_multiple_shooting(texts, constra
         assert found.outcome.verdict is Status.DIVERGED
 
 
-def test_first_of_equivalent_genes_is_kept():
-    found = evaluate_one(
-        individual("q2(u(k-1))", "y(k-1)*u(k-1)", "u(k-3)", "u(k-1)*y(k-1)"), constraints="none"
-    )
-    assert found.genes == individual("q2(u(k-1))", "y(k-1)*u(k-1)").genes
-    assert found.key == ("u1(k-3)", "y(k-1)*u1(k-1)")
-
-
 # Failures are outcomes with reasons.
-
-
-def test_regressors_that_are_dependent_on_the_record_are_singular():
-    """The cube of an input with the levels -1 and 1 equals the input."""
-    rng = np.random.default_rng(0)
-    u = np.sign(rng.normal(size=500))
-    data = Dataset(u, np.convolve(u, [0.0, 1.0, 0.5])[:500] + 0.01 * rng.normal(size=500), 0.1)
-    found = evaluate_one(individual("u(k-1)", "u(k-1)*u(k-1)*u(k-1)", "y(k-1)"), data, constraints="none")
-    assert found.outcome.verdict is Status.SINGULAR
-    assert (
-        found.outcome.reason == "the regressors are linearly dependent in the null space of the constraints"
-    )
 
 
 def test_model_whose_simulation_leaves_the_bound_has_diverged():
@@ -179,23 +157,6 @@ def test_ill_conditioned_structures_agree_with_least_squares(texts, constraints,
 # Duplicates, and model (13) of the paper.
 
 
-def test_individuals_with_equal_remaining_terms_are_evaluated_once():
-    """Constraints and pruning leave y(k-1) of all four: u(k-3) alone has the parameter zero."""
-    evaluator = Evaluator(record(), SETTINGS)
-    one, same, other = (
-        individual("y(k-1)", "u(k-3)"),
-        individual("q2(u(k-1))", "y(k-1)"),
-        individual("y(k-1)"),
-    )
-    found, duplicates = evaluator.evaluate([(one, False), (same, False), (other, False), (one, True)])
-    assert duplicates == 3
-    assert len({each.theta for each in found}) == 1
-    assert found[1].genes == (same.genes[1],)
-    different = individual("y(k-1)", "y(k-2)")
-    assert evaluator.evaluate([(other, False), (same, True), (different, False)])[1] == 2
-    assert evaluator.evaluate([]) == ((), 0)
-
-
 @pytest.mark.parametrize(
     ("terms", "feasible"),
     [
@@ -226,37 +187,6 @@ def test_without_the_root_rule_a_structure_is_feasible_that_does_not_converge():
         evaluator.clear_caches()
         assert evaluator.evaluate([(each, False)])[0][0].outcome.verdict is verdicts[-1]
     assert verdicts == [Status.INFEASIBLE, Status.OK]
-
-
-MODEL_13 = (
-    "y(k-1)",
-    "mul(phi1(q5(q5(q1(u(k-1)))), u(k-1)), mul(u(k-1), phi2(q3(u(k-1)), u(k-1))))",
-    "phi1(q5(q3(u(k-1))), q5(q5(q2(u(k-1)))))",
-    "mul(phi1(q5(q5(q1(u(k-1)))), q5(q4(u(k-1)))), mul(q1(y(k-1)), phi2(q5(u(k-1)), u(k-1))))",
-    "mul(q5(q2(mul(y(k-1), u(k-1)))), phi1(u(k-1), q3(u(k-1))))",
-    "phi1(q5(q4(u(k-1))), q5(u(k-1)))",
-    "phi1(u(k-1), q5(q5(q2(u(k-1)))))",
-    "phi2(q5(q5(q4(u(k-1)))), q5(q5(q1(u(k-1)))))",
-    "mul(u(k-1), mul(q5(q5(q1(u(k-1)))), phi1(q1(u(k-1)), u(k-1))))",
-)
-
-
-def test_model_13_as_genes_has_the_fitness_of_constrained_least_squares():
-    """The model meets the limits of the paper: height 5 including back-shifts, and nine of ten terms."""
-    setting, model = PRESETS["paper-case1"], PUBLISHED["13"].model
-    each = individual(*MODEL_13)
-    assert max(map(height, each.genes)) == setting.max_height == 5
-    assert len(each.genes) <= setting.max_terms
-    data = make_record("bouc-wen-piezo", "authors", "estimation")[:20_000]
-    (found,), _ = Evaluator(data, setting).evaluate([(each, False)])
-    assert found.regressors == model.regressors
-    expected = estimate(model.regressors, data, "hysteresis", setting.maximum_lag).model
-    # Four terms are differences of nearby samples of a slow input, so only seven digits are accurate.
-    assert found.theta == pytest.approx(expected.theta, rel=1e-6)
-    simulated = multiple_shooting(expected, data, 500, setting.maximum_lag)
-    assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-7)
-    # The error of its free run is 0.3 % of the range (Table 1); intervals of 0.5 s have no larger error.
-    assert 100 * found.fitness**0.5 / data.output_range < 0.4
 
 
 def test_the_targets_of_the_settings_are_those_of_the_kernel():

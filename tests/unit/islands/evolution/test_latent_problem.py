@@ -2,11 +2,9 @@
 
 import pytest
 
-from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.latent_problem import make_latent_problem, select_latent_elite
+from islands.evolution.latent_problem import make_latent_problem
 from islands.evolution.presets import resolve_settings
 from islands.persistence.checkpoints import archipelago_from_document, checkpoint_text
 from islands.progress import Steps, never_stop
@@ -24,11 +22,6 @@ def problem():
 def archipelagos(problem):
     epochs = SerialEngine().run(problem, empty_archipelago(2, 5), never_stop)
     return [each.archipelago for each in epochs]
-
-
-def make_system(fitness, size, units=()):
-    free = tuple(place < size for place in range(6))
-    return FittedStateSpace(1, 1, units, (0.5,) * 6, free, ((0.0,),), fitness, fitness)
 
 
 @pytest.mark.ci
@@ -65,17 +58,3 @@ def test_the_model_of_an_individual_is_that_of_the_record(problem, archipelagos)
     model = problem.make_model(best)
     assert model.output_name == "y_mm"
     assert (model.order, model.units) == (best.order, best.units)
-
-
-def test_the_hall_keeps_one_system_of_every_size():
-    hall = with_entries(
-        HallOfFame(), [make_system(2.0, 5), make_system(1.0, 5, ("tanh",)), make_system(3.0, 4)]
-    )
-    assert [(each.size, each.fitness) for each in hall.entries] == [(4, 3.0), (5, 1.0)]
-
-
-def test_the_elite_has_the_front_and_the_least_criterion_first():
-    small, large, useless = make_system(2.0, 3), make_system(1.0, 6), make_system(1.001, 6, ("tanh",))
-    assert select_latent_elite([small, large, useless], 2, 1000) == (large, small)
-    # With few rows, three parameters do not pay for half of the squared error.
-    assert select_latent_elite([small, large, useless], 3, 6)[0] == small

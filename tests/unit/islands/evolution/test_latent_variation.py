@@ -79,12 +79,6 @@ def test_a_state_that_is_added_hardly_changes_the_simulation(data, system):
     assert simulate(draft, data) == pytest.approx(system.mean_square, abs=1e-3)
 
 
-def test_a_removed_connection_has_fewer_free_parameters(system):
-    for seed in range(5):
-        draft = latent_variation._remove_connection(system, np.random.default_rng(seed))
-        assert 0 < system.size - draft.free.sum() <= 2
-
-
 def test_a_linear_system_has_no_unit_to_replace_remove_or_disturb(linear):
     for operation in ("_replace_unit", "_remove_unit", "_disturb"):
         assert getattr(latent_variation, operation)(linear[0], np.random.default_rng(0)) is None
@@ -102,14 +96,3 @@ def test_offspring_have_the_zeros_of_the_structure(data, linear, structure, name
     for draft in drafts:
         block = draft.layout.split(draft.free)[name]
         assert not (block[:, : draft.layout.order] if name == "W" else block).any()
-
-
-def test_functions_grow_to_trees_and_shrink_again():
-    rng, seen = np.random.default_rng(0), set()
-    function = "abs"
-    for _ in range(400):
-        function = latent_variation._vary_function(function, rng)
-        tree = parse_unit(function)
-        assert 1 <= tree.operations <= latent_variation.MOST_OPERATIONS
-        seen.add((tree.name == "*", tree.operations))
-    assert seen == {(False, 1), (False, 2), (False, 3), (True, 2), (True, 3)}

@@ -70,16 +70,6 @@ def test_paper_appendix_minimises_the_one_step_error_of_polynomials(preset):
     assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
 
 
-def test_paper_presets_differ_only_in_the_printed_settings():
-    def difference(one, other):
-        here, there = asdict(PRESETS[one]), asdict(PRESETS[other])
-        return {name for name in here if here[name] != there[name]}
-
-    assert difference("paper-case1", "paper-case2") == {"tolerance", "shooting"}
-    assert difference("paper-case1", "paper-case1-islands") == {"islands", "topology"}
-    assert difference("paper-appendix", "paper-appendix-s2") == {"max_height", "max_terms", "initial_terms"}
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_presets_are_valid_settings(preset):
     assert Settings(**asdict(PRESETS[preset])) == PRESETS[preset]

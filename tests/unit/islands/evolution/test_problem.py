@@ -12,7 +12,6 @@ from islands.evolution.individual import make_regressor
 from islands.evolution.problem import Problem, make_problem
 from islands.evolution.settings import ISLAND_PROFILES, Settings
 from islands.expressions.parsing import parse
-from islands.expressions.tree import Apply, walk
 from islands.models.candidate_library import candidates
 from islands.models.narx import canonical_order
 from islands.records.dataset import Dataset
@@ -36,17 +35,6 @@ def test_pool_is_the_library_and_seeds_are_its_forward_selection():
     assert [make_regressor(gene) for gene in search_problem.pool] == list(library)
     expected = forward_selection(library, record(), "hysteresis", SETTINGS.max_terms)
     assert [tuple(canonical_order(distinct_genes(genes))) for genes in search_problem.seeds] == list(expected)
-
-
-def test_library_genes_use_phi_functions():
-    """Constrained presets do not use ``sub`` and ``sign``, whose arguments variation may replace."""
-    names = {
-        node.primitive.name
-        for gene in make_problem(record(), SETTINGS).pool
-        for node in walk(gene)
-        if isinstance(node, Apply)
-    }
-    assert names == {"mul", "phi1", "phi2"}
 
 
 @pytest.mark.parametrize(

@@ -35,12 +35,6 @@ def test_diverged_models_come_last_by_one_step_ahead_error():
     assert_ranked_in_any_order(entry(1e9, one_step=5.0), entry(nan, one_step=0.1), entry(nan, one_step=0.2))
 
 
-def test_models_that_diverged_one_step_ahead_come_after_all_others():
-    assert_ranked_in_any_order(
-        entry(0.5), entry(nan, 0.2), entry(nan, 7.0), entry(nan, nan), entry(nan, nan, ("1", "y(k-1)"))
-    )
-
-
 def test_ties_are_broken_by_size_and_then_by_text():
     small, large = ("y(k-1)",), ("u(k-1)", "u(k-2)")
     assert_ranked_in_any_order(entry(0.1, terms=small), entry(0.1, terms=large))

@@ -10,14 +10,13 @@ import pytest
 
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.evolution.variation import random_individuals, repair_genes
+from islands.evolution.variation import random_individuals
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.expressions.user_primitive import primitive
 from support.variation import (
     breed_compiled,
     breed_trees,
-    inner_mutation,
     make_index,
     outer_mutation,
     random_genes,
@@ -118,31 +117,6 @@ def test_kernel_draws_the_random_genes_of_the_first_population(name):
 # Mutations.
 
 
-def test_inner_mutation_replaces_one_subtree_of_one_gene():
-    parent = genes("y(k-1)", "tanh(q1(u(k-1)))*u(k-1)")
-    roots = Counter()
-    for seed in SEEDS:
-        child = inner_mutation(parent, SETTINGS, 1, stream(seed))
-        assert len(child) == 2
-        changed = [place for place in (0, 1) if child[place] != parent[place]]
-        assert len(changed) <= 1
-        if changed == [1]:
-            # The root is one of five nodes, so it is kept in four of five cases.
-            roots[plain(child[1]).startswith("tanh(") or plain(child[1]).endswith("*u(k-1)")] += 1
-    assert roots[True] > roots[False] > 0
-
-
-def test_outer_mutation_without_a_pool_replaces_one_gene():
-    changed = Counter()
-    for seed in SEEDS:
-        child = outer_mutation(LETTERS, SETTINGS, 1, stream(seed), ())
-        assert len(child) == 4
-        places = [place for place in range(4) if child[place] != LETTERS[place]]
-        assert len(places) <= 1
-        changed.update(places)
-    assert sorted(changed) == [0, 1, 2, 3]
-
-
 def test_outer_mutation_with_a_pool_replaces_drops_or_adds_a_gene():
     always = replace(SETTINGS, from_library=1.0)
     pool = genes("u(k-7)", "u(k-8)")
@@ -167,22 +141,3 @@ def test_outer_mutation_respects_the_limits_of_the_number_of_genes():
 
 
 # Random genes and repair.
-
-
-def test_random_genes_use_all_leaves_functions_and_back_shifts():
-    setting = replace(SETTINGS, shifts=(2, 5), primitives=("mul", "tanh"), max_terms=6, initial_terms=(2, 4))
-    drawn = [random_genes(setting, 2, stream(seed)) for seed in SEEDS]
-    assert {len(found) for found in drawn} == {2, 3, 4}
-    seen = " ".join(plain(gene, 2) for found in drawn for gene in found)
-    for part in ("y(k-1)", "u1(k-1)", "u2(k-1)", "q2(", "q5(", "tanh(", "*"):
-        assert part in seen
-    for part in ("q1(", "q3(", "phi", "k-2"):
-        assert part not in seen
-
-
-def test_repair_for_increment_structure_replaces_linear_outputs():
-    increment = replace(SETTINGS, constraints="hysteresis", structure="increment")
-    repaired = repair_genes(
-        genes("q3(q1(y(k-1)))", "q2(y(k-1)*u(k-1))", "phi1(y(k-1), q1(u(k-1)))"), increment
-    )
-    assert texts(repaired) == ("y(k-1)", "q2(y(k-1)*u(k-1))", "phi1(u(k-1), q1(u(k-1)))")

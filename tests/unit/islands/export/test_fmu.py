@@ -143,19 +143,6 @@ def test_an_fmu_without_a_compiler_has_sources_only(kind, tmp_path, monkeypatch)
     assert {"modelDescription.xml", "sources/model.h", "sources/instance.h"} < set(names)
 
 
-def test_variables_are_the_columns_with_their_units(tmp_path):
-    write_export(PUBLISHED["12"].model, "fmu", tmp_path / "model.fmu")
-    found = fmpy.read_model_description(str(tmp_path / "model.fmu"))
-    assert [(each.name, each.causality, each.unit) for each in found.modelVariables] == [
-        ("time", "independent", "s"),
-        ("y_um", "output", "um"),
-        ("u_V", "input", "V"),
-        ("start.y_um[1]", "parameter", "um"),
-        *((f"start.u_V[{lag}]", "parameter", "V") for lag in (1, 2, 3)),
-    ]
-    assert float(found.defaultExperiment.stepSize) == 0.001
-
-
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
 def test_a_column_name_is_a_variable_or_an_error(name, kind, tmp_path, monkeypatch):
@@ -169,8 +156,3 @@ def test_a_column_name_is_a_variable_or_an_error(name, kind, tmp_path, monkeypat
     assert validate_fmu(str(tmp_path / "model.fmu")) == []
     described = fmpy.read_model_description(str(tmp_path / "model.fmu"))
     assert name in [each.name for each in described.modelVariables]
-
-
-def test_a_model_without_a_sampling_time_is_refused(tmp_path):
-    with pytest.raises(ModelError, match="no sampling time"):
-        write_export(model({"u(k-1)": 1.0}), "fmu", tmp_path / "model.fmu")

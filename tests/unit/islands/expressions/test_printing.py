@@ -69,28 +69,6 @@ def test_plain_text_of_an_expression_parses_back_to_it(expression, text):
 
 
 @pytest.mark.parametrize(
-    ("text", "expression"),
-    [
-        ("  u(k - 1) ", U),
-        ("u1(k-1)", U),
-        ("u(k-1)**2", mul(U, U)),
-        ("u(k-1)^1", U),
-        ("u(k-1)^1*y(k-1)^2", mul(U, Y, Y)),
-        ("u(k-1) - y(k-1) - u(k-1)", sub(sub(U, Y), U)),
-        ("u(k-1)*y(k-1)/u(k-1)", div(mul(U, Y), U)),
-        ("u(k-1)/y(k-1)*u(k-1)", mul(div(U, Y), U)),
-        ("-u(k-1)*y(k-1)", mul(mul(Constant(-1.0), U), Y)),
-        ("-3", Constant(-3.0)),
-        ("-2^2", mul(Constant(-1.0), mul(Constant(2.0), Constant(2.0)))),
-        ("mul(u(k-1), y(k-1), 2)", mul(U, Y, Constant(2.0))),
-        ("q12(y(k))", Shift(12, Lagged(0, 0))),
-    ],
-)
-def test_parser_accepts_equivalent_notations(text, expression):
-    assert parse(text) == expression
-
-
-@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", r"cannot read '': write it like u\(k-1\)\*sign\(u\(k-1\) - u\(k-2\)\)"),

@@ -3,20 +3,18 @@
 import pytest
 
 from islands.expressions.parsing import parse, parse_expression
-from islands.expressions.primitives import ADD, MUL, PRIMITIVES, SUB
+from islands.expressions.primitives import ADD, MUL, PRIMITIVES
 from islands.expressions.tree import (
     Apply,
     Constant,
     Lagged,
     Shift,
     Symbol,
-    children,
     content,
     height,
     replace,
     replace_leaves,
     substitute,
-    walk,
 )
 
 
@@ -26,20 +24,6 @@ from islands.expressions.tree import (
 )
 def test_height_counts_edges_from_the_root_to_the_deepest_leaf(text, edges):
     assert height(parse(text)) == edges
-
-
-def test_walk_yields_nodes_in_pre_order():
-    left, right = Apply(SUB, (Lagged(1), Lagged(2))), Shift(1, Constant(3.0))
-    expression = Apply(ADD, (left, right))
-    assert children(expression) == (left, right)
-    assert list(walk(expression)) == [
-        expression,
-        left,
-        Lagged(1),
-        Lagged(2),
-        right,
-        Constant(3.0),
-    ]
 
 
 def test_content_orders_signals_functions_back_shifts_numbers():
@@ -59,11 +43,6 @@ def test_content_orders_signals_functions_back_shifts_numbers():
     keys = [content(expression) for expression in rising]
     assert keys == sorted(keys)
     assert len(set(keys)) == len(keys)
-
-
-def test_functions_of_equations_are_not_protected_but_share_the_arithmetic():
-    assert Apply(PRIMITIVES["div"], (Symbol("a"), Symbol("b"))) != parse_expression("a/b")
-    assert Apply(MUL, (Symbol("a"), Symbol("b"))) == parse_expression("a*b")
 
 
 def test_parts_of_an_expression_are_replaced_from_the_root_down():

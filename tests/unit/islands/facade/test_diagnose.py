@@ -59,16 +59,6 @@ def test_user_defined_effect_is_named(record: tuple[islands.Dataset, Signal]) ->
     assert finding.parameters["k"].value == pytest.approx(0.01, rel=0.05)
 
 
-@pytest.mark.ci
-def test_a_recorded_simulation_is_a_column_of_a_frame(record: tuple[islands.Dataset, Signal]) -> None:
-    data, simulated = record
-    frame = {"u": data.u[:, 0], "y": data.y, "theirs": simulated}
-    choice = {"inputs": "u", "output": "y", "dt": data.dt}
-    found = islands.diagnose(frame, "column:theirs", **choice)
-    same = islands.diagnose(islands.as_record(frame, **choice), "column:theirs", columns=frame)
-    assert found.summary == same.summary
-
-
 def _proportional(u: Signal, dt: float, gain: float = 0.8) -> Signal:
     del dt
     return gain * u

@@ -93,16 +93,6 @@ def test_model_simulates_a_record_in_three_modes(result):
         result.best.simulate(record, "backwards")
 
 
-def test_free_run_uses_measured_outputs_only_in_the_warm_up(result):
-    record = piezo(200, seed=9)
-    y = record.y.copy()
-    y[2:] = np.nan
-    blind = result.best.simulate(with_output(record, y), warm_up=2)
-    assert np.array_equal(blind.y, result.best.simulate(record, warm_up=2).y, equal_nan=True)
-    with pytest.raises(RecordError, match=r"missing at sample 2, .* a shorter warm-up"):
-        result.best.simulate(with_output(record, y))
-
-
 def test_result_is_saved_as_a_folder(result, tmp_path):
     with undrawn_figures():
         folder = result.with_wall_time(2.0).save(tmp_path / "new" / "out")

@@ -35,7 +35,9 @@ def test_fit_estimates_with_the_chosen_estimator():
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("estimator", ["least-squares", "extended-least-squares", "free-run"])
+@pytest.mark.parametrize(
+    "estimator", ["extended-least-squares", pytest.param("free-run", marks=pytest.mark.nightly)]
+)
 def test_identify_estimates_all_models_with_the_chosen_estimator(estimator):
     record = make_noisy_record("arma", 0, 800)
     result = identify(record, **BUDGET, estimator=estimator)

@@ -12,7 +12,7 @@ def error(result):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("library", ["auto", "polynomial"])
+@pytest.mark.parametrize("library", [pytest.param("auto", marks=pytest.mark.nightly), "polynomial"])
 def test_level_of_a_tank_has_the_two_terms_of_its_law(library):
     result = islands.fit(make_tank(1, 600), library=library)
     assert result.best.model.parameter_names == ("y(k-1)", "u1(k-1)")

@@ -8,7 +8,6 @@ from islands.cli.options import columns
 from islands.records.reading.options import ReadingOptions
 from islands.report.text.inspection import WIDTH, format_inspection
 from support.known_records import delay, lag, measure, steps
-from support.parsed_files import list_parsed
 
 
 def write(path, time=None, drop=(), blank=(), header="t_s,u_V,y_um"):
@@ -22,27 +21,11 @@ def write(path, time=None, drop=(), blank=(), header="t_s,u_V,y_um"):
     return path
 
 
-def test_a_file_is_described_without_a_choice_of_columns(tmp_path):
-    found = islands.inspect_record(write(tmp_path / "r.csv"))
-    assert [column.role for column in found.columns] == ["time", "input", "output"]
-    assert found.sampling.dt == pytest.approx(0.1)
-    assert found.find("dead-time").value == 4
-    assert found.warnings == ()
-    assert "--input u_V --output y_um" in found.command
-    assert found.choice.confidence > 0.9
-
-
 @pytest.mark.parametrize("name", ["Voltage, V", "drive,left"])
 def test_the_suggested_command_names_a_column_with_a_comma(tmp_path, name):
     file = write(tmp_path / "r.csv", header=f't_s,"{name}",y_um')
     words = shlex.split(islands.inspect_record(file, [name], "y_um").command)
     assert columns([words[words.index("--input") + 1]]) == [name]
-
-
-def test_a_file_is_parsed_once(tmp_path, monkeypatch):
-    parsed = list_parsed(monkeypatch)
-    assert islands.inspect_record(write(tmp_path / "r.csv")).facts.facts
-    assert parsed == ["r.csv"]
 
 
 def test_gaps_are_reported_with_rows_and_no_fact_reads_across_them(tmp_path):

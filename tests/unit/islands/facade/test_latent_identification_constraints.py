@@ -34,18 +34,6 @@ def test_every_model_meets_the_constraints_before_and_after_a_refit(result):
             assert [check.value for check in checks] == pytest.approx([0.3, 0.564], rel=1e-9)
 
 
-@pytest.mark.ci
-def test_a_saved_result_states_the_constraints(result, tmp_path):
-    result.save(tmp_path, figures=())
-    saved = islands.load(tmp_path)
-    assert saved.settings["constraints"] == KNOWN
-    assert all(check["met"] for check in saved.best.document["constraints"])
-    summary = (tmp_path / "summary.txt").read_text("utf-8")
-    assert f"Constraints that the model meets: {KNOWN}." in summary
-    assert "under constraints" in summary
-    assert f"so that they meet {KNOWN}." in " ".join((tmp_path / "method.txt").read_text("utf-8").split())
-
-
 @pytest.mark.nightly
 def test_models_that_cannot_meet_the_constraints_are_left_out_and_counted():
     # The slopes of a linear model are equal.
@@ -68,8 +56,3 @@ def test_statements_that_make_no_sense_are_refused(text):
 def test_a_statement_refers_to_inputs_of_the_record():
     with pytest.raises(SettingsError, match="2 inputs, but the record has 1"):
         identify(spring_record(100), constraints="gain(u2) = 1")
-
-
-def test_other_classes_have_no_constraints():
-    with pytest.raises(SettingsError, match="model is one of narx, latent"):
-        islands.fit(spring_record(100), model="gain-scheduled", constraints="gain = 1")

@@ -10,9 +10,8 @@ import islands
 from islands.errors import SettingsError
 from islands.estimation.estimator_table import BOX_JENKINS, ESTIMATORS, OUTPUT_ERROR
 from islands.estimation.output_error import fit_output_error, refit_output_error
-from islands.facade.refit import join_data, refit_models
+from islands.facade.refit import join_data
 from islands.persistence.models import read_validated_model
-from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.report.figures.registry import FIGURES
 from islands.report.text.facts import BEFORE_REFIT
@@ -177,13 +176,6 @@ def test_figures_on_the_validation_data_show_the_model_of_the_errors():
     for panel in (*panels, result.best.plot("free-run", ax=panels[0]).axes[0]):
         drawn = [np.asarray(line.get_ydata()) for line in panel.get_lines()]
         assert any(np.array_equal(each[-300:], before[-len(each) :][-300:], equal_nan=True) for each in drawn)
-
-
-def test_a_stop_leaves_the_refit_out():
-    found = fit_law(make_noisy_record("output", 12, 300)).search_result
-    stopped = refit_models(found, 0.25, Steps(stop=lambda: True))
-    assert stopped.search.left_out == ("estimation of the parameters on all data",)
-    assert stopped.models == found.models
 
 
 def test_a_refit_is_all_or_none_and_of_one_output():

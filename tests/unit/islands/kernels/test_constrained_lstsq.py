@@ -146,24 +146,7 @@ def test_estimate_ignores_the_data_if_every_term_is_a_pivot(route):
 # The pivots.
 
 
-def test_pivot_of_a_group_has_the_largest_ratio_of_weight_to_norm():
-    gram = np.diag([1.0, 4.0, 9.0, 0.01, 100.0, 5.0])
-    found = reduced(gram, [0, -1, 0, 0, 1], [1.0, 1.0, -6.0, 0.1, 3.0])
-    assert found.pivot.tolist() == [2, -1, 2, 2, 4]
-    assert found.share.tolist() == pytest.approx([-1 / 6, 0.0, 1.0, -0.1 / 6, 1.0])
-    assert found.fixed.tolist() == pytest.approx([0.0, 0.0, -1 / 6, 0.0, 0.0])
-    assert found.free.tolist() == [0, 1, 3]
-
-
 # Where the digits end.
-
-
-@every_route
-@pytest.mark.parametrize("group", [None, [0, -1, 0]])
-def test_zero_regressor_is_refused(route, group):
-    psi, y = regression()
-    psi[1] = 0.0
-    assert estimated(route, psi, y, group) is None
 
 
 @every_route
@@ -269,20 +252,3 @@ def test_lags_of_a_nearly_constant_input_are_refused(route):
     assert solved(route, gram, program, rows, reduced(gram)) is None
     # With fixed sums, the remaining directions have digits again.
     assert solved(route, gram, program, rows, reduced(gram, [0, 0, 0, 1, 1, 1])) is not None
-
-
-@every_route
-@pytest.mark.parametrize("group", [None, [-1, 0, -1, 0]])
-def test_dependent_columns_are_refused(route, group):
-    psi, y = regression(4)
-    psi[2] = 2.0 * psi[0]
-    assert estimated(route, psi, y, group) is None
-    psi, y = regression(4)
-    psi[3] = psi[1] - 3.0 * psi[2] + psi[0]
-    assert estimated(route, psi, y) is None
-
-
-@every_route
-def test_fewer_rows_than_free_parameters_are_refused(route):
-    psi, y = regression(5, rows=4)
-    assert estimated(route, psi, y) is None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.kernels.damped_step import factor, solve_damped, solve_factored, solve_own
+from islands.kernels.damped_step import solve_damped, solve_own
 
 # The kernels are compiled at their first use.
 pytestmark = pytest.mark.ci
@@ -54,13 +54,3 @@ def test_equations_that_are_not_positive_definite_have_no_step(column):
     products[:, column, column] *= -1.0
     with np.errstate(invalid="ignore"):
         assert not solve(products, 4, 2)[0]
-
-
-def test_a_factor_solves_linear_equations():
-    matrix = make_products(5, 0)[0]
-    right = np.arange(6.0)
-    expected = np.linalg.solve(matrix, right)
-    assert factor(matrix)
-    solve_factored(matrix, right)
-    assert right == pytest.approx(expected)
-    assert not factor(-np.eye(2))

@@ -5,10 +5,8 @@ The tests of `froe` check properties of the selection; this file checks the cont
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from islands.kernels.err_selection import DEPENDENT, prune, prune_increments, prune_single, select
+from islands.kernels.err_selection import DEPENDENT, prune, prune_increments, select
 from islands.kernels.parameter_reduction import reduce
 
 
@@ -64,40 +62,6 @@ def pruned(gram, terms, tolerance):
     return kept[:count].tolist()
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.floats(0.0, 0.5))
-def test_pruning_of_single_terms_keeps_those_with_a_large_correlation(seed, terms, tolerance):
-    psi, y = problem(seed, terms)
-    psi[seed % terms] *= seed % 2  # a column that is zero has no correlation
-    kept = np.full(terms, -7)
-    count = prune_single(gram_of(psi, y), terms, tolerance, kept)
-    shares = (psi @ y) ** 2 / np.where(norms := (psi**2).sum(axis=1), norms, 1.0) / (y @ y)
-    assert kept[:count].tolist() == np.flatnonzero(shares > tolerance).tolist()
-    assert (kept[count:] == -7).all()
-
-
-def same(found, expected):
-    assert [position for position, _ in found] == [position for position, _ in expected]
-    assert [err for _, err in found] == pytest.approx([err for _, err in expected], rel=1e-8, abs=1e-13)
-
-
-@given(
-    st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3), st.integers(0, 9)
-)
-def test_selection_equals_gram_schmidt_on_the_columns(seed, terms, spare, tolerance, limit):
-    psi, y = problem(seed, terms)
-    expected = gram_schmidt(psi, y)
-    end = next((rank for rank, (_, err) in enumerate(expected) if err <= tolerance), terms)
-    limit = min(limit, terms)
-    same(selected(gram_of(psi, y, spare), terms, tolerance, limit), expected[: min(end, limit)])
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3))
-def test_pruning_keeps_the_terms_of_gram_schmidt_in_their_order(seed, terms, spare, tolerance):
-    psi, y = problem(seed, terms)
-    expected = sorted(position for position, err in gram_schmidt(psi, y) if err > tolerance)
-    assert pruned(gram_of(psi, y, spare), terms, tolerance) == expected
-
-
 @pytest.mark.parametrize(("share", "count"), [(3e-5, 2), (3e-6, 1), (0.0, 1)])
 def test_dependent_candidate_is_not_selected(share, count):
     """A candidate must keep 1e-5 of its norm, 1e-10 of its squared norm."""
@@ -106,18 +70,6 @@ def test_dependent_candidate_is_not_selected(share, count):
     gram = gram_of(psi, one + 0.1 * other + 0.5 * noise)
     assert len(selected(gram, 2)) == count
     assert len(pruned(gram, 2, 0.0)) == count
-
-
-def test_similar_candidates_keep_their_order_and_six_digits():
-    """After the first selection a thousandth of each norm is left, a millionth of its square."""
-    for seed in range(20):
-        generator = np.random.default_rng(seed)
-        psi = generator.normal(size=(5, 150))
-        psi[1:] = psi[0] + 1e-3 * psi[1:]
-        y = 1e3 * generator.normal(size=5) @ psi + generator.normal(size=150)
-        found, expected = selected(gram_of(psi, y), 5), gram_schmidt(psi, y)
-        assert [position for position, _ in found] == [position for position, _ in expected]
-        assert [err for _, err in found] == pytest.approx([err for _, err in expected], rel=1e-6, abs=1e-9)
 
 
 def null_space_columns(psi, y, group, sums, previous):

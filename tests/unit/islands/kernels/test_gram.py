@@ -7,7 +7,7 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.kernels.gram import gram, gram_of_residual, inner_products
+from islands.kernels.gram import gram, gram_of_residual
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
@@ -25,7 +25,6 @@ TEXTS = [
     "1/(2 + abs(y(k-1)))",
 ]
 TERMS = [*(regressor(parse(text))[1] for text in TEXTS), Lagged(0, 0)]
-SQUARE = np.array([(i, j) for i in range(len(TERMS)) for j in range(len(TERMS))])
 WARM_UP = 3
 
 #: Rows of the segments: a short record, whole chunks, and segments that end anywhere in a chunk.
@@ -48,12 +47,6 @@ def record(rows, seed=7):
     return arrange_rows(signals, list(zip(begin[:-1] + WARM_UP, rows, strict=True)), WARM_UP)
 
 
-def products_of(terms, rows, pairs):
-    out = np.full(len(pairs), np.nan)
-    inner_products(link(terms), rows, np.asarray(pairs), out)
-    return out
-
-
 def gram_of(terms, rows):
     out = np.full((len(terms), len(terms)), np.nan)
     gram(link(terms), rows, out)
@@ -64,14 +57,6 @@ def columns_of(terms, rows):
     out = np.empty((len(terms), rows.count))
     columns(link(terms), rows, out)
     return out
-
-
-@pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
-@pytest.mark.parametrize("rows", ROWS)
-def test_inner_products_of_some_pairs_equal_the_gram_matrix(rows, terms):
-    square = np.array([(i, j) for i in range(len(terms)) for j in range(len(terms))])
-    some = products_of(terms, record(rows), square[::-1])[::-1]
-    assert np.array_equal(some.reshape(len(terms), len(terms)), gram_of(terms, record(rows)))
 
 
 @pytest.mark.parametrize("rows", ROWS)
@@ -89,15 +74,6 @@ def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
         for j, b in enumerate(psi.tolist()):
             products = [left * right for left, right in zip(a, b, strict=True)]
             assert abs(found[i, j] - math.fsum(products)) <= 1e-15 * math.fsum(map(abs, products))
-
-
-def test_all_pairs_are_computed_if_several_passes_are_needed():
-    data = record((5, 2))
-    one = products_of(TERMS, data, SQUARE)
-    repeats = (1 << 20) // len(SQUARE) + 2
-    many = products_of(TERMS, data, np.tile(SQUARE, (repeats, 1)))
-    assert many.size > 1 << 20
-    assert np.array_equal(many, np.tile(one, repeats))
 
 
 @pytest.mark.parametrize("terms", [0, 3, 4, 7])

@@ -126,14 +126,6 @@ def stored_kernels(folder: Path) -> set[str]:
     return {path.name.split("-")[0] for path in folder.rglob("*.nbc")}
 
 
-def test_kernels_are_stored_in_the_chosen_folder_only(start, tmp_path):
-    found = get_output(start(READY))
-    folder = Path(found["folder"])
-    assert folder.parent == tmp_path / "cache" / "kernels"
-    assert stored_kernels(folder) == stored_kernels(tmp_path) == {"toys.ratio"}  # half is called by it alone
-    assert [path.parent.parent for path in tmp_path.rglob("*.nbi")] == [folder]
-
-
 @pytest.mark.parametrize("kind", ["start", "start_new"])
 def test_second_process_loads_the_kernels_of_the_first_silently(request, kind):
     start = request.getfixturevalue(kind)
@@ -151,15 +143,6 @@ def test_processors_with_different_features_do_not_share_a_folder(start):
     plain = get_output(start(FOLDER, NUMBA_CPU_NAME="haswell"))
     wider = get_output(start(FOLDER, NUMBA_CPU_NAME="haswell", NUMBA_CPU_FEATURES="+avx2"))
     assert plain != wider
-
-
-def test_change_in_any_kernel_source_gives_another_folder(start, tmp_path):
-    package = tmp_path / "islands" / "kernels"
-    folders = []
-    for text in ("X = 1\n", "X = 2\n", "X = 1\n"):
-        (package / "inlined.py").write_text(text)
-        folders.append(get_output(start(FOLDER)))
-    assert folders[0] == folders[2] != folders[1]
 
 
 def test_checkouts_with_equal_sources_share_their_kernels(start, tmp_path):
@@ -187,25 +170,6 @@ def test_folder_of_another_version_is_deleted_after_a_month_without_use(start, t
     assert old.exists()  # only a process that compiles deletes folders
     get_output(start(READY))
     assert old.exists() == (days < 30)
-
-
-@pytest.mark.parametrize("users", ["", "theirs"])
-def test_numba_cache_dir_applies_to_other_functions(start, tmp_path, users):
-    chosen = str(tmp_path / users) if users else ""
-    (tmp_path / "other.py").write_text("import numba\n@numba.njit(cache=True)\ndef other(x):\n    return x\n")
-    code = """if True:
-        import json, numba, toys
-        from other import other
-        other(1.0), toys.ratio(1.0, 2.0)
-        settings = [toys.set_before, numba.config.CACHE_DIR]
-        print(json.dumps([*settings, other.stats.cache_path, str(toys.cache_folder())]))
-    """
-    before, after, theirs, ours = get_output(start(code, **({"NUMBA_CACHE_DIR": chosen} if users else {})))
-    assert before == after == chosen
-    assert Path(theirs).is_relative_to(chosen or tmp_path / "__pycache__")
-    assert stored_kernels(Path(theirs)) == {"other.other"}
-    assert stored_kernels(Path(ours)) == {"toys.ratio"}
-    assert Path(ours).is_relative_to(tmp_path / "cache")
 
 
 def test_concurrent_saves_lose_and_mix_nothing(start, tmp_path):
@@ -270,26 +234,6 @@ def test_kernels_stay_in_memory_if_the_folder_cannot_be_created(start, tmp_path)
         assert (found["compiled"], found["value"], found["hits"]) == (True, 1.5, 0)
         assert "ISLANDS_CACHE_DIR" in found["messages"][0]
     assert not stored_kernels(tmp_path)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")
-@pytest.mark.parametrize("full", ["at first", "later"])
-def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
-    # A file size limit of zero has the effect of a full disk or quota in one process.
-    code = """if True:
-        import json, resource, sys
-        fill = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-        if sys.argv[1] == "at first":
-            fill()
-        import toys
-        from islands.kernels.jit_cache import ready
-        fill()
-        compiled = ready(lambda: toys.ratio(3.0, 2.0), lambda line: None)
-        folder = toys.cache_folder()
-        print(json.dumps([compiled, folder is None, folder is not None and (folder / "complete").exists()]))
-    """
-    assert get_output(start(code, full)) == [True, full == "at first", False]
-    assert get_output(start(READY))["compiled"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of the file size")

@@ -17,31 +17,9 @@ from islands.models.equations import (
     named_equation,
     named_statement,
     named_term,
-    signal_names,
 )
 from islands.models.narx import make_model
 from support.strategies import models
-
-MODEL_12 = make_model(
-    [
-        (parse("y(k-1)"), 1.0),
-        (parse("phi1(u(k-1), u(k-2))"), 0.77),
-        (parse("u(k-2)*phi2(u(k-2), u(k-3))*phi1(u(k-2), u(k-3))"), 1.44e-2),
-        (parse("y(k-1)*phi2(u(k-2), u(k-3))*phi1(u(k-2), u(k-3))"), -9.6e-3),
-        (parse("u(k-2)^2*phi1(u(k-2), u(k-3))"), 3.15e-4),
-        (parse("u(k-2)*y(k-1)*phi1(u(k-2), u(k-3))"), -2.46e-4),
-    ]
-)
-
-
-def test_equation_of_the_papers_model_12():
-    assert equation(MODEL_12) == (
-        "y(k) = 1*y(k-1) - 0.000246*y(k-1)*u(k-2)*(u(k-2) - u(k-3))"
-        " - 0.0096*y(k-1)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3))"
-        " + 0.000315*u(k-2)^2*(u(k-2) - u(k-3))"
-        " + 0.0144*u(k-2)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3)) + 0.77*(u(k-1) - u(k-2))"
-    )
-
 
 #: Functions that a printed equation needs: `div` as docs/reference/expressions.md defines it, and NumPy's.
 RUNTIME = {name: getattr(np, name) for name in ("sqrt", "log", "exp", "abs", "tanh", "sign")} | {
@@ -116,20 +94,6 @@ def test_equation_without_parameters_numbers_them():
     assert latex_equation(bare) == (
         r"y_{k} = \theta_{1} \, y_{k-1} + \theta_{2} \, \left(u_{1,k-1} + u_{2,k-1}\right) + \theta_{3}"
     )
-
-
-def test_signals_are_named_by_their_columns_without_units_in_brackets():
-    model = make_model(
-        [(parse("y(k-1)"), -1.0), (parse("u1(k-1)*u2(k-1)"), 11.0), (parse("u3(k-1)"), 1.0)],
-        ("flow (l/s)", "flow [m]", "valve 2 [V]"),
-        "speed [rad/s]",
-    )
-    assert signal_names(model) == ("speed", "[flow (l/s)]", "[flow [m]]", "[valve 2 [V]]")
-    assert sorted(named_equation(model).removeprefix("speed(k) = ").split(" + ")) == [
-        "-speed(k-1)",
-        "11*[flow (l/s)](k-1)*[flow [m]](k-1)",
-        "[valve 2 [V]](k-1)",
-    ]
 
 
 #: Functions of an equation as NumPy has them; `div` is that of the page on expressions.

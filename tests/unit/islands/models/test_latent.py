@@ -86,28 +86,6 @@ def test_a_document_has_the_whole_model():
     assert LatentModel.read(model.document(), "model.json") == model
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"units": ("cosh",)}, "unknown unit 'cosh'"),
-        ({"wiring": tuple(reversed(tuple(SPRING)))}, "in this order"),
-        ({"parameters": (1.0,)}, "has the parameters"),
-    ],
-)
-def test_an_impossible_structure_is_refused(change, message):
-    with pytest.raises(ModelError, match=message):
-        replace(make_model(), **change)
-
-
-def test_modes_are_those_about_the_operating_point():
-    lag = make_model({"a1_1": np.exp(-0.01 / 0.3), "b1": 1.0, "c1": 1.0}, (), 1)
-    assert lag.describe_modes() == ("time constant 0.3 s",)
-    # The cubic spring is stiffer away from zero.
-    (stiff,) = make_model(operating_inputs=(1.0,)).describe_modes()
-    assert float(stiff.split("resonance at ")[1].split()[0]) > 5.2
-    assert replace(lag, dt=None).describe_modes() == ()
-
-
 def test_standard_errors_follow_the_quantities():
     model = make_model(quantity_errors=(0.0123, 0.0045, 0.067))
     assert [(each.name, each.unit, each.input) for each in model.quantities] == [

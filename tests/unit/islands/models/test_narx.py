@@ -6,7 +6,7 @@ from hypothesis import given
 from islands.errors import ModelError
 from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.models.narx import Model, canonical_order, make_model
+from islands.models.narx import Model, make_model
 from islands.models.regressor import regressor
 from support.strategies import models
 
@@ -28,18 +28,6 @@ def test_model_without_regressor_is_refused():
 def test_regressors_out_of_order_or_repeated_are_refused(texts):
     with pytest.raises(ModelError, match="must be in canonical order without repetition"):
         Model(items(*texts))
-
-
-def test_canonical_order_sorts_and_drops_repetitions():
-    ordered = canonical_order(items("3", "y(k-1)*u(k-1)", "u(k-2)", "y(k-1)", "u(k-1)*y(k-1)"))
-    assert [plain(item.expression) for item in ordered] == ["y(k-1)", "u(k-2)", "y(k-1)*u(k-1)", "1"]
-    assert Model(tuple(ordered)).size == 4
-
-
-@pytest.mark.parametrize("name", ["theta", "standard_errors"])
-def test_wrong_number_of_parameters_is_refused(name):
-    with pytest.raises(ModelError, match=f"3 {name} for 2 regressors"):
-        Model(items("y(k-1)", "u(k-1)"), **{name: (1.0, 2.0, 3.0)})
 
 
 def test_make_model_moves_factors_into_parameters_and_merges_terms():

@@ -28,9 +28,3 @@ def test_the_linear_system_has_the_slopes_of_the_units():
         assert (after - at.after) / step == pytest.approx(column, abs=1e-6)
     assert at.values == pytest.approx([0.7**3])
     assert at.slopes == pytest.approx([3 * 0.7**2])
-
-
-def test_of_several_states_at_rest_the_start_decides():
-    # x + 0.1 * (x - x^3): rest at -1, 0 and 1.
-    model = make_model({"a1_1": 1.1, "c1": 1.0, "e1_1": -0.1, "w1_1": 1.0}, ("cube",), 1)
-    assert [rest_of(model, 0.0, (start,))[0] for start in (-0.9, 0.1, 0.9)] == pytest.approx([-1.0, 0.0, 1.0])

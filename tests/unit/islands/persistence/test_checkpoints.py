@@ -4,7 +4,6 @@ import json
 import os
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 
 import pytest
 
@@ -141,15 +140,6 @@ def test_a_crash_while_writing_keeps_the_old_checkpoint(path, monkeypatch):
     with pytest.raises(OSError, match="No space left"):
         write_checkpoint(archipelago(), path, {"epoch": "new"})
     assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
-
-
-def test_a_checkpoint_is_synced_before_it_replaces_the_old_one(path, monkeypatch):
-    order = []
-    synchronise, put = os.fsync, Path.replace
-    monkeypatch.setattr(os, "fsync", lambda number: (order.append("synchronised"), synchronise(number))[1])
-    monkeypatch.setattr(Path, "replace", lambda self, to: (order.append("replaced"), put(self, to))[1])
-    write_checkpoint(archipelago(), path, {})
-    assert order == ["synchronised", "replaced"]
 
 
 # Hall of fame files.

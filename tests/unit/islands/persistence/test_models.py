@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -17,7 +16,6 @@ from islands.persistence.models import (
     model_json,
     read_coupled_model,
     read_model,
-    terms_document,
     write_model,
 )
 from islands.systems.published_models import PUBLISHED
@@ -108,41 +106,6 @@ def halved(a):
 
 
 # The file.
-
-
-def test_a_model_file_does_not_depend_on_the_machine(tmp_path, monkeypatch):
-    model = PUBLISHED["13"].model
-    texts = []
-    for name in ("here", "there"):
-        folder = tmp_path / name
-        folder.mkdir()
-        monkeypatch.chdir(folder)
-        write_model(model, Path("model.json"))
-        texts.append(Path("model.json").read_bytes())
-    assert texts[0] == texts[1]
-    assert str(tmp_path).encode() not in texts[0]
-
-
-def test_terms_may_be_in_any_form():
-    model = model_from_json(
-        document(
-            terms=[
-                term("u(k-2) - u(k-1)", 3.0, standard_error=0.3),
-                term("2*u(k-1)*y(k-1)", 0.25, standard_error=0.125),
-                term("q2(y(k-1))/4", 8.0, standard_error=4.0),
-                term("sign(u(k-2) - u(k-1))^3", -1.0, standard_error=0.5),
-                term("3", 2.0, standard_error=1.0),
-            ]
-        )
-    )
-    terms = {entry.pop("regressor"): entry for entry in terms_document(model)}
-    assert terms == {
-        "u(k-1) - u(k-2)": {"parameter": -3.0, "standard_error": 0.3},
-        "y(k-1)*u(k-1)": {"parameter": 0.5, "standard_error": 0.25},
-        "y(k-3)": {"parameter": 2.0, "standard_error": 1.0},
-        "sign(u(k-1) - u(k-2))": {"parameter": 1.0, "standard_error": 0.5},
-        "1": {"parameter": 6.0, "standard_error": 3.0},
-    }
 
 
 # Invalid files.

@@ -3,7 +3,6 @@
 import ctypes
 import decimal
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,14 +58,6 @@ def test_uncompilable_function_is_refused():
         ModelError, match="primitive 'slow' does not compile; use arithmetic, comparisons and math"
     ):
         row_address(entry)
-
-
-def test_functions_are_compiled_once_and_identified_by_object():
-    entry = primitive("twice", lambda a: 2.0 * a)
-    assert row_address(entry) == row_address(replace(entry, latex="2 {0}"))
-    other = primitive("twice", lambda a: a + a + 1.0)
-    assert row_address(other) != row_address(entry)
-    assert run(other, [1.0])[0] == 3.0
 
 
 def test_row_function_of_a_user_is_compiled_in_every_process():

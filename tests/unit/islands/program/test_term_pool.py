@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
-from islands.expressions.tree import Lagged
 from islands.expressions.user_primitive import primitive
 from islands.kernels import codegen
 from islands.kernels.codegen import CONSTANT, LAGGED
@@ -20,7 +19,6 @@ from islands.kernels.interpreter import (
     SIGN,
 )
 from islands.models.regressor import regressor
-from islands.program import term_pool
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import TermPool, link
 from support.oracles import NUMBERS
@@ -131,10 +129,3 @@ def test_functions_with_one_name_in_two_pools_keep_their_addresses():
     ]
     assert found == [[row_address(one)], [row_address(other)]]
     assert found[0] != found[1]
-
-
-def test_pool_of_recent_terms_is_bounded():
-    for lag in range(1, 3 * term_pool._MOST_NODES):
-        link([Lagged(1, lag)])
-    assert len(term_pool._RECENT.pool) <= term_pool._MOST_NODES + 1
-    assert term_pool._RECENT.pool.nodes.operation.size <= 2 * term_pool._MOST_NODES

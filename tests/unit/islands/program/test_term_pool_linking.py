@@ -74,33 +74,12 @@ def test_no_expression_is_computed_twice(called, terms):
     assert len(set(computed)) == len(computed) == len(program.code)
 
 
-@given(several)
-def test_target_is_never_the_row_of_an_operand_or_constant(terms):
-    program = link(terms)
-    for _, target, first, second in program.code:
-        assert target >= len(program.constants)
-        assert target < program.temporaries
-        for operand in (first, second):
-            assert tuple(program.operands[operand]) != (TEMPORARY, target)
-
-
 def linked(*texts):
     return link([regressor(parse(text))[1] for text in texts])
 
 
 def operations(program):
     return program.code[:, 0].tolist()
-
-
-def test_products_of_up_to_four_factors_need_no_instruction():
-    program = linked("y(k-1)*u(k-3)^2*u(k-1)", "y(k-1)")
-    assert (len(program.code), program.temporaries) == (0, 0)
-    assert program.degree.tolist() == [4, 1]
-    terms = [
-        program.operands[row[:degree]].tolist()
-        for row, degree in zip(program.factors, program.degree, strict=True)
-    ]
-    assert terms == [[[0, 1], [1, 1], [1, 3], [1, 3]], [[0, 1]]]
 
 
 def test_row_is_reused_after_the_last_read_of_its_value():

@@ -5,7 +5,6 @@ import pytest
 from islands.records.channel_names import (
     PLAIN_UNITS,
     SYMBOLS,
-    conversion_factor,
     is_unit,
     parse_channel_name,
     parse_unit,
@@ -62,16 +61,6 @@ def test_a_unit_is_the_end_of_a_name(name, stem, unit):
 def test_text_that_is_not_a_unit_is_a_part_of_the_name(name):
     assert parse_unit(name) == ""
     assert parse_channel_name(name).stem == name
-
-
-def test_units_with_prefixes_convert_by_powers_of_ten():
-    assert conversion_factor("mV", "V") == 1e-3
-    assert conversion_factor("kOhm", "mΩ") == 1e6
-    assert conversion_factor("V", "A") is None
-    assert conversion_factor("min", "h") is None
-    assert [text for text in ("V", "N.m", "m/s2", "degC", "est", "", "B", "set") if is_unit(text)] == [
-        *("V", "N.m", "m/s2", "degC")
-    ]
 
 
 @pytest.mark.parametrize(

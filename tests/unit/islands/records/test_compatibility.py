@@ -39,18 +39,6 @@ def test_inputs_are_matched_by_name_and_otherwise_by_position(expected, given, o
     assert matched.input_names == tuple(given[place] for place in order)
 
 
-def test_an_input_that_the_reference_reads_early_is_advanced_in_every_segment():
-    u = np.arange(12.0).reshape(6, 2)
-    given = Dataset(u, np.zeros(6), 0.1, ("b", "a_V"), "y_um", segments=(4, 2))
-    for names in (("a_V+1", "b"), ("a_V+1", "b+1")):
-        matched = match_record(record(*names), given)
-        assert matched.input_names == names
-        assert matched.u[:, 0].tolist() == [3.0, 5.0, 7.0, 7.0, 11.0, 11.0]
-        assert matched.u[0, 1] == (2.0 if names[1] == "b+1" else 0.0)
-    with pytest.raises(RecordError, match=r"read the input a_V\+1$"):
-        match_record(record("a_V+1", "b"), given, advance=False)
-
-
 @pytest.mark.parametrize(
     ("expected", "given", "message"),
     [

@@ -25,13 +25,6 @@ def error_message(**changes: object) -> str:
     return str(caught.value)
 
 
-def test_single_input_may_be_a_vector():
-    made = record()
-    assert made.u.shape == (10, 1)
-    assert (made.samples, made.inputs, len(made)) == (10, 1, 10)
-    assert (made.input_names, made.input_units, made.segments) == (("u",), ("",), (10,))
-
-
 def test_record_is_read_only():
     made = record()
     with pytest.raises(ValueError, match="read-only"):
@@ -97,14 +90,6 @@ def test_error_for_an_infinite_output_names_output_and_sample():
     assert "output y_um is infinite at sample 4" in message
 
 
-def test_slice_is_a_record_with_a_later_start():
-    part = record()[4:7]
-    assert part.u[:, 0].tolist() == [4.0, 5.0, 6.0]
-    assert part.y.tolist() == [16.0, 25.0, 36.0]
-    assert part.start == 2.0
-    assert part.segments == (3,)
-
-
 def test_slice_cuts_segments_and_joins_none():
     made = record(segments=(3, 5, 2))
     assert made[1:9].segments == (2, 5, 1)
@@ -116,13 +101,6 @@ def test_slice_cuts_segments_and_joins_none():
 def test_slice_that_is_empty_or_skips_samples_is_refused(rows):
     with pytest.raises(RecordError, match="non-empty slice of step 1 of the record's 10 samples"):
         record()[rows]
-
-
-def test_joined_recordings_remain_separate_segments():
-    joined = join((record(samples=4, start=1.0), record(samples=6, segments=(2, 4))))
-    assert joined.segments == (4, 2, 4)
-    assert joined.y.tolist() == [0.0, 1.0, 4.0, 9.0, 0.0, 1.0, 4.0, 9.0, 16.0, 25.0]
-    assert joined.start == 1.0
 
 
 def test_cutting_and_joining_at_a_boundary_returns_the_record():

@@ -13,11 +13,6 @@ def record(known: list[bool], start: float = 0.0) -> Dataset:
     return Dataset(counted, np.where(known, counted, np.nan), 0.5, start=start)
 
 
-def test_a_complete_record_is_returned_itself():
-    complete = record([True, True])
-    assert skip_missing_outputs(complete) is complete
-
-
 @given(st.lists(st.booleans(), min_size=1).filter(any), st.lists(st.booleans(), min_size=1).filter(any))
 def test_known_samples_remain_in_order_and_segments_end_at_gaps(one, other):
     joined = join((record(one, start=3.0), record(other)))

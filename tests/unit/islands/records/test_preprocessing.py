@@ -14,14 +14,6 @@ def record():
     return Dataset(u, 5.0 + lag(u, 8.0), 0.1)
 
 
-def test_linear_detrend_removes_a_drift_of_the_output(record):
-    drifting = Dataset(record.u, record.y + 0.01 * record.time, record.dt)
-    done = preprocess(drifting, detrend="linear")
-    same = preprocess(record, detrend="linear")
-    np.testing.assert_allclose(done.y, same.y, atol=1e-9)
-    assert done.preprocessing.output_slope - same.preprocessing.output_slope == pytest.approx(0.01)
-
-
 def test_steps_are_repeated_with_the_offsets_but_not_with_the_line(record):
     done = preprocess(record, detrend="linear", decimate=2)
     other = Dataset(record.u + 1.0, record.y + 2.0, record.dt)
@@ -47,24 +39,10 @@ def test_lowpass_removes_noise_and_keeps_the_signal():
     assert np.std(done.y - u) < 0.5 * np.std(noisy.y - u)
 
 
-def test_decimation_multiplies_the_sampling_time_and_keeps_segments(record):
-    two = join((record[:901], record[901:]))
-    done = preprocess(two, decimate=5)
-    assert done.dt == pytest.approx(0.5)
-    assert done.segments == (181, 220)
-
-
 def test_decimation_does_not_alias():
     k = np.arange(4000)
     fast = np.sin(2.0 * np.pi * 0.45 * k)
     assert np.abs(preprocess(Dataset(fast, fast, 1.0), decimate=4).y[50:-50]).max() < 0.01
-
-
-def test_missing_outputs_stay_missing(record):
-    y = record.y.copy()
-    y[100:110] = np.nan
-    done = preprocess(Dataset(record.u, y, record.dt), lowpass=1.0, detrend="constant")
-    np.testing.assert_array_equal(np.isnan(done.y), np.isnan(y))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset, join
-from islands.records.split import hold_out, share_samples, split, split_data
+from islands.records.split import hold_out, split, split_data
 
 
 def record(samples: int = 100, inputs: int = 1, **changes: object) -> Dataset:
@@ -19,13 +19,6 @@ def test_parts_of_a_split_together_are_the_record_in_order(samples, fraction):
     parts = split(record(samples), fraction)
     both = np.concatenate([parts.estimation.y, parts.validation.y])
     assert both.tolist() == list(range(samples))
-
-
-def test_validation_part_is_the_end_of_the_record_and_keeps_its_time():
-    parts = split(record(start=2.0), 0.2)
-    assert parts.validation.y[0] == 80.0
-    assert parts.validation.start == pytest.approx(10.0)
-    assert parts.estimation.start == 2.0
 
 
 @pytest.mark.parametrize("fraction", [0.0, 1.0, -0.1, 1.5, float("nan")])
@@ -57,15 +50,6 @@ def test_estimation_data_are_refused_as_validation_data():
         split_data(data[10:40], data)
 
 
-def test_samples_of_one_file_are_shared_if_the_rows_and_the_column_are():
-    whole = drawn(sha256="a" * 64)
-    # An input that is read one sample early repeats its last value.
-    first, second = whole[:30], replace(whole[20:], u=whole.u[20:] + 1.0)
-    assert share_samples(first, second)
-    assert not share_samples(first, whole[30:])
-    assert not share_samples(first, replace(drawn(seed=1), output_name="y_val", sha256="a" * 64))
-
-
 def test_samples_without_an_output_separate_segments_of_both_parts():
     data, other = drawn(), drawn(seed=1)
     y = other.y.copy()
@@ -84,12 +68,6 @@ def test_every_recording_gives_its_end_to_the_validation_data():
     assert parts.estimation.rows_by_recording == {"1": slice(0, 30), "2": slice(30, 45), "3": slice(45, 46)}
     assert parts.validation.rows_by_recording == {"1": slice(0, 10), "2": slice(10, 15)}
     assert parts.validation.y.tolist() == [*drawn(seed=1).y[30:40], *drawn(seed=2).y[15:20]]
-
-
-def test_a_recording_among_several_is_found_again():
-    one, other, third = (drawn(seed=seed) for seed in (1, 2, 3))
-    assert share_samples(join((one, other)), other)
-    assert not share_samples(join((one, other)), third)
 
 
 def test_recording_that_is_held_out_follows_the_others():

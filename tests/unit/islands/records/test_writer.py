@@ -1,7 +1,5 @@
 """Writing of records and simulations: files are read back exactly."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -56,31 +54,11 @@ def test_sampling_time_and_start_survive_at_any_ratio(dt, start, tmp_path):
     assert found.start == pytest.approx(start, rel=1e-12, abs=1e-6 * dt)
 
 
-def test_a_file_has_a_header_and_one_line_per_sample_on_any_platform(tmp_path):
-    write_record(record(40), tmp_path / "r.csv")
-    raw = (tmp_path / "r.csv").read_bytes()
-    assert raw.startswith(b"t_s,u_V,T_K,y_um\n")
-    assert raw.count(b"\n") == 41
-    assert b"\r" not in raw
-
-
 def test_several_recordings_do_not_fit_into_one_table(tmp_path):
     with pytest.raises(RecordError) as caught:
         write_record(record(segments=(20, 30)), tmp_path / "r.csv")
     assert str(caught.value) == "a CSV file holds one recording: write each segment to a separate file"
     assert not (tmp_path / "r.csv").exists()
-
-
-def test_a_simulation_has_a_row_for_every_sample_of_the_record(tmp_path):
-    data = record(start=2.0)
-    simulated = np.sin(np.arange(50.0))
-    simulated[:3] = math.nan
-    write_simulation(data, simulated, tmp_path / "s.csv")
-    lines = (tmp_path / "s.csv").read_text().splitlines()
-    assert lines[0] == "time,y_sim"
-    assert lines[1:4] == ["2.0,nan", "2.01,nan", "2.02,nan"]
-    found = np.array([float(line.split(",")[1]) for line in lines[1:]])
-    assert np.array_equal(found, simulated, equal_nan=True)
 
 
 def test_a_simulation_of_several_recordings_concatenates_their_samples(tmp_path):

@@ -7,7 +7,6 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
-from islands.records.dataset import join
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run
 from support.slow_processes import TANK_NOISE, make_tank
@@ -31,20 +30,6 @@ def test_free_run_of_an_integrator_has_the_error_of_the_noise():
         estimated.append(rmse(simulate_freely(TANK, record)))
     assert max(estimated) < 1.15 * TANK_NOISE
     assert max(measured) > 1.8 * TANK_NOISE
-
-
-def test_initial_outputs_are_estimated_for_each_segment():
-    record = join((make_tank(5, 300), make_tank(6, 200)))
-    started = estimate_initial_outputs(TANK, record)
-    assert np.flatnonzero(started.y != record.y).tolist() == [0, 300]
-    alone = [estimate_initial_outputs(TANK, make_tank(seed, count)) for seed, count in ((5, 300), (6, 200))]
-    assert started.y == pytest.approx(np.concatenate([each.y for each in alone]), abs=1e-12)
-
-
-def test_initial_outputs_of_a_model_that_forgets_them_are_the_measured_ones():
-    record = make_tank(0, 400)
-    model = law(**{"y(k-1)": 0.5, "u(k-1)": 0.02})
-    assert estimate_initial_outputs(model, record) is record
 
 
 def test_error_of_a_wrong_model_is_not_taken_for_noise():

@@ -7,7 +7,6 @@ import pytest
 
 from islands.export import export
 from islands.kernels.state_space import simulate_state_space
-from islands.records.dataset import Dataset, join
 from islands.simulation.initial_states import (
     Segment,
     estimate_states,
@@ -26,28 +25,6 @@ def test_states_of_a_record_without_noise_are_found():
     model = make_model()
     found = estimate_states(model.theta, model.codes, Segment(record.u, record.y), model.rest)
     assert found == pytest.approx([0.5, -0.4], abs=1e-3)
-
-
-def test_every_segment_has_its_initial_states():
-    parts = [
-        spring_record(300, seed=seed, start=start) for seed, start in ((0, (0.5, -0.4)), (1, (-0.6, 0.2)))
-    ]
-    run = free_run(make_model(), join(tuple(parts)), 60)
-    for begin, part in ((0, parts[0]), (300, parts[1])):
-        assert run.y[begin + 60 : begin + 300] == pytest.approx(part.y[60:], abs=1e-3)
-        assert np.isnan(run.y[begin : begin + 60]).all()
-
-
-def test_a_model_of_two_inputs_is_simulated():
-    """Rows of several inputs have another order in memory than those of one."""
-    parameters = {"a1_1": 0.9, "b1_1": 0.4, "b1_2": -0.2, "c1": 1.0}
-    names = ("u1", "u2")
-    model = make_model(parameters, (), 1, input_names=names, output_name="y", operating_inputs=(0.0, 0.0))
-    u, x, y = np.random.default_rng(0).standard_normal((200, 2)), 0.3, np.empty(200)
-    for k in range(200):
-        y[k] = x
-        x = 0.9 * x + u[k] @ [0.4, -0.2]
-    assert free_run(model, Dataset(u, y, 0.01, names, "y")).y[20:] == pytest.approx(y[20:], abs=1e-3)
 
 
 def test_a_model_that_diverges_in_the_warm_up_diverges_at_the_first_prediction():

@@ -48,24 +48,6 @@ def test_blocks_fit_the_width_and_intervals_are_sorted_by_length(record, interva
         assert (np.diff(lengths) <= 0).all()
 
 
-def test_one_step_ahead_layout_does_not_gather_samples(record):
-    cut = layout(record, WARM_UP, 1)
-    assert cut.row_stride == 1
-    assert np.array_equal(cut.signals[:, : record.samples], np.vstack([record.y, record.u.T]))
-    # The kernel may read the complete row of the last sample.
-    assert cut.signals.shape[1] == record.samples + cut.width
-    # A block does not cross a segment boundary: its lanes are adjacent samples.
-    for _, _, starts, _ in blocks(cut):
-        assert (np.diff(starts) == 1).all()
-
-
-@pytest.mark.parametrize(("intervals", "width"), [(1, 8), (8, 8), (20, 24), (24, 24), (60, 104), (1000, 104)])
-def test_width_of_a_row_depends_on_the_number_of_intervals(intervals, width):
-    record = Dataset(np.zeros(3 * intervals + 1), np.zeros(3 * intervals + 1), 1.0)
-    cut = layout(record, 1, 3)
-    assert (len(cut.start), cut.width) == (intervals, width)
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("interval", [2, 7, 100, None])
 def test_gathered_row_only_contains_samples_of_the_record(monkeypatch, record, interval, width):

@@ -172,23 +172,6 @@ def test_an_extended_simulation_of_an_earlier_version_is_read(name: str) -> None
     assert np.max(np.abs(simulate_spec(spec, case.record) - alone)) > 1e-3
 
 
-def test_only_unchanged_equations_are_described_by_their_name() -> None:
-    oscillator = make_oscillator(0.5, 4.0, 200.0)
-    values = np.array([each.nominal for each in oscillator.parameters])
-    spec = describe_extension(oscillator, values, ("u_N",), "y_m")
-    values_by_name = {"m": 0.5, "c": 4.0, "k": 200.0}
-    assert spec == PhysicalSpec(kind="second-order", parameters=values_by_name, steps=1)
-    changed = oscillator.system.with_term("v", "-3*x**2*v")
-    record = recorded(wave(), wave(), units=("N", "m"))
-    extended = make_ode_simulator(changed, record, {"x": 0.0, "v": 0.0})
-    spec = describe_extension(extended, values, ("u_N",), "y_m")
-    again = make_simulator(spec, made()["second-order"].record)
-    assert isinstance(again, OdeSimulator)
-    assert again.system.derivatives == changed.derivatives
-    assert [each.name for each in again.state_effects] == ["input-offset:force"]
-    assert again.built_in_effects == {"viscous"}
-
-
 def test_an_effect_that_does_not_exist_is_refused() -> None:
     effect = OdeEffect("leakage", "v", Symbol("value"))
     system = replace(make_oscillator(0.5, 4.0, 200.0).system, effects=(effect,))
@@ -260,18 +243,6 @@ def test_given_parameters_are_kept_and_the_others_recovered(names: tuple[str, ..
     assert_close(found, truth)
     kept = {"m": found.mass, "c": found.damping, "k": found.stiffness}
     assert {name: kept[name] for name in names} == chosen
-
-
-@pytest.mark.parametrize("name", ["c", "k"])
-def test_given_zero_does_not_determine_the_scale(name: str) -> None:
-    """Estimate the mass without a damper and without a spring."""
-    u = make_input()
-    known = {"m": 0.4, "c": 1.5, "k": 140.0, name: 0.0}
-    truth = SecondOrder(known["m"], known["c"], known["k"])
-    found = estimate_second_order(u, simulate(truth, u), DT, {name: 0.0})
-    assert (found.mass, found.damping, found.stiffness) == pytest.approx(
-        (truth.mass, truth.damping, truth.stiffness), rel=1e-4
-    )
 
 
 def test_estimate_from_a_noisy_record_is_within_one_per_cent() -> None:

@@ -110,17 +110,3 @@ def test_a_map_of_a_held_input_is_that_of_its_samples(name: str) -> None:
     assert simulation.simulate(set_values(simulation)) == pytest.approx(
         expected, abs=1e-12 * np.ptp(expected)
     )
-
-
-def test_a_static_map_before_another_map_acts_on_the_samples() -> None:
-    """A delay needs samples, and the order of the maps is kept."""
-    record = record_of(wave())
-    context = make_context(record, OSCILLATOR, record.samples)
-    zone, delay = CATALOGUE["dead-zone"], CATALOGUE["delay"]
-    maps = [(each, np.array(each.starting_points(context, context.u)[0])) for each in (zone, delay)]
-    x, characteristic = map_input(maps, context, is_continuous_time=True)
-    assert characteristic is None
-    assert np.array_equal(x, map_input(maps, context, is_continuous_time=False).x)
-    x, characteristic = map_input(maps[::-1], context, is_continuous_time=True)
-    assert characteristic is not None
-    assert np.array_equal(x, map_input(maps[1:], context, is_continuous_time=True).x)

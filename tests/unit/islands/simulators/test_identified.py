@@ -69,16 +69,6 @@ def test_starting_points_do_not_depend_on_hold_out_samples(extended: ExtendedSim
     )
 
 
-def test_missing_terms_keep_the_output_constant_at_a_constant_input(
-    extended: ExtendedSimulator, faulty: FaultyRecord
-) -> None:
-    values = get_starting_values(extended, faulty)
-    resting = np.where(np.arange(2000) < 1000, extended.context.u, extended.context.u[999])
-    own = {each.name: value for each, value in zip(extended.parameters[8:], values[8:], strict=True)}
-    y = extended.simulator.simulate(values[:8], resting, extended.context, own, ())
-    assert np.ptp(y[1010:]) == 0.0
-
-
 def test_an_extended_model_contains_the_missing_terms(
     extended: ExtendedSimulator, faulty: FaultyRecord
 ) -> None:

@@ -5,8 +5,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.preparation import count_fitted_samples
@@ -21,8 +19,6 @@ Array = NDArray[np.float64]
 
 #: Mass, damping and stiffness; the period of the oscillation is 0.1 s, ten samples.
 VALUES = (0.5, 1.5, 2000.0)
-
-signals = st.lists(st.floats(-10, 10), min_size=4, max_size=80).map(np.array)
 
 
 def oscillator() -> OdeSimulator:
@@ -61,16 +57,6 @@ def test_smaller_steps_converge_to_the_exact_motion(intersample: InterSample, ex
         assert coarse / fine == pytest.approx(16.0, rel=0.3)
 
 
-@given(signals, st.sampled_from([1, 2, 3, 8]))
-def test_every_resampled_input_contains_all_samples(x: Array, oversampling: int) -> None:
-    for intersample in InterSample:
-        u, between = resample_input(x, intersample, oversampling)
-        assert u.shape == (oversampling * x.size,)
-        assert between.shape == (2, oversampling * x.size)
-        assert u[::oversampling] == pytest.approx(x, abs=1e-4 * np.max(np.abs(x)) + 1e-12)
-        assert np.isfinite(between).all()
-
-
 @pytest.mark.parametrize("oversampling", [1, 2, 4])
 def test_a_band_limited_input_is_reconstructed_between_its_samples(oversampling: int) -> None:
     def signal(t: Array) -> Array:
@@ -85,14 +71,3 @@ def test_a_band_limited_input_is_reconstructed_between_its_samples(oversampling:
     assert between[1][within] == pytest.approx(signal(at + 1 / oversampling)[within], abs=0.02)
     linear = resample_input(signal(np.arange(600.0)), InterSample.FOH, 2)[0]
     assert np.max(np.abs(linear - signal(np.arange(1200) / 2))) > 0.3
-
-
-@pytest.mark.parametrize("oversampling", [1, 3, 8])
-def test_a_linear_input_is_interpolated_as_by_numpy(oversampling):
-    x = np.random.default_rng(2).normal(size=50)
-    start, between = resample_input(x, InterSample.FOH, oversampling)
-    at = np.arange(50 * oversampling) / oversampling
-    middles = np.arange(1, 100 * oversampling, 2) / (2 * oversampling)
-    ends = np.arange(2, 100 * oversampling + 1, 2) / (2 * oversampling)
-    for found, places in ((start, at), (between[0], middles), (between[1], ends)):
-        np.testing.assert_array_equal(found, np.interp(places, np.arange(50), x))

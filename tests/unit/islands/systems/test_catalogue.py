@@ -34,13 +34,6 @@ def test_piezo_starts_at_rest_except_in_the_authors_noise(variant, part):
     assert at_rest == ((variant, part) not in {("authors", "estimation"), ("authors", "noise-2")})
 
 
-@pytest.mark.parametrize("part", ["hold-loading", "hold-unloading"])
-def test_hold_parts_are_constant_for_twenty_seconds_at_twenty_volts(part):
-    record = make_record("bouc-wen-piezo", "consistent", part)
-    assert (record.u[-20000:, 0] == 20.0).all()
-    assert (record.y[-20000:] == record.y[-1]).all()
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

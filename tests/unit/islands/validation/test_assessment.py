@@ -136,22 +136,6 @@ def test_estimation_divergence_makes_information_criteria_nan():
 # Several recordings and short recordings.
 
 
-def test_residual_tests_use_the_longest_recording():
-    recordings = tuple(record(samples, seed) for seed, samples in enumerate((30, 80, 50)))
-    found = assess(LINEAR, Split(record(200), join(recordings)), SHOOTING).residual_tests
-    expected = assess(LINEAR, Split(record(200), recordings[1]), SHOOTING).residual_tests
-    assert found.ljung_box == expected.ljung_box
-    assert found.tests[0].values.tolist() == expected.tests[0].values.tolist()
-
-
-def test_metrics_of_several_recordings_cover_all_their_samples():
-    recordings = tuple(record(samples, seed) for seed, samples in enumerate((30, 80, 50)))
-    found = assess(LINEAR, Split(join(recordings), record(90)), SHOOTING).metrics["estimation"]["free_run"]
-    errors = np.concatenate([(part.y - free_run(LINEAR, part).y)[2:] for part in recordings])
-    assert len(errors) == 154
-    assert found.rmse == pytest.approx(math.sqrt(np.mean(errors**2)), rel=1e-12)
-
-
 def test_errors_of_the_recordings_add_up_to_those_of_the_part():
     recordings = [record(80, 1), record(60, 2)]
     found = assess(LINEAR, Split(record(200), join(tuple(recordings))), SHOOTING)

@@ -98,14 +98,6 @@ def test_members_are_of_the_first_draws_half_of_which_are_plausible(monkeypatch,
     assert structure.parameters == pytest.approx(np.array(expected))
 
 
-def test_members_equal_the_measured_output_before_they_start():
-    data = parts(0.02)
-    found = ensemble(data, [("y(k-1)", "u(k-2)")])
-    runs = found.simulate(data.validation, 1)
-    assert (runs[:, :2] == data.validation.y[:2]).all()
-    assert (runs[:, 2] != data.validation.y[2]).all()
-
-
 def test_the_spread_is_infinite_if_a_tenth_of_the_members_has_diverged():
     found = ensemble(parts(0.02), [TRUE])
     runs = np.zeros((len(found.weights), 2))
@@ -113,19 +105,6 @@ def test_the_spread_is_infinite_if_a_tenth_of_the_members_has_diverged():
     runs[: len(runs) // 4, 1] = np.nan
     assert found.spread(runs, np.zeros(2)).tolist() == [0.0, np.inf]
     assert np.isnan(found.spread(runs, np.array([np.nan, 0.0]))[0])
-
-
-def test_errors_on_a_constant_output_of_zero_are_weighed() -> None:
-    """The ratio of the errors overflowed, since rounding errors of a range of 0 are 0."""
-    data = parts()
-    resting = replace(data, validation=replace(data.validation, y=np.zeros(data.validation.samples)))
-    exact, other = (candidate(texts, data).model for texts in STRUCTURES[:2])
-    made = make_ensemble(
-        [ValidatedModel(exact, LEAST_SQUARES, 0.0), ValidatedModel(other, LEAST_SQUARES, 5.0)],
-        *(resting, "none", 2),
-        seed=0,
-    )
-    assert [structure.weight for structure in made.structures] == [1.0]
 
 
 def first_order(noise, seed, samples=1200):
@@ -185,18 +164,7 @@ def test_noise_of_initial_outputs_does_not_exclude_the_law_of_a_slow_process():
     assert sum(lost) >= 3
 
 
-def test_the_recommended_structure_is_in_the_ensemble():
-    data = parts(0.02)
-    entries = [candidate(texts, data) for texts in STRUCTURES]
-    poor = entries[1].model
-    assert poor.parameter_names not in [each.model.parameter_names for each in ensemble(data).structures]
-    found = make_ensemble(entries, data, "none", 2, 0, recommended=poor)
-    assert found.structures[-1].model.parameter_names == poor.parameter_names
-    assert 0.0 < found.structures[-1].weight < 1e-3
-    assert sum(each.weight for each in found.structures) == pytest.approx(1.0)
-
-
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_terms_of_a_recommended_law_are_certain():
     """y(k-1) had a probability of 0.50, because y(k) = 0.73 y(k-3) + ... is the same law."""
     found = fit(first_order(0.02, 1))

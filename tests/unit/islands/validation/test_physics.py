@@ -52,28 +52,11 @@ def test_cluster_sums_are_not_sufficient_for_property_1():
     assert checked.property_1 is False
 
 
-def test_constant_holds_are_not_sufficient_for_property_1():
-    # The output settles at constant input, but at a single equilibrium.
-    checked = check_physics(model({"y(k-1)": 0.5, "u(k-1)": 0.4}), record())
-    assert all(entry.bounded and entry.constant for entry in checked.holds)
-    sums = {entry.cluster: (entry.sum, entry.target, entry.met) for entry in checked.clusters}
-    assert sums == {"y": (0.5, 1.0, False), "u": (0.4, 0.0, False)}
-    assert checked.property_1 is False
-
-
 @pytest.mark.parametrize("terms", [{"u(k-1) - u(k-2)": 0.5}, {"1": 2.0}, {"y(k-1)*u(k-1)": 0.01}])
 def test_model_without_feedback_has_no_continuum_of_equilibria(terms):
     # The first model has no cluster; its output is zero and constant in every hold.
     checked = check_physics(model(terms), record())
     assert checked.clusters[0] == ClusterSum("y", 0.0, 1.0)
-    assert checked.property_1 is False
-
-
-def test_output_alternating_between_two_values_is_not_constant():
-    checked = check_physics(model({"y(k-2)": 1.0, "u(k-1) - u(k-2)": 0.1}), record())
-    assert checked.clusters == (ClusterSum("y", 1.0, 1.0),)
-    assert all(entry.bounded for entry in checked.holds)
-    assert not all(entry.constant for entry in checked.holds)
     assert checked.property_1 is False
 
 
@@ -160,34 +143,6 @@ def test_closure_of_a_ratchet_is_its_gain_per_period():
 
 
 # What the record gives: the period, the range, a place to start from.
-
-
-def hold_length(data, terms=HYSTERESIS, names=("u",)):
-    """Return the length of a hold in samples, which is twenty periods."""
-    signal, _ = hold_response(model(terms, names), data)
-    return len(signal) - 1 - int(np.flatnonzero(signal != signal[-1])[-1])
-
-
-def test_period_for_noise_follows_from_its_range_and_slope():
-    rng = np.random.default_rng(5)
-    u = np.cumsum(rng.normal(size=5000))
-    expected = int(np.pi * np.ptp(u) / np.sqrt(2 * np.mean(np.diff(u) ** 2)))
-    assert 40 < expected < 5000
-    assert hold_length(Dataset(u, u, 0.1)) == 20 * expected
-
-
-TWO = {"y(k-1)": 1.0, "u1(k-1) - u1(k-2)": 0.5, "u2(k-1) - u2(k-2)": -0.25}
-
-
-def test_inputs_are_excited_simultaneously_over_their_ranges():
-    angle = 2 * np.pi * np.arange(800) / 200
-    u = np.column_stack([2 * np.sin(angle), 40 + 10 * np.cos(angle)])
-    data = Dataset(u, 4.0 * np.sin(angle), 0.1)
-    checked = check_physics(model(TWO, ("a", "b")), data)
-    assert checked.property_1 is True
-    assert checked.hold_drift_percent < 1e-9
-    # Contributions 0.5 * 2 and -0.25 * 10, peak to peak, relative to a range of 8.
-    assert excursions(checked)["rate x 0.25"].range_percent == pytest.approx(100 * 2 * 1.5 / 8, rel=1e-3)
 
 
 def test_drift_relative_to_a_constant_output_is_zero_or_infinite():

@@ -31,13 +31,6 @@ def test_the_share_is_the_fraction_of_the_mean_square(missing):
         assert predictable_share(residual, U, Y) == pytest.approx(1 / (1 + noise**2), abs=0.06)
 
 
-def test_a_product_of_residual_and_input_is_predictable():
-    residual = WHITE.copy()
-    for k in range(1, len(residual)):
-        residual[k] += 0.9 * residual[k - 1] * U[k - 1, 0]
-    assert predictable_share(residual, U, Y) > 0.15
-
-
 def test_a_coloured_residual_is_predictable_at_two_levels_of_the_output():
     level = np.where(np.arange(2000) < 1000, 0.0, 10.0)
     y, u = level + 0.1 * Y, level[:, None] + 0.1 * U

@@ -46,14 +46,6 @@ def test_the_coverage_of_new_records_is_near_the_level():
     assert np.mean(inside) == pytest.approx(0.9, abs=0.04)
 
 
-def test_a_band_widens_outside_the_data():
-    """Parameters are less certain where the input exceeds that of the estimation data."""
-    data = record(seed=1)
-    wide = result().best.bands(replace(data, u=1.6 * data.u))
-    band = result().best.bands(data)
-    assert np.nanmax(wide.upper - wide.lower) > 1.2 * np.nanmax(band.upper - band.lower)
-
-
 def drive(samples, seed, amplitude):
     """A lag behind a saturation, which no polynomial of the second degree describes outside of the data."""
     u, x = amplitude * filtered_noise(1.0, samples, 0.1, seed), np.zeros(samples)

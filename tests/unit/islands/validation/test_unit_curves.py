@@ -50,16 +50,6 @@ def test_a_curve_over_the_input_is_the_effect_of_the_unit_at_rest(parameters, un
     assert curve.abscissa is (Abscissa.INPUT if "v1" in parameters else Abscissa.CONSTANT_INPUT)
 
 
-def test_a_curve_does_not_depend_on_the_scale_of_states_and_argument():
-    # Twice the states, and a cube of half the argument.
-    scaled = {"b1": 2.0, "b2": 2.0, "c1": 0.5, "e2_1": 2.0 * 8.0, "w1_1": 0.5 * 0.5}
-    other = make_model({name: value * scaled.get(name, 1.0) for name, value in SPRING.items()})
-    one, two = trace(make_model()), trace(other)
-    # The initial states are estimated near those at rest, in their own scale.
-    assert two.x == pytest.approx(one.x, abs=1e-3)
-    assert two.y == pytest.approx(np.interp(two.x, one.x, one.y), abs=1e-3)
-
-
 def test_without_a_static_gain_a_curve_is_the_effect_on_a_state():
     integrator = make_model({**SPRING, "a1_1": 1.0, "a1_2": 0.0, "a2_1": 0.0}, order=2)
     curve = trace(integrator)

@@ -10,7 +10,6 @@ from islands_api.client import (
     Event,
     JobFailedError,
 )
-from islands_api.client.responses import EventParser
 from islands_service.domain.job import JobOutcome, JobState
 from support.service import Service
 from support.stores import CANCELLED, FAILED, FOUND, brought_on
@@ -89,16 +88,6 @@ def test_wait_raises_the_reason_of_an_unsuccessful_job(
     assert str(caught.value) == f"job {job.id} {message}"
 
 
-def test_wait_survives_a_restart_of_the_service(
-    connect: Any, me: Any, wire: Any, run_job: Any, later: Any
-) -> None:
-    client = connect(wire.url, me.secret)
-    job = client.submit(me.dataset, **SPEC)
-    later(0.1, wire.outage, 0.3)
-    later(0.2, run_job, job)
-    assert client.wait(job).state == JobState.SUCCEEDED
-
-
 # By events.
 
 
@@ -132,13 +121,3 @@ def test_silent_connection_is_reopened_after_the_timeout(
         numbers_and_kinds(connect(service.url, me.secret, timeout=0.5, retry=1.0).events(job))
         == expected_events()
     )
-
-
-@pytest.mark.parametrize("size", [1, 2, 3, 7, 1000])
-def test_parsed_events_do_not_depend_on_the_chunk_size(size: int) -> None:
-    text = (
-        ": alive\n\n" + 'id: 1\nevent: running\ndata: {"note": "ü: x"}\n\n' * 2 + "id: 9\nevent: prog"
-    ).encode()
-    parser = EventParser()
-    found = [event for at in range(0, len(text), size) for event in parser.feed(text[at : at + size])]
-    assert found == [Event(1, "running", {"note": "ü: x"})] * 2

@@ -42,11 +42,6 @@ def post_body(service, body, media="application/json", path="/v1/jobs"):
     return service.client.post(path, content=body, headers=headers)
 
 
-@pytest.mark.parametrize("body", [b"{", b'{"a": NaN}', b'{"a": 1, "a": 2}', b"[" * 100_000, b"\xff"])
-def test_a_damaged_body_is_a_bad_request(service, body):
-    assert problem_of(post_body(service, body), 400, "bad-request").startswith("the body is")
-
-
 @pytest.mark.parametrize("media", [None, "text/plain", "application/xml", "multipart/form-data", "json", ";"])
 def test_a_job_with_another_media_type_is_rejected(service, media):
     order = json.dumps(spec(kept(service.store))).encode()
@@ -112,19 +107,6 @@ def post_chunked(service, path, media, chunks, piece):
 def test_a_chunked_body_is_limited_while_it_is_received(service):
     status, media, document = post_chunked(service, "/v1/jobs", "application/json", 12, b" " * 100_000)
     assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
-
-
-def test_a_chunked_upload_is_limited_while_it_is_received(tmp_path):
-    from support.service import served
-
-    head = b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\n'
-    with served(tmp_path, max_upload=300_000) as small:
-        status, media, document = post_chunked(
-            small, "/v1/datasets", "multipart/form-data; boundary=x", 6, head + b"1" * 100_000
-        )
-        assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
-        assert document["detail"] == "the request has more than 400000 bytes, the maximum of this path"
-        assert not [path for path in small.settings.blobs.rglob("*") if path.is_file()]
 
 
 @pytest.mark.parametrize(

@@ -104,13 +104,3 @@ def test_a_damaged_gzip_file_is_rejected(sent):
         RecordError, match=r"a\.csv\.gz is not a gzip file, or is damaged \(.+\): compress the record again"
     ):
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", True, 1000)
-
-
-@pytest.mark.parametrize(
-    ("sent", "compressed"),
-    [(b"", False), (b"", True), (gzip.compress(b""), True)],
-    ids=["plain", "no gzip", "gzip of nothing"],
-)
-def test_an_empty_file_is_rejected(sent, compressed):
-    with pytest.raises(RecordError, match=r"a\.csv is empty: export the record again"):
-        receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 1000)

@@ -41,10 +41,6 @@ def reached(is_stopped: bool, start: Archipelago, stop: bool = False, least: int
     return [epoch.archipelago.generation for epoch in engine.run(PROBLEM, start, lambda: stop)]
 
 
-def test_stopped_search_evaluates_its_first_population_and_ends() -> None:
-    assert reached(True, empty_archipelago(1, 1)) == [0]
-
-
 @pytest.mark.parametrize(("least", "last"), [(1, 2), (3, 3), (9, 4)])
 def test_search_that_continues_reaches_the_generation_that_its_owner_has_seen(least: int, last: int) -> None:
     assert reached(True, archipelago(2), least=least) == [*range(3, last + 1)]

@@ -5,7 +5,6 @@ import pytest
 from islands_service.coordinator import job_run
 from islands_service.coordinator import job_run as turn_module
 from islands_service.coordinator.job_run import JobNotes, Turn, TurnOver
-from islands_service.domain.job import ProgressReport
 from islands_service.runtime import actor_pool
 from islands_service.runtime.actor_pool import IslandActorPool
 from support.stores import ALICE, claimed, submitted
@@ -30,18 +29,6 @@ def test_phase_before_the_first_report_is_stored_at_once(store, lease):
     again = claimed(store)
     JobNotes(again, store).begin("reading the record")
     assert progress_of(store, again) == {"phase": "reading the record"}
-
-
-def test_running_search_keeps_its_figures_and_the_message_for_a_while(store, lease, monkeypatch):
-    notes, figures = JobNotes(lease, store), {"phase": "search", "generation": 7}
-    store.leases.report(lease, ProgressReport(notes.complete(figures)))
-    assert progress_of(store, lease) == figures
-    notes.add(LOST)
-    assert progress_of(store, lease) == {**figures, "note": LOST}
-    assert notes.complete({"generation": 8}) == {"generation": 8, "note": LOST}
-    shown_until = job_run.monotonic() + job_run.SHOWN_SECONDS
-    monkeypatch.setattr(job_run, "monotonic", lambda: shown_until + 1.0)
-    assert notes.complete({"generation": 9}) == {"generation": 9}
 
 
 def test_a_change_between_two_reports_keeps_the_fraction_and_no_old_time_left(store, lease):

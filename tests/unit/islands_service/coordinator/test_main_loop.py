@@ -11,14 +11,12 @@ import pytest
 import structlog
 
 from islands_service.coordinator import main_loop as coordinator_module
-from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import (
     Job,
     JobOutcome,
     JobState,
     Lease,
-    ProgressReport,
     Submission,
 )
 from islands_service.liveness import StopRequest
@@ -173,36 +171,6 @@ def test_unreferenced_blobs_are_swept_after_an_hour(
 
     eventually(swept, seconds=30.0)
     assert {young, named} <= {blob for blob, _ in blobs.all()}
-
-
-def test_replaced_checkpoints_are_swept_while_the_job_runs(
-    store: Store,
-    blobs: Blobs,
-    job: Job,
-    coordinator: Callable[..., Thread],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    left: list[str] = []
-
-    def old(data: bytes) -> str:
-        blob = blobs.write(data)
-        os.utime(blobs.path(blob), (1e9, 1e9))
-        return blob
-
-    def keeps_checkpoints(run: JobRun) -> JobOutcome:
-        for data in (b"replaced", b"named"):
-            left.append(old(data))
-            store.leases.report(run.lease, ProgressReport({}, checkpoint=left[-1]))
-        left.append(blobs.write(b"about to be named"))
-        return run_until_check_raises(run)
-
-    replace_runner(monkeypatch, keeps_checkpoints)
-    monkeypatch.setattr(sweeper_module, "SWEEP_INTERVAL", 0.05)
-    coordinator()
-    eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=30.0)
-    now = store.jobs.get(ALICE, job.id)
-    assert (now.state, now.checkpoint) == (JobState.RUNNING, left[1])
-    assert set(left[1:]) <= set(dict(blobs.all()))
 
 
 def test_wait_for_ray_counts_as_an_attempt_if_it_ends(

@@ -158,19 +158,6 @@ def test_a_file_that_takes_too_long_ends_the_process(endless):
     assert not alive(inspections())
 
 
-def test_cancelled_inspection_ends_its_process(endless):
-    async def run():
-        task = asyncio.create_task(inspect_file(endless, InspectionRequest(), MEMORY, SECONDS))
-        while not inspections():
-            await asyncio.sleep(0.01)
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        return alive(inspections())
-
-    assert asyncio.run(run()) == []
-
-
 def test_process_has_no_secrets_and_no_files_of_the_service(endless, tmp_path, monkeypatch):
     monkeypatch.setenv("ISLANDS_DATABASE", "postgresql+psycopg://me:secret@host/islands")
     (tmp_path / "islands.db").touch()

@@ -70,20 +70,6 @@ def test_scheduler_continues_from_any_epoch(search, choose, data):
     assert len(done) == len(left) - 1
 
 
-@given(searches(), orders)
-def test_epochs_before_the_last_complete_archipelago_are_dropped(search, choose):
-    problem_, ends, ahead = search
-    run = PlayedRun(problem_, ends, ahead)
-    while not run.scheduler.finished:
-        run.send()
-        task = choose.choice(run.ready())
-        run.carry(task)
-        run.report(task)
-        known = [sorted(each) for each in run.scheduler.known.values()]
-        assert {each[0] for each in known} == {run.scheduler.completed_generation}
-        assert all(len(each) <= ahead + 1 for each in known)
-
-
 # No barrier.
 
 
@@ -124,18 +110,6 @@ def test_islands_independent_of_the_slowest_are_not_delayed(search, choose, data
     for island, known in run.scheduler.known.items():
         reachable = from_there + away.get(island, len(ends))
         assert ends.index(max(known)) == min(reachable, complete + ahead, len(ends) - 1)
-
-
-@given(searches(), orders)
-def test_ready_tasks_of_earlier_epochs_come_first(search, choose):
-    problem_, ends, ahead = search
-    run = PlayedRun(problem_, ends, ahead)
-    while not run.scheduler.finished:
-        begins = [task.begin for task in run.send()]
-        assert begins == sorted(begins)
-        task = choose.choice(run.ready())
-        run.carry(task)
-        run.report(task)
 
 
 class Clock:
@@ -198,13 +172,6 @@ def test_time_in_a_queue_and_time_without_immigrants_do_not_count(deadlines, clo
     assert clock.frozen_after({}, most=60.0) == (None, [])
     seconds, _ = clock.frozen_after({ACTOR: THIRD})
     assert seconds == pytest.approx(FACTOR * 1.0 + ALLOWANCE, abs=0.25)
-
-
-def test_only_the_silent_one_of_two_actors_is_frozen(deadlines, clock):
-    deadlines.record(SECOND, 1.0)
-    assert clock.frozen_after({"a": THIRD}, most=3.0) == (None, [])
-    _, frozen = clock.frozen_after({"a": THIRD, "b": EpochTask(1, 5, 10)})
-    assert frozen == ["a"]
 
 
 def test_overloaded_machine_does_not_cause_endless_replacements(deadlines, clock):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.engine import IslandEpoch, SerialEngine, run_epoch, select_migrants
+from islands.evolution.engine import SerialEngine, run_epoch
 from islands.evolution.individual import Individual
 from islands.evolution.problem import make_problem
 from islands_service.runtime.epoch_scheduler import EpochTask, schedule_islands
@@ -81,16 +81,6 @@ def evolving():
         characters=("plain", "pruner"),
     )
     return make_problem(record(150), setting)
-
-
-def test_scheduler_begins_with_the_emigrants_of_its_start(evolving):
-    for epoch in SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False):
-        start = epoch.archipelago
-        known = schedule_islands(evolving, start, keep_epoch).known.values()
-        for island, each in zip(start.islands, known, strict=True):
-            leaving = select_migrants(island, evolving.settings_of(island.index))
-            assert each == {start.generation: IslandEpoch(island, leaving, ())}
-            assert bool(leaving) == (start.generation in (2, 4))
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -90,16 +90,6 @@ def test_blob_and_its_folders_are_synced_before_its_name_is_returned(blobs, fold
     assert [path for path, _ in folders] == [folder / blob[:2], folder]
 
 
-def test_all_yields_blobs_and_partly_written_files(blobs, folder):
-    assert list(blobs.all()) == []
-    made = {blobs.write(bytes([each])) for each in range(20)}
-    with blobs.receiving() as stream:
-        found = list(blobs.all())
-        assert {blob for blob, _ in found} == {*made, ""}
-        assert dict(found)[""] == Path(stream.name)
-        assert all(blobs.path(blob) == path for blob, path in found if blob)
-
-
 def test_old_unreferenced_blobs_are_swept(blobs):
     named, unnamed, young = (blobs.write(each) for each in (b"a", b"b", b"c"))
     for blob in (named, unnamed):
@@ -108,15 +98,6 @@ def test_old_unreferenced_blobs_are_swept(blobs):
     assert blobs.sweep({named}, LONG_AGO + 1) == 1
     assert {blob for blob, _ in blobs.all()} == {named, young}
     assert blobs.sweep((), time.time() + 60) == 2
-
-
-def test_old_partly_written_files_are_swept(blobs, folder):
-    left = folder / "left.part"
-    left.write_bytes(b"half")
-    assert blobs.sweep((), LONG_AGO) == 0
-    aged(left)
-    assert blobs.sweep((), LONG_AGO + 1) == 1
-    assert files(folder) == []
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])

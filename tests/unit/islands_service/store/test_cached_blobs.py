@@ -55,13 +55,6 @@ def test_a_blob_that_cannot_be_uploaded_has_no_name_and_leaves_nothing(machine, 
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_a_blob_is_uploaded_again_which_repairs_a_damaged_object(machine, objects):
-    blob = machine().write(b"record")
-    objects.objects[key(blob)] = b"rec"
-    machine().write(b"record")
-    assert machine("other").read(blob) == b"record"
-
-
 def test_a_damaged_object_is_not_read(machine, objects, tmp_path):
     blob = machine().write(b"record")
     objects.objects[key(blob)] = b"rec"

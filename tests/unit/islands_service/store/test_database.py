@@ -5,10 +5,9 @@ import sqlite3
 import threading
 import time
 from contextlib import closing
-from uuid import uuid4
 
 import pytest
-from sqlalchemy import delete, event, false, insert, text
+from sqlalchemy import event, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError
 
 from islands_service.store import Store, dialect
@@ -21,7 +20,6 @@ from islands_service.store.database import (
     StoreError,
     StoreUnavailableError,
 )
-from islands_service.store.tables import jobs, owners
 from support.databases import emptied
 from support.stores import at_once
 
@@ -179,19 +177,3 @@ def test_writer_that_cannot_start_blocks_no_later_write(sqlite, monkeypatch):
     monkeypatch.undo()
     (answer,) = at_once([lambda: sqlite.write(executing("SELECT 1")) is not None])
     assert answer is True
-
-
-def test_change_by_any_connection_is_reported_once(sqlite_database: str) -> None:
-    asking, other = Database(sqlite_database), Database(sqlite_database)
-    try:
-        assert asking.has_changed()  # the first time
-        assert not asking.has_changed()
-        for writer in (other, asking):
-            writer.write(lambda connection: connection.execute(delete(jobs).where(false())))
-            assert not asking.has_changed()  # nothing was written
-            writer.write(lambda connection: connection.execute(insert(owners).values(name=uuid4().hex)))
-            assert asking.has_changed()
-            assert not asking.has_changed()
-    finally:
-        asking.close()
-        other.close()

@@ -108,21 +108,6 @@ def test_a_behaviour_that_matches_a_record_without_noise_is_selected() -> None:
     assert target.is_matched(calibrate(simulation, target, fit.values).output)
 
 
-def test_steps_are_halved_until_the_output_converges() -> None:
-    """At six samples per period, one step per sample is far too coarse."""
-    stiff = (0.5, 2.0, 5500.0)
-    u, fine_u = make_inputs(InterSample.FOH)
-    y = add_noise(simulate_finely(fine_u, *stiff), 0.002)
-    fit, target = calibrate_to(recorded(u, y, DT, ("N", "m")), oscillator(*stiff))
-    core = select_intersample(fit, target)
-    assert isinstance(core, ResampledSimulator)
-    assert core.intersample == InterSample.FOH
-    assert core.oversampling >= 2
-    refitted = calibrate(ExtendedSimulator(core, (), fit.simulation.context), target, fit.values)
-    assert refitted.values[:3] == pytest.approx(stiff, rel=0.01)
-    assert refitted.mean_square < 0.3 * fit.mean_square
-
-
 @pytest.mark.parametrize("delay", [4, -12])
 def test_lead_of_an_output_is_as_small_as_the_record_permits(delay: int) -> None:
     """A hold is half a sample late, so that a shorter delay is a lead there, and a lead is longer."""

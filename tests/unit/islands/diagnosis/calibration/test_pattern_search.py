@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
-from islands.diagnosis.calibration.pattern_search import Coordinate, search_jumps, search_pattern
+from islands.diagnosis.calibration.pattern_search import Coordinate, search_pattern
 from islands.diagnosis.calibration.target import Target
 from islands.effects.baseline import JUMP
-from islands.effects.hysteresis import STICTION
-from islands.effects.quantiser import QUANTISED_INPUT
 from islands.effects.time_variation import GAIN_STEP, instant_bounds
 from islands.simulators.extended import ExtendedSimulator, make_context
 from support.built_in_simulators import make_oscillator
@@ -40,28 +38,3 @@ def test_an_instant_moves_to_the_true_one_over_many_samples(effect) -> None:
     moved = search_pattern(calibrated, target, [instant])
     assert moved.values[part.start + 1] == pytest.approx(TRUE, abs=2 * DT)
     assert moved.score < calibrated.score
-
-
-@pytest.mark.parametrize(
-    ("effect", "true", "wrong"),
-    [
-        (QUANTISED_INPUT, (0.8, 0.1), (0.8024, 0.1)),
-        (QUANTISED_INPUT, (0.8, 0.1), (0.8, 0.14)),
-        (STICTION, (0.8,), (0.8024,)),
-    ],
-)
-def test_the_values_of_a_jump_are_found_next_to_them(effect, true, wrong) -> None:
-    record = recorded(wave(SAMPLES), wave(SAMPLES))
-    simulator = make_oscillator(0.5, 4.0, 200.0)
-    simulation = ExtendedSimulator(simulator, (effect,), make_context(record, simulator, SAMPLES))
-    part = simulation.get_slice(effect)
-    values = simulation.nominal
-    values[part] = true
-    y = simulation.simulate(values)
-    target = Target(y, np.ones(SAMPLES, dtype=bool), None, {}, fitted=SAMPLES)
-    start = values.copy()
-    start[part] = wrong
-    calibrated = calibrate(simulation, target, start)
-    assert np.max(np.abs(calibrated.values[part] - true)) > 0.001 * true[0]
-    moved = search_jumps(calibrated, target)
-    assert moved.values[part] == pytest.approx(true, rel=3e-4)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration import levenberg_marquardt
-from islands.diagnosis.calibration.levenberg_marquardt import calibrate, minimise
+from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.problem import CalibrationProblem, simulate_together
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
@@ -57,27 +56,6 @@ def test_step_without_damping_solves_the_linearised_problem(
     expected = np.linalg.lstsq(point.jacobian, point.residual, rcond=None)[0] * simulation.scales
     np.testing.assert_allclose(steps[0] - point.values, expected, rtol=1e-4)
     assert predicted[0] > predicted[1] > 0.0
-
-
-def test_simulations_in_groups_give_the_same_fit(
-    oscillator: tuple[ExtendedSimulator, Target], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    simulation, target = oscillator
-    one_by_one = calibrate(simulation, target, simulation.nominal)
-    monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
-    grouped = calibrate(simulation, target, simulation.nominal)
-    assert grouped.values.tobytes() == one_by_one.values.tobytes()
-
-
-def test_fits_from_several_starts_do_not_depend_on_each_other(
-    oscillator: tuple[ExtendedSimulator, Target],
-) -> None:
-    simulation, target = oscillator
-    starts = [factor * simulation.nominal for factor in (0.97, 1.0, 1.05)]
-    together = minimise(simulation, target, starts)
-    alone = [minimise(simulation, target, [start])[0] for start in starts]
-    assert len({each.values.tobytes() for each in together}) == 3
-    assert [each.values.tobytes() for each in together] == [each.values.tobytes() for each in alone]
 
 
 @pytest.mark.parametrize(("chi", "g"), [(8.0, 0.0), (1.0, 0.8)])

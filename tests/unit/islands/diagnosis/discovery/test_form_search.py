@@ -33,7 +33,7 @@ def diagnose(y: np.ndarray, names: Sequence[str] = tuple(CATALOGUE)) -> islands.
     )
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_curve_of_no_listed_form_is_a_family_with_its_shape() -> None:
     peak = float(np.max(np.abs(THEIRS)))
 

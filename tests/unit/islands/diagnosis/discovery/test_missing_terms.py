@@ -20,7 +20,6 @@ from islands.diagnosis.discovery.candidate_terms import (
     list_candidate_terms,
     shifts_in_time,
 )
-from islands.diagnosis.discovery.redundant_terms import drop_redundant_terms
 from islands.diagnosis.discovery.term_search import TermSearchResult, search_terms
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
@@ -205,34 +204,6 @@ def test_only_rates_of_the_input_and_of_the_output_shift_in_time() -> None:
     assert {("v", "rate(F)"), ("output", "rate(F)"), ("output", "v")} <= shifts
     # In equations with other terms, a delay may add functions of the rate of the input.
     assert all("rate(F)" in text for _, text in shifts - {("output", "v")})
-
-
-def test_terms_that_the_parameters_reproduce_are_no_candidates() -> None:
-    system = OdeSpec.model_validate({"kind": "ode", **DOCUMENT}).make_system()
-    candidates = list_candidate_terms(system, dict.fromkeys(("x", "v", "F", "rate(F)"), 1.0), 10.0, {})
-    kept = {(each.target, each.text) for each in drop_redundant_terms(candidates, system)}
-    every = {(each.target, each.text) for each in candidates}
-    # Mass, damping and stiffness are free, and no parameter is in the equation of the output.
-    assert every - kept == {("v", "x"), ("v", "v"), ("v", "F")}
-    fixed = {(each.target, each.text) for each in drop_redundant_terms(candidates, system, {"m"})}
-    assert every - fixed == {("v", "x"), ("v", "v")}
-
-
-def test_no_term_is_added_to_right_equations() -> None:
-    assert search(lambda _x, _v, _u: 0.0) is None
-
-
-def test_definition_of_a_rate_gets_no_terms() -> None:
-    simulator = make_simulator(
-        OdeSpec.model_validate({"kind": "ode", **DOCUMENT}), simulate(LAWS["product"][0])
-    )
-    sizes = {"x": 1.0, "v": 2.0, "F": 3.0, "rate(F)": 4.0}
-    terms = list_candidate_terms(simulator.system, sizes, 10.0, {})  # type: ignore[attr-defined]
-    assert {each.target for each in terms} == {"v", "output"}
-    assert len({(each.target, each.text) for each in terms}) == len(terms)
-    assert {each.size for each in terms if each.text == "x**2*v"} == {2.0}
-    # Where the input is the coordinate, its rate has the products that v has here.
-    assert {each.size for each in terms if each.text == "rate(F)*F**2"} == {36.0}
 
 
 def test_many_signals_have_no_products() -> None:

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 import scipy
 
-import islands
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.interface.effect import Signal
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_json
 from islands.simulators.external import RecordedOutput
 from islands.simulators.interface import Simulator
-from islands.simulators.specification.table import LocalExtendedSpec
 
 DT = 0.01
 
@@ -75,11 +72,3 @@ def test_right_simulation_gets_no_terms(seed: int) -> None:
     found = diagnose(record, make_column(record))
     assert found.verdict == "nothing"
     assert found.discovery is None
-
-
-@pytest.mark.nightly
-def test_extended_simulation_is_right_in_a_second_diagnosis() -> None:
-    record, found = find("u**5")
-    spec = LocalExtendedSpec.model_validate_json(extended_json(found.best, record))
-    again = islands.diagnose(record, spec, columns={"y_model": follow(record.u[:, 0], DT)})
-    assert again.verdict == "nothing"

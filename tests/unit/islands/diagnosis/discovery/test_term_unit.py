@@ -2,7 +2,7 @@
 
 import pytest
 
-from islands.diagnosis.discovery.term_unit import divide_units, find_expression_unit, find_factor_unit
+from islands.diagnosis.discovery.term_unit import find_factor_unit
 from islands.expressions.parsing import parse_expression
 
 UNITS = {"x": "m", "v": "m/s", "u": "N", "w": "N s/m", "t": "s", "p": "1", "unknown": "", "q": "m/(s K)"}
@@ -33,20 +33,3 @@ UNITS = {"x": "m", "v": "m/s", "u": "N", "w": "N s/m", "t": "s", "p": "1", "unkn
 )
 def test_unit_of_a_coefficient_completes_that_of_the_equation(expression: str, unit: str) -> None:
     assert find_factor_unit("m/s^2", parse_expression(expression), UNITS) == unit
-
-
-def test_coefficient_of_an_equation_without_a_unit_has_none() -> None:
-    assert find_factor_unit("", parse_expression("x"), UNITS) == ""
-
-
-@pytest.mark.parametrize(
-    ("unit", "other", "quotient"),
-    [("m/s", "s", "m/s^2"), ("um", "s", "um/s"), ("V", "V", ""), ("rad/s", "1", "rad/s"), ("", "s", "")],
-)
-def test_units_are_divided(unit: str, other: str, quotient: str) -> None:
-    assert divide_units(unit, other) == quotient
-
-
-def test_unit_of_an_expression() -> None:
-    assert find_expression_unit(parse_expression("rate(x)"), UNITS) == "m/s"
-    assert find_expression_unit(parse_expression("exp(x)"), UNITS) == ""

@@ -11,7 +11,6 @@ from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
-from islands.simulators.external import RecordedOutput
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import PhysicalSpec
@@ -128,11 +127,6 @@ def test_gross_error_is_named_and_its_correction_leaves_no_discrepancy(case: str
     assert (corrected.verdict, corrected.effects) == (Verdict.NOTHING, ())
 
 
-def test_record_without_a_gross_error_has_no_finding() -> None:
-    found = run(RECORD)
-    assert (found.verdict, found.record_findings) == (Verdict.NOTHING, ())
-
-
 def test_sampling_time_at_which_the_simulation_diverges_is_advised() -> None:
     document = {
         "name": "oscillator",
@@ -154,11 +148,3 @@ def test_free_parameters_absorb_a_unit_but_not_the_sign() -> None:
     assert flipped.effects[0].name == "sign"
     assert "m, c, k are all negative" in flipped.record_findings[0].description
     assert flipped.best.values[0] == pytest.approx(0.5, rel=0.05)
-
-
-@pytest.mark.ci
-def test_simulation_that_resembles_its_input_is_not_compared_with_it() -> None:
-    nominal = U + 0.2 * np.std(U) * np.sin(np.arange(U.size))
-    clipped = replace(RECORD, y=np.clip(nominal, -0.1 * np.std(U), 0.1 * np.std(U)) + NOISE)
-    found = diagnose(clipped, RecordedOutput("column", nominal), {}, catalogue=())
-    assert found.verdict != Verdict.GROSS_ERROR

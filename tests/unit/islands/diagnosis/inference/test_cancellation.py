@@ -72,15 +72,6 @@ def test_effects_of_opposite_signs_are_one_finding(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_independent_effects_are_two_findings(seed: int) -> None:
-    hypothesis, target = suppose(seed, (CUBIC, OFFSET), 0.2)
-    assert measure_cancellation(hypothesis, (CUBIC, OFFSET), target) > MAX_OPPOSED
-    kept, removed = resolve_cancellation(hypothesis, target, np.random.default_rng(0))
-    assert kept is hypothesis
-    assert removed == {}
-
-
-@pytest.mark.parametrize("seed", range(5))
 def test_opposed_effects_have_to_gain_without_each_other(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both do here; it is the rule for effects that cancel less, unless the residual is model error."""
     monkeypatch.setattr(cancellation, "MAX_CANCELLED", 0.0)

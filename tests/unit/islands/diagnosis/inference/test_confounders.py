@@ -84,12 +84,6 @@ def test_stick_slip_and_play_differ_in_serial_correlation(fine_u: Array, seed: i
     assert stick.excess_mean_square == pytest.approx(0.4**2 / 12, rel=0.3)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_stick_slip_below_the_noise_gives_no_evidence(fine_u: Array, seed: int) -> None:
-    for x in (stick_slip(fine_u, 0.1), play_from(fine_u, 0.05)):
-        assert abs(fit_play(fine_u, x, 0.5, seed).score_gain) < 4.0
-
-
 def test_confounder_with_which_the_simulation_diverges_is_none(fine_u: Array) -> None:
     def diverge_at_jumps(u: Array, _dt: float) -> Array:
         return u if np.abs(np.diff(u)).max() < 0.2 else np.full_like(u, np.nan)

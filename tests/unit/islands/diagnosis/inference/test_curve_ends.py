@@ -40,9 +40,3 @@ def test_ends_without_samples_are_flat(seed: int) -> None:
     assert after[-1] == after[-2]
     assert np.abs(after).max() < np.abs(before).max()
     assert flat.cost < hypothesis.cost + 4 * MAX_INCREASE
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_ends_with_samples_remain(seed: int) -> None:
-    hypothesis, target = fit_curve(seed, narrow=False)
-    assert flatten_ends(hypothesis, target) is hypothesis

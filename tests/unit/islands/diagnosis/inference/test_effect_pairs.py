@@ -10,7 +10,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.effect_pairs import EffectPair, add_pair, rank_pairs
 from islands.diagnosis.inference.hypothesis import Hypothesis
-from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.simulators.extended import ExtendedSimulator, make_context
@@ -39,15 +38,6 @@ def opposed() -> tuple[CalibrationResult, Target]:
 
 def get_names(pair: EffectPair) -> tuple[str, str]:
     return pair.first.name, pair.second.name
-
-
-def test_effects_that_oppose_each_other_are_a_pair(opposed: tuple[CalibrationResult, Target]) -> None:
-    base, target = opposed
-    best, other = rank_pairs(base, target, EFFECTS, 2, 2)
-    assert get_names(best) == ("linear-drift", "jump")
-    assert best.gain > other.gain
-    single = screen_effects(base, target, DiagnosisRun(EFFECTS))[0]
-    assert best.gain > 2.0 * (base.score - single.fit.score)
 
 
 def test_effects_with_the_same_response_are_no_pair(opposed: tuple[CalibrationResult, Target]) -> None:

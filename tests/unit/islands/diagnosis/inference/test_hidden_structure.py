@@ -1,7 +1,5 @@
 """Tests before a coloured residual is called noise."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -18,8 +16,6 @@ from support.noise_records import (
     SAMPLES,
     draw_input,
     make_noisy_record,
-    make_quantised_actuator,
-    make_swept_force,
     respond,
 )
 from support.simulated_records import recorded
@@ -35,26 +31,6 @@ def fit(record: Dataset, order: int = 2) -> tuple[CalibrationResult, Target]:
 
 def find(record: Dataset, order: int = 2) -> dict[str, float]:
     return dict(find_hidden_structure(*fit(record, order), np.random.default_rng(0)))
-
-
-def make_gap(record: Dataset) -> Dataset:
-    y = record.y.copy()
-    y[300:330] = np.nan
-    return Dataset(record.u, y, record.dt)
-
-
-@pytest.mark.parametrize("change", [lambda record: record, make_gap], ids=["complete", "gap"])
-@pytest.mark.parametrize("seed", range(2))
-def test_quantised_actuator_is_a_fine_map_of_the_input(
-    change: Callable[[Dataset], Dataset], seed: int
-) -> None:
-    assert list(find(change(make_quantised_actuator(seed)))) == ["fine map of the input"]
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("seed", range(2))
-def test_unmeasured_sweep_is_a_moving_frequency(seed: int) -> None:
-    assert "moving frequency" in find(make_swept_force(seed))
 
 
 @pytest.mark.parametrize("seed", range(2))

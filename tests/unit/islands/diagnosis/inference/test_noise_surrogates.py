@@ -51,12 +51,3 @@ def test_thresholds_hold_for_a_random_walk_whose_slow_part_is_absorbed(randomisa
 
 def remove(absorbed: np.ndarray, signals: np.ndarray) -> np.ndarray:
     return signals - absorbed @ (absorbed.T @ signals)
-
-
-def test_only_long_records_exclude_a_random_walk() -> None:
-    """Calibration absorbs slow functions, and an autoregression fits the rest of a random walk better."""
-    walk = np.cumsum(np.random.default_rng(1).standard_normal(500))
-    left = walk - np.polynomial.Polynomial.fit(np.arange(500), walk, 4)(np.arange(500))
-    assert 1.0 in [model.difference_order for model in list_noise_models(left, ())]
-    white = np.random.default_rng(1).standard_normal(500)
-    assert [model.order for model in list_noise_models(white, ())] == [0]

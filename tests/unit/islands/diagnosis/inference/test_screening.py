@@ -1,8 +1,5 @@
 """Screening: effects are judged by what the parameters of a simulation cannot reproduce, in either order."""
 
-from collections.abc import Callable, Iterable, Iterator
-
-import cloudpickle
 import numpy as np
 import pytest
 
@@ -12,11 +9,9 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.screening import screen_effects
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
-from islands.parallel import ParallelMap
 from islands.progress import ignore_progress
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.linear import LinearSimulator
 from support.built_in_simulators import make_oscillator
 from support.simulated_records import recorded, wave
@@ -66,31 +61,3 @@ def test_a_map_of_an_actuator_is_added_before_or_behind_another_one(names: tuple
     assert tuple(each.name for each in found[0].fit.simulation.effects) == names
     added = found[0].fit.simulation.with_effects((*found[0].fit.simulation.effects, CATALOGUE["offset"]))
     assert tuple(each.name for each in added.effects) == (*names, "offset")
-
-
-def send_to_another_process(function: Callable, arguments: Iterable) -> Iterator:
-    """Evaluate a function on arguments, each of which is received as another process receives it."""
-    received = cloudpickle.loads(cloudpickle.dumps(function))
-    return (received(cloudpickle.loads(cloudpickle.dumps(each))) for each in arguments)
-
-
-@pytest.mark.parametrize("parallel_map", [map, send_to_another_process])
-def test_a_cyclic_error_is_found_in_front_of_a_jump_that_shifts_its_phase(parallel_map: ParallelMap) -> None:
-    """Over the position behind the jump, the halves of the record cancel, since they are in antiphase."""
-    u, period, amplitude, noise = wave(1200), 0.1, 0.01, 0.003
-    y = u + amplitude * np.sin(2 * np.pi * u / period)
-    y[600:] += 0.5 * period
-    record = recorded(u, y + noise * np.random.default_rng(5).standard_normal(u.size))
-    core = PythonFunctionSimulator(lambda u, _dt, gain=1.0: gain * u, "theirs.py:repeat")
-    effects = tuple(CATALOGUE[name] for name in ("jump", "cyclic-error"))
-    alone = ExtendedSimulator(core, effects[:1], make_context(record, core, u.size))
-    target = Target(record.y, np.ones(u.size, dtype=bool), None, {}, fitted=u.size)
-    start = alone.nominal
-    start[alone.get_slice(effects[0])] = 0.5 * period, 600 * record.dt
-    run = DiagnosisRun(effects[1:], parallel_map=parallel_map)
-    (found,) = screen_effects(calibrate(alone, target, start), target, run)
-    assert [each.name for each in found.fit.simulation.effects] == ["cyclic-error", "jump"]
-    cosine, sine, frequency = found.fit.values[found.fit.simulation.get_slice(found.effect)]
-    assert frequency == pytest.approx(1.0 / period, rel=2e-3)
-    assert np.hypot(cosine, sine) == pytest.approx(amplitude, rel=0.1)
-    assert found.fit.mean_square == pytest.approx(noise**2, rel=0.15)

@@ -12,7 +12,6 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     CalibrationResult,
     calibrate,
     evaluate_fit,
-    whiten_target,
 )
 from islands.diagnosis.calibration.preparation import count_fitted_samples, select_effects
 from islands.diagnosis.calibration.target import Target
@@ -116,49 +115,6 @@ def test_effects_that_mask_each_other_are_only_found_as_a_pair(masked) -> None:
     found, _ = stepwise_search(base, screened, target, run, pairs=True)
     assert {each.name for each in found.effects} == {"offset", "linear-drift"}
     assert found.cost < base.score - MIN_GAIN
-
-
-@pytest.mark.ci
-def test_noise_model_is_white_once_both_causes_are_found() -> None:
-    """The search begins with the coloured residual of the first cause and ends with white noise."""
-    u = wave(3000)
-    time = DT * np.arange(u.size)
-    noise = 0.05 * np.random.default_rng(3).standard_normal(u.size)
-    core = RecordedOutput("theirs", u)
-    base, target = calibrate_to(recorded(u, u + 0.02 * u**2 + 0.3 * (time > 8.0) + noise), core)
-    effects = select_some(select_effects(core, base.simulation.context, {}))
-    run = DiagnosisRun(effects)
-    screened = screen_effects(base, target, run)
-    target = whiten_target(target, screened[0].fit)
-    assert target.noise is not None
-    assert target.noise.order > 0
-    base = calibrate(base.simulation, target, base.values)
-    found, target = stepwise_search(base, screen_effects(base, target, run), target, run)
-    assert {each.name for each in found.effects} == {"even-nonlinearity", "jump"}
-    assert target.noise is not None
-    assert target.noise.order == 0
-    best = calibrate(found.fit.simulation, replace(target, noise=None), found.fit.values)
-    assert found.fit.score == pytest.approx(best.score, abs=SCORE_TIE)
-
-
-def test_deviation_from_the_prior_is_part_of_the_residual() -> None:
-    """Parameters absorb a sensor gain at a cost in the prior; the gain is screened next to another effect."""
-    u = wave(3000)
-    core = make_piezo()
-    simulation = ExtendedSimulator(core, (), make_context(recorded(u, u), core, u.size))
-    y = 1.1 * simulation.simulate(simulation.nominal) + 2.0
-    y = y + 0.05 * np.random.default_rng(4).standard_normal(u.size)
-    prior_std = {parameter.name: 0.01 for parameter in core.parameters}
-    base, target = calibrate_to(recorded(u, y), core)
-    target = replace(target, prior_std=prior_std)
-    effects = select_effects(core, base.simulation.context, prior_std)
-    offset = next(each for each in effects if each.name == "offset")
-    base = calibrate(base.simulation, target, base.values)
-    with_offset = screen_effects(base, target, DiagnosisRun([offset]))[0].fit
-    screened = screen_effects(with_offset, target, DiagnosisRun(effects))
-    gains = [each for each in screened if each.effect.is_gain]
-    assert gains
-    assert gains[0].score_gain(with_offset) > MIN_GAIN
 
 
 @pytest.mark.nightly

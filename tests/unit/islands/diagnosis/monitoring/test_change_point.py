@@ -28,8 +28,3 @@ def test_the_interval_contains_the_instant_of_a_step_in_95_percent(step):
 def test_a_drift_is_distinguished_from_a_step():
     assert locate(draw(0, slope=0.5), TRAINING).form == ChangeForm.RAMP
     assert locate(draw(0, step=4.0), TRAINING).form == ChangeForm.STEP
-
-
-def test_the_onset_of_a_drift_is_found():
-    errors = [locate(draw(seed, slope=0.5), TRAINING).record - ONSET for seed in range(20)]
-    assert abs(np.median(errors)) <= 2

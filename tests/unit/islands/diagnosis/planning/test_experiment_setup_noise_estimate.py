@@ -45,13 +45,6 @@ def test_the_colour_of_the_noise_is_found(
     assert found.std == pytest.approx(0.05, rel=0.15)
 
 
-def test_an_error_that_the_input_predicts_is_at_most_a_part_of_the_noise() -> None:
-    found = estimate(measure(APERIODIC, "white", 0.1))
-    error = float(np.std(0.1 * APERIODIC[:1200] ** 2))
-    assert found.origin == NoiseOrigin.RESIDUAL
-    assert 0.05 < found.std < 0.7 * np.hypot(0.05, error)
-
-
 def test_a_drift_is_noise_with_at_most_the_duration_as_time_constant() -> None:
     drifting = replace(input_record(PERIODIC), y=2.0 * PERIODIC + 0.01 * np.arange(SAMPLES))
     found = estimate(drifting)

@@ -1,7 +1,5 @@
 """Isolability: causes with equal responses, expected ratios, and detectable strengths."""
 
-from math import inf
-
 import numpy as np
 import pytest
 import scipy
@@ -20,18 +18,6 @@ from support.planned import (
 )
 
 SLOW, FAST = wave((0.25,)), wave((0.5, 3.0, 7.0))
-
-#: The gain of the amplifier is known within 1 %.
-KNOWN = {"k": 0.01}
-
-
-def test_gains_of_input_and_sensor_are_separable_at_no_strength() -> None:
-    experiment = amplifier_experiment(FAST, prior_std=KNOWN)
-    found = find_isolability(experiment, take_effects("input-gain", "sensor-gain", "offset"))
-    assert found.misfits[0, 1] == found.misfits[1, 0] == inf
-    assert found.rows[0].ratios[1] == pytest.approx(0.0, abs=1e-6)
-    assert found.groups == (("input-gain", "sensor-gain"),)
-    assert np.isfinite(found.misfits[:2, 2]).all()
 
 
 def test_delay_and_lag_are_separable_with_a_fast_input_only() -> None:
@@ -58,22 +44,6 @@ def test_expected_ratio_is_the_quadratic_form_of_the_covariance(coefficients: tu
     left = offset - absorbed @ np.linalg.solve(absorbed.T @ precise, precise.T @ offset)
     ratio = left @ scipy.linalg.solve(covariance, left, assume_a="pos")
     assert found.rows[0].ratios[1] == pytest.approx(ratio, rel=1e-3)
-
-
-def test_slow_noise_hides_an_offset_and_shows_a_delay() -> None:
-    """The noises have the same standard deviation."""
-    white = amplifier_experiment(wave((7.0, 11.0, 19.0)))
-    slow = with_noise(white, coloured_noise(0.2 * (1.0 - 0.95**2) ** 0.5, 0.95))
-    assert slow.noise.std == pytest.approx(white.noise.std)
-    found = [
-        [row.detectable for row in find_isolability(each, take_effects("offset", "delay")).rows]
-        for each in (white, slow)
-    ]
-    (offset, delay), (offset_in_slow, delay_in_slow) = found
-    assert offset_in_slow.misfit > 3.0 * offset.misfit
-    assert delay_in_slow.misfit < 0.5 * delay.misfit
-    # Misfits are those before whitening, in the unit of the output.
-    assert abs(offset_in_slow.value) == pytest.approx(offset_in_slow.misfit_in_output, rel=0.2)
 
 
 def test_detectable_strength_has_the_distance_that_detection_requires() -> None:

@@ -1,7 +1,6 @@
 """Formulas of effects: what readers see is what the simulation computes."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -197,9 +196,3 @@ def test_an_equation_of_a_gain_is_the_factor_over_time(name: str) -> None:
     named = {each.name: value for each, value in zip(effect.parameters(context), values, strict=True)}
     found = apply_equation(effect, np.ones(SAMPLES), values, context)
     np.testing.assert_allclose(found, gain_over_time(named, context), rtol=1e-13)
-
-
-def test_numbers_of_an_equation_are_the_scales_of_the_context() -> None:
-    context = replace(make_context(), input_peak=2.0)
-    found = apply_equation(CATALOGUE["input-saturation"], context.u, np.array([0.25]), context)
-    assert (found.min(), found.max()) == (-1.5, 1.5)

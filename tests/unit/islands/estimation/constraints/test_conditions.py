@@ -9,7 +9,6 @@ from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
 from islands.models.narx import canonical_order
 from islands.models.regressor import regressor
-from islands.simulation.outcome import Status
 
 
 def make_regressors(*texts):
@@ -20,30 +19,7 @@ def texts(regressors):
     return [plain(item.expression) for item in regressors]
 
 
-def rows(text, *terms):
-    """Return every row as ({text of the term: coefficient}, target)."""
-    found = constraint(text).constrain(make_regressors(*terms))
-    return [
-        ({name: weight for name, weight in zip(texts(found.regressors), row, strict=True) if weight}, target)
-        for row, target in zip(found.S.tolist(), found.c.tolist(), strict=True)
-    ]
-
-
 TERMS = ("y(k-1)", "u(k-1)", "u(k-2)^2", "y(k-2)*u(k-1)", "phi2(u(k-1), u(k-2))")
-
-
-def test_gain_weighs_every_term_with_the_slope_along_the_characteristic():
-    # d(y u) = y du + u dy, with dy = G du.
-    expected = {"y(k-1)": 0.5, "u(k-1)": 1.0, "u(k-2)^2": 4.0, "y(k-2)*u(k-1)": 3.0 + 2.0 * 0.5}
-    assert rows("gain = 0.5 at 2, 3", *TERMS) == [(expected, 0.5)]
-    assert rows("gain = 0.5", *TERMS) == [({"y(k-1)": 0.5, "u(k-1)": 1.0}, 0.5)]
-
-
-def test_absent_term_of_an_equality_has_the_parameter_zero():
-    assert rows("[u(k-1)] + 2*[u(k-9)] = 1", *TERMS) == [({"u(k-1)": 1.0}, 1.0)]
-    found = constraint("[u(k-9)] = 1").constrain(make_regressors(*TERMS))
-    assert found.verdict is Status.INFEASIBLE
-    assert "[u(k-9)] = 1" in found.reason
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,6 @@ from islands.errors import SettingsError
 from islands.estimation.constraints.parser import FORMS
 from islands.estimation.constraints.parts import (
     LinearEquality,
-    ParameterSign,
-    StaticGain,
 )
 from islands.estimation.parameter_constraints import constraint
 from islands.expressions.parsing import parse
@@ -23,14 +21,6 @@ def term(text):
 def part(text):
     (found,) = constraint(text).parts
     return found
-
-
-def test_gain_has_an_input_and_an_operating_point():
-    assert part("gain=2.5") == StaticGain("gain=2.5", 2.5, 1, ())
-    assert part("gain(u2) = -1 at 1, 2, 3") == StaticGain(
-        "gain(u2) = -1 at 1, 2, 3", -1.0, 2, (3.0, 1.0, 2.0)
-    )
-    assert part("gain(u)=1").channel == 1
 
 
 @pytest.mark.parametrize(
@@ -52,14 +42,6 @@ def test_equality_has_a_weight_for_every_term(text, weights, target):
     assert isinstance(found, LinearEquality)
     assert found.weights == {term(name): weight for name, weight in weights.items()}
     assert found.target == target
-
-
-@pytest.mark.parametrize(
-    ("text", "sign"),
-    [("[u(k-1)] >= 0", 1), ("[u(k-1)] <= 0", -1), ("-[u(k-1)] >= 0", -1), ("[-u(k-1)] <= 0.0", 1)],
-)
-def test_inequality_is_the_sign_of_a_parameter(text, sign):
-    assert part(text) == ParameterSign(text, term("u(k-1)"), sign)
 
 
 @pytest.mark.parametrize(

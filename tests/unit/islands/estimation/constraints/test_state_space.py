@@ -132,12 +132,3 @@ def test_statements_that_make_no_sense_for_a_state_space_are_refused(text, messa
         check_latent_constraints(text)
     with pytest.raises(SettingsError, match=message):
         check_constraints(make_model(), text)
-
-
-def test_statements_refer_to_the_inputs_of_the_record():
-    with pytest.raises(SettingsError, match="has values or terms of 2 inputs, but the record has 1"):
-        find_conditions("fixed-point = 1, 2, 3", 1)
-    with pytest.raises(SettingsError, match="has values or terms of 2 inputs"):
-        find_conditions("gain(u2) = 1", 1)
-    (condition,) = find_conditions("gain(u2) = 1", 2).statics
-    assert (condition.inputs, condition.channel, condition.near) == ((0.0, 0.0), 2, None)

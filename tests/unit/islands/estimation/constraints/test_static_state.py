@@ -33,14 +33,6 @@ def test_the_derivatives_are_those_of_differences(unit, channel):
         assert slope == pytest.approx((above - below) / (2.0 * step), rel=1e-5, abs=1e-6)
 
 
-def test_the_rest_nearest_to_an_output_is_found():
-    # x + 0.1 * (x - x^3): rest at -1, 0 and 1.
-    model = make_model({"a1_1": 1.1, "c1": 2.0, "e1_1": -0.1, "w1_1": 1.0, "level": 5.0}, ("cube",), 1)
-    system = StateSpaceParameters(model.layout, model.theta, model.codes)
-    rests = [find_static_state(system, np.zeros(1), near) for near in (None, 5.1, 6.8, 3.3)]
-    assert [each.output.total for each in rests] == pytest.approx([5.0, 5.0, 7.0, 3.0])
-
-
 def test_an_integrator_has_neither_rest_nor_derivatives():
     model = make_model({"a1_1": 1.0, "b1": 1.0, "c1": 1.0}, (), 1)
     system = StateSpaceParameters(model.layout, model.theta, model.codes)

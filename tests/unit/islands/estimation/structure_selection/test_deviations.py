@@ -4,16 +4,12 @@ import numpy as np
 import pytest
 
 import islands
-from islands.estimation.estimate import estimate
 from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
-    add_offsets,
     find_offsets,
     subtract_offsets,
 )
-from islands.expressions.parsing import parse
 from islands.expressions.printing import plain
-from islands.models.regressor import regressor
 from islands.records.dataset import Dataset
 
 STEPS = np.random.default_rng(3)
@@ -40,10 +36,6 @@ LAWS = {
         ["y(k-1)", "u(k-1)", "u(k-1)^3"],
     ),
 }
-
-
-def structure(*texts):
-    return tuple(regressor(parse(text))[1] for text in texts)
 
 
 def texts(model):
@@ -95,22 +87,6 @@ def test_constraint_holds_exactly_at_every_offset(output, source):
     assert error(found, 4) < 1e-8
 
 
-def test_structure_has_the_same_residual_in_deviations_and_in_units():
-    terms = structure("y(k-1)", "u(k-1)^2*y(k-1)", "(u(k-1) - u(k-2))*y(k-2)", "sign(u(k-1) - u(k-2))*u(k-1)")
-    record = Dataset(U + 5e4, LAWS["cubic"][0] - 3e3 + 0.1 * NOISE, 0.1)
-    offsets = (-3e3, 5e4)
-    assert {plain(item.expression) for item in add_offsets(terms, offsets)} == {
-        "1",
-        "y(k-1)",
-        "(y(k-1) + 3000)*(u(k-1) - 50000)^2",
-        "(y(k-2) + 3000)*(u(k-1) - u(k-2))",
-        "sign(u(k-1) - u(k-2))*(u(k-1) - 50000)",
-    }
-    centred = estimate((*terms, *structure("1")), subtract_offsets(record, offsets))
-    found = estimate(add_offsets(terms, offsets), record)
-    assert found.residual_variance == pytest.approx(centred.residual_variance, rel=1e-6)
-
-
 def test_the_operating_point_is_a_value_of_the_record():
     rng = np.random.default_rng(4)
     u, y = 20.0 + rng.uniform(-1, 1, 101), 5.0 + rng.normal(size=101)
@@ -133,13 +109,6 @@ def test_a_statement_about_the_signals_is_one_about_their_zero():
     record = Dataset(U + 50.0, LAWS["linear"][0] + 50.0, 0.1)
     assert all(find_offsets(record, "hysteresis"))
     assert not any(find_offsets(record, "odd"))
-
-
-def test_evolution_finds_the_law_at_a_large_offset():
-    y, _ = LAWS["cubic"]
-    changes = {"generations": 2, "population": 20, "max_terms": 5, "library_lags": 2, "refine": False}
-    found = islands.identify(Dataset(U + 1e5, y + 1e5, 0.1), preset="narx", **changes)
-    assert error(found, 5) < 1e-8
 
 
 def test_the_constant_of_an_offset_is_no_term_of_the_law():

@@ -10,49 +10,7 @@ from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from support.block_cases import OF_STATES
 from support.exported_programs import needs_octave, octave, run_matlab
-from support.levels import nightly_but
-from support.programs import CASES, model, record, record_of
-
-
-@pytest.fixture(scope="module")
-def cases(tmp_path_factory):
-    found = run_matlab([(CASES[name], record_of(name)) for name in CASES], tmp_path_factory.mktemp("octave"))
-    return dict(zip(CASES, found, strict=True))
-
-
-@pytest.mark.ci
-@needs_octave
-@pytest.mark.parametrize("name", nightly_but(("published 12", "many parts", "several inputs"), CASES))
-def test_octave_simulates_like_the_kernel(name, cases):
-    exported, data = CASES[name], record_of(name)
-    ours, lag = free_run(exported, data), exported.maximum_lag
-    assert ours.outcome
-    assert cases[name][:lag].tolist() == data.y[:lag].tolist()
-    np.testing.assert_allclose(cases[name][lag:], ours.y[lag:], rtol=1e-12)
-
-
-#: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and Octave's output for them.
-CALLS = {
-    # The output is a row or a column like the input; y0 may be either.
-    "narx_model([4 8 12], [1 2])": "[1 2 2]",
-    "narx_model([4 8 12], [1; 2])": "[1 2 2]",
-    "narx_model([4; 8; 12], [1 2])": "[1;2;2]",
-    "narx_model([4 8 12 16], [1 2 77 77 77])": "[1 2 2 3]",
-    "narx_model([4 8], [1 2])": "[1 2]",
-    "narx_model(4, [1 2])": "1",
-    "size(narx_model(zeros(0, 1), [1 2]))": "[0 1]",
-    # Integer arithmetic would round, and single precision would lose digits.
-    "narx_model(int8([1 8 12]), int8([1 3]))": "[1 3 1.75]",
-    "class(narx_model(single([4 8 12]), single([1 2])))": "double",
-}
-
-
-@needs_octave
-def test_octave_accepts_vectors_of_every_shape_and_class(tmp_path):
-    (tmp_path / "narx_model.m").write_text(export(model({"y(k-1)": 0.5, "u(k-2)": 0.25}), "matlab"))
-    show = "r = {}; if ischar(r), disp(r), else, disp(mat2str(r)), end"
-    shown = octave("\n".join(show.format(call) for call in CALLS), tmp_path).splitlines()
-    assert dict(zip(CALLS, shown, strict=True)) == CALLS
+from support.programs import at_the_edges, model, record
 
 
 @needs_octave
@@ -103,3 +61,12 @@ def test_the_class_declares_what_simulink_asks_for():
     assert "'SampleTime', 0.1);" in text
     assert "size = [1 3];" in text
     assert "%   y(k-1), u2(k-1), u2(k-2)" in text
+
+
+@pytest.mark.ci
+@needs_octave
+def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
+    programs = [at_the_edges(name) for name in PRIMITIVES]
+    for (exported, data), theirs in zip(programs, run_matlab(programs, tmp_path), strict=True):
+        ours = free_run(exported, data, bound=np.inf).y
+        np.testing.assert_allclose(theirs[1:], ours[1:], rtol=1e-12, err_msg=export(exported, "plain"))

@@ -17,7 +17,7 @@ from islands.models.regressor import Regressor
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
-from support.programs import CASES, HOSTILE_NAMES, bits, model, record, record_of
+from support.programs import CASES, HOSTILE_NAMES, bits, model, record
 from support.strategies import models
 
 
@@ -44,12 +44,6 @@ def assert_same_free_run(exported, data):
     assert bits(theirs) == bits([*data.y[:lag], *ours.y[lag:]])
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_python_module_simulates_like_the_kernel(name):
-    assert_same_free_run(CASES[name], record_of(name))
-    assert module(CASES[name])["MAXIMUM_LAG"] == CASES[name].maximum_lag
-
-
 def test_a_program_reads_the_present_of_an_input_that_the_model_reads_early():
     exported = model({"y(k-1)": 0.5, "u(k-1)*u(k-2)": 2.0, "u(k-1)": 1.0}, ("u_V+1",))
     data = Dataset(np.linspace(-1.0, 1.0, 9) ** 3, np.zeros(9), 0.1, ("u_V",))
@@ -58,14 +52,6 @@ def test_a_program_reads_the_present_of_an_input_that_the_model_reads_early():
     assert "u[0]*u[-1]" in export(exported, "c")
     assert "never a later sample than u[0]." in export(exported, "c")
     assert "u(k)*u(k-1)" in export(exported, "matlab")
-
-
-def test_a_zero_input_gives_no_negative_zero():
-    # The kernel adds the terms to zero.
-    at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
-    exported = model({"u(k-1)": -0.5, "y(k-1)": -0.25})
-    assert bits(simulated(exported, at_rest)) == [0] * 9
-    assert bits(free_run(exported, at_rest).y[1:]) == [0] * 8
 
 
 @pytest.mark.ci
@@ -203,9 +189,6 @@ def test_numbers_that_would_overwrite_each_other_are_refused():
     assert refused(limited(0.5), other=limited(0.75)) == (
         "primitive 'own' uses limit, a name that means something else in the export: rename it"
     )
-
-
-MAXIMUM_LAG = 7
 
 
 # Other formats.

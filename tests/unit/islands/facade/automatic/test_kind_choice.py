@@ -8,7 +8,7 @@ import pytest
 
 import islands
 from islands.errors import SettingsError
-from islands.evolution.presets import KINDS, resolve_kind, resolve_kinds
+from islands.evolution.presets import resolve_kind
 from islands.facade.automatic.kind_choice import (
     _select_kind,
     choice_from_document,
@@ -77,11 +77,6 @@ def test_models_without_a_dead_time_compete_with_those_that_have_one(monkeypatch
 def test_damaged_choice_is_refused():
     with pytest.raises(SettingsError, match="start a new run"):
         choice_from_document({"kind": "smooth"})
-
-
-def test_constraint_hysteresis_permits_hysteresis_only():
-    assert list(resolve_kinds({"constraints": "hysteresis"})) == ["hysteresis"]
-    assert list(resolve_kinds({"constraints": "odd"})) == list(KINDS)
 
 
 def test_record_that_is_too_short_gets_the_simplest_kind():

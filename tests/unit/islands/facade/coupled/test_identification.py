@@ -19,7 +19,6 @@ from islands.persistence.checkpoints import (
     state_from_document,
 )
 from islands.progress import StoppedError
-from islands.records.coupled import CoupledRecord
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
 
@@ -119,12 +118,3 @@ def test_a_record_of_one_output_is_refused() -> None:
         fit_coupled(record.records[0])
     with pytest.raises(RecordError, match="at least two outputs"):
         fit_coupled({"u": record.y[:, 0], "y": record.y[:, 1]}, inputs="u", outputs=["y"], dt=0.1)
-
-
-@pytest.mark.ci
-def test_missing_outputs_are_skipped_for_all() -> None:
-    record = make_coupled_record(PREY, samples=150)
-    holed = np.where(np.isin(np.arange(150), (50, 120)), np.nan, record.y[:, 0])
-    found = fit_coupled(CoupledRecord((replace(record.records[0], y=holed), record.records[1])), **FAST)
-    assert found.split.estimation.samples + found.split.validation.samples == record.samples - 2
-    assert found.metrics["y2"]["validation"]["free_run"].mape < 1e-6

@@ -8,7 +8,6 @@ import pytest
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import HistoryPoint, SearchState, stop_reason
-from islands.progress import StoppedError
 from support.identifications import BUDGET, identify, record_states
 
 
@@ -86,8 +85,3 @@ def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
     # A resumed run continues as if it had not been stopped.
     resumed = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, start=seen[-1])
     assert resumed.search_result.search.history == states[-1].history
-
-
-def test_search_stopped_before_its_first_population_raises_an_error(data):
-    with pytest.raises(StoppedError, match="stopped before this step: sampling rate"):
-        identify(data, **BUDGET, on_epoch=pytest.fail, stop=lambda: True)

@@ -1,7 +1,6 @@
 """`islands.identify` with a primitive of the user."""
 
 import decimal
-import json
 
 import numpy as np
 import pytest
@@ -9,8 +8,6 @@ import pytest
 import islands
 from islands.errors import ModelError, SettingsError
 from islands.expressions.printing import plain
-from islands.report.documents.result_folder import result_json
-from islands.report.text.summary import method_text
 from support.own_primitive import DEAD_ZONE, LAW, SEARCH, record
 
 
@@ -29,13 +26,6 @@ def test_search_finds_a_law_that_needs_the_primitive(result):
     found = {plain(item.expression): value for item, value in zip(model.regressors, model.theta, strict=True)}
     assert found == pytest.approx(LAW, rel=1e-12)
     assert result.best.simulate(record(), warm_up=1).y[1:] == pytest.approx(record().y[1:], abs=1e-12)
-
-
-def test_result_records_the_name_and_the_source(result):
-    settings = json.loads(result_json(result.search_result))["settings"]
-    assert settings["primitives"] == ["mul", "dead_zone"]
-    assert settings["own_primitives"]["dead_zone"].startswith("def dead_zone(a):\n    return max(")
-    assert "def dead_zone" not in method_text(result.search_result)
 
 
 @pytest.mark.parametrize("kind", ["plain", "latex", "python", "c"])

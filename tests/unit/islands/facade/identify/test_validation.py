@@ -1,6 +1,6 @@
 """Arguments of `islands.identify`: validation data, presets, constraints, settings."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -8,20 +8,7 @@ import pytest
 from islands.errors import RecordError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.records.dataset import Dataset
-from islands.records.split import split
-from support.identifications import BUDGET, identify, parameters, record, two_inputs
-
-
-@pytest.mark.ci
-def test_validation_data_may_be_a_separate_record(data, result):
-    parts = split(data, 0.25)
-    separate = identify(parts.estimation, validation=parts.validation, **BUDGET, seed=5)
-    assert parameters(separate) == parameters(result)
-    assert separate.search_result.split.validation is parts.validation
-    elsewhere = identify(parts.estimation, validation=record(seed=9), **BUDGET, seed=5)
-    assert separate.search_result.settings["validation"] != elsewhere.search_result.settings["validation"]
-    assert elsewhere.search_result.search.history == result.search_result.search.history
-
+from support.identifications import BUDGET, identify, record
 
 # Errors before the search starts.
 
@@ -60,13 +47,6 @@ def test_too_short_records_raise_an_error_before_the_search(data):
         identify(data[:100], on_epoch=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="take a longer recording"):
         identify(data[:20], validation=record(seed=9), on_epoch=pytest.fail, **BUDGET)
-
-
-def test_validation_data_of_another_system_raise_an_error(data):
-    with pytest.raises(RecordError, match="the validation data 2"):
-        identify(data, validation=two_inputs(seed=1), on_epoch=pytest.fail)
-    with pytest.raises(RecordError, match="resample the validation data"):
-        identify(data, validation=replace(data, dt=0.5), on_epoch=pytest.fail)
 
 
 def test_error_without_models_lists_the_outcomes():

@@ -39,14 +39,6 @@ def test_predictions_of_a_frame_have_one_value_per_row(result):
         result.predict(frame.rename(columns={"u": "v"}))
 
 
-def test_predictions_need_only_the_lags_of_the_model(result):
-    data = record(400)
-    few = pd.DataFrame({"u": data.u[:6, 0], "y": data.y[:6]})
-    assert np.array_equal(result.predict(few), result.predict(data[:6]), equal_nan=True)
-    lag = result.best.model.maximum_lag
-    assert np.isfinite(result.predict(few)[lag:]).all()
-
-
 def test_recordings_of_a_list_are_predicted_one_after_the_other(result):
     parts = [record(60, seed=seed) for seed in (1, 2)]
     frames = [pd.DataFrame({"u": part.u[:, 0], "y": part.y}) for part in parts]
@@ -55,19 +47,6 @@ def test_recordings_of_a_list_are_predicted_one_after_the_other(result):
     assert np.array_equal(
         result.best.simulate(frames).y, result.best.simulate(islands.join(tuple(parts))).y, equal_nan=True
     )
-
-
-def test_rows_of_a_model_of_means_have_the_prediction_of_their_mean():
-    data = islands.join((record(400), record(205, seed=3)))
-    result = islands.fit(data, library="polynomial", degree=1, max_terms=2, average=4)
-    predicted = result.predict(data)
-    means = result.best.simulate(data, warm_up=result.best.model.maximum_lag).y
-    assert predicted.shape == (605,)
-    assert np.array_equal(predicted[:400:4], means[:100], equal_nan=True)
-    assert np.array_equal(
-        predicted[400:600].reshape(-1, 4), np.repeat(means[100:150, None], 4, 1), equal_nan=True
-    )
-    assert np.isnan(predicted[604])
 
 
 def test_a_result_draws_its_recommended_model(result):

@@ -13,7 +13,6 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.rate_selection import TrialLibrary
 from islands.records.dataset import Dataset, join
 from islands.records.split import split
-from islands.systems.catalogue import make_record
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 5, "average": 1}
 TRIAL = TrialLibrary("polynomial", 1, 3, "none")
@@ -68,14 +67,6 @@ def test_direct_feedthrough_is_found(record):
 def test_a_delay_is_not_taken_for_direct_feedthrough(make, delay, noise):
     assert find_direct_inputs(lag(make(3), delay, noise)) == ()
     assert find_direct_inputs(cubic(make(3), delay)) == ()
-
-
-def test_the_slope_of_the_consistent_piezo_is_not_delayed():
-    found = {
-        name: find_direct_inputs(make_record("bouc-wen-piezo", name, "estimation"))
-        for name in ("consistent", "authors")
-    }
-    assert found == {"consistent": (0,), "authors": ()}
 
 
 @pytest.mark.parametrize(

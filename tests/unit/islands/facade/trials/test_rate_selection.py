@@ -11,7 +11,7 @@ from islands.facade.trials.rate_selection import TrialLibrary, select_rate
 from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset, join
 from islands.records.split import split
-from islands.report.documents.result_folder import result_json, write_result
+from islands.report.documents.result_folder import write_result
 
 LIBRARY = {"library": "polynomial", "degree": 2, "max_terms": 4}
 TRIAL = TrialLibrary("polynomial", 2, 3, "none")
@@ -48,17 +48,6 @@ def test_averaging_a_noisy_oversampled_record_reduces_the_error(averaged):
     assert true_error(averaged) < true_error(noisy) / 3
 
 
-@pytest.mark.ci
-def test_a_record_without_noise_keeps_its_sampling_time():
-    record = lag(noise=0.0)
-    found, plain = (islands.fit(record, average=average, **LIBRARY) for average in ("auto", 1))
-    assert found.search_result.average == 1
-    assert [each.model for each in found.models] == [each.model for each in plain.models]
-    documents = [json.loads(result_json(each.search_result)) for each in (found, plain)]
-    assert [document["settings"].pop("average") for document in documents] == ["auto", 1]
-    assert documents[0] == documents[1]
-
-
 def white(samples=8000):
     """Return a record whose input changes completely from sample to sample."""
     u = np.random.default_rng(0).normal(size=samples)
@@ -84,18 +73,6 @@ def test_a_record_that_permits_no_means_keeps_its_sampling_time(record, least):
 @pytest.mark.parametrize("noise", [0.01, 0.05, 0.3])
 def test_a_record_with_little_or_much_noise_is_averaged(noise):
     assert select_rate(split(lag(noise)), "auto", TRIAL, 6)[1] > 1
-
-
-def identify(**changes):
-    budget = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 2, "max_height": 1}
-    return islands.identify(lag(), preset="narx", shifts=(1,), from_library=0.0, **budget, **changes)
-
-
-@pytest.mark.parametrize("library", ["polynomial", ""])
-def test_identify_averages_likewise(library):
-    found = identify(library=library, refine=False)
-    assert found.search_result.average > 1
-    assert found.best.model.dt == 0.001 * found.search_result.average
 
 
 # A shooting interval lasts the same time at every rate.

@@ -40,17 +40,6 @@ def test_names_suggest_roles(name, role):
     assert find_role(name)[0] == role
 
 
-def test_cause_predicts_effect():
-    for swapped in (False, True):
-        columns = make()
-        if swapped:
-            columns = dict(reversed(columns.items()))
-        choice = choose_columns(columns)
-        assert (choice.inputs, choice.output) == (("a",), "b")
-        assert 0.9 < choice.confidence < 0.99
-        assert "a predicts" in choice.reason
-
-
 def test_every_named_input_that_predicts_is_chosen():
     u, v = white(3000, 0), white(3000, 1)
     columns = {"u1": u, "u2": v, "u3": white(3000, 2), "y": lag(u, 3.0) + lag(v, 3.0)}
@@ -75,13 +64,6 @@ def test_another_response_is_not_an_input(kind):
     assert_right(kind, test=True, seeds=[0])
 
 
-def test_no_pair_without_a_visible_response_is_proposed():
-    for seed in range(3):
-        choice = choose_columns(make_record("no relation", seed, False).columns)
-        assert (choice.inputs, choice.output, choice.confidence) == ((), "", None)
-        assert "No response of a column to another one is visible" in choice.reason
-
-
 def test_names_in_doubt_do_not_replace_a_response():
     unrelated = white(1000, 0), white(1000, 1)
     assert choose_columns(dict(zip(("pump", "level"), unrelated, strict=True))).output == ""
@@ -94,13 +76,6 @@ def test_names_in_doubt_do_not_replace_a_response():
 def test_a_constant_column_does_not_matter():
     choice = choose_columns(make() | {"u": np.full(3000, 0.1)}, (), "b")
     assert choice.inputs == ("a",)
-
-
-def test_codes_of_missing_values_do_not_hide_a_response():
-    columns = make()
-    columns["b"][::100] = -9999.0
-    choice = choose_columns(columns)
-    assert (choice.inputs, choice.output) == (("a",), "b")
 
 
 def test_counters_and_parts_of_a_file_are_no_signals():

@@ -2,14 +2,11 @@ import numpy as np
 import pytest
 
 from islands.records.inspection.column_shape import (
-    find_computed,
     is_derived,
     is_feedback,
     is_label,
     measure_command,
     measure_noise_level,
-    measure_precedence,
-    measure_roughness,
 )
 from support.known_records import lag, steps, white
 
@@ -29,29 +26,12 @@ def test_the_noise_level_is_that_of_added_noise():
     assert measure_noise_level(smooth) < -3.9
 
 
-def test_a_response_is_smoother_and_follows():
-    u = white(1000, 0)
-    y = lag(u, 10.0)
-    assert measure_roughness(y) < measure_roughness(u) - 0.3
-    assert measure_precedence(u, y) > 0.3
-    assert measure_precedence(u, y) == pytest.approx(-measure_precedence(y, u))
-
-
 @pytest.mark.parametrize("differentiate", [np.gradient, lambda y: np.diff(y, prepend=y[0])])
 def test_a_derivative_is_recognised(differentiate):
     y = lag(steps(1000, 0), 20.0) + 0.01 * white(1000, 1)
     assert is_derived(differentiate(y), y)
     assert not is_derived(steps(1000, 0), y)
     assert not is_derived(2.0 * y + 1.0, y)
-
-
-def test_columns_of_a_controller_determine_each_other():
-    set_point, measured = steps(800, 0, 40), lag(steps(800, 0, 40), 20.0) + 0.01 * white(800, 1)
-    error = set_point - measured
-    manipulated = np.clip(2.0 * error + 0.1 * np.cumsum(error), -1.0, 1.0)
-    loop = np.array([set_point, manipulated, measured])
-    assert find_computed(loop) == (0, 1, 2)
-    assert find_computed(np.array([set_point, manipulated + 0.01 * white(800, 2), measured])) == ()
 
 
 def test_a_controller_with_rounded_columns_is_a_feedback_and_a_response_is_none():

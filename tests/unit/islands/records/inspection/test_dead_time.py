@@ -79,22 +79,6 @@ def test_every_input_has_its_own_dead_time():
     assert [fact.value for fact in estimate_dead_times(record, (0, 1))] == [4, 10]
 
 
-@pytest.mark.parametrize("part", [0.03, 0.19])
-def test_means_of_a_held_input_change_the_dead_time_by_a_sample_at_most(part):
-    """Samples of a late column are between those of the input: a mean has a part of the next level."""
-    for seed in range(3):
-        u = steps(1500, seed, 10)
-        y = delay(lag(u, 5.0), 3)
-        means = (1.0 - part) * u + part * np.append(u[1:], u[-1])
-        assert abs(estimate(measure(means, y, 0.02, seed, dt=0.1)).value - 4) <= 1
-
-
-def test_a_small_inverse_response_is_a_response():
-    u = steps(1500, 0, 10)
-    y = delay(lag(u, 5.0) - 1.2 * np.diff(lag(u, 1.0), prepend=0.0), 3)
-    assert estimate(measure(u, y, 0.005)).value == 4
-
-
 def test_a_lag_that_is_probably_wrong_is_stated_as_an_interval():
     """Ramps excite a slow response so little that a dead time and a time constant are equal."""
     levels = np.random.default_rng(0).normal(size=10)

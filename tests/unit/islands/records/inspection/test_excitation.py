@@ -4,7 +4,7 @@ import scipy
 
 from islands.records.inspection.channel import channels
 from islands.records.inspection.excitation import estimate_spectrum, measure_excitation
-from support.known_records import measure, slow, steps, white
+from support.known_records import measure, white
 
 
 def excite(u, dt=0.01):
@@ -40,10 +40,3 @@ def test_spectrum_is_that_of_scipy(samples, length, centres_parts):
 def test_order_of_persistent_excitation_is_twice_the_number_of_sines(count):
     found = excite(sines(*(3.0 + 8.0 * place for place in range(count))))
     assert found["excitation-order"].value == 2 * count
-
-
-def test_coverage_is_the_part_of_the_range_with_samples():
-    assert excite(np.sign(steps(2000, 0)))["coverage"].value == pytest.approx(2 / 20)
-    assert excite(sines(1.0))["coverage"].value == 1.0
-    u = slow(4000, 0)
-    assert excite(np.concatenate([u, [10.0 * u.max()]]))["coverage"].value < 0.3

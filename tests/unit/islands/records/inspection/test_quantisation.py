@@ -5,7 +5,7 @@ from islands.records.dataset import Dataset
 from islands.records.inspection.channel import Channel
 from islands.records.inspection.excitation import measure_excitation
 from islands.records.inspection.quantisation import find_quantisation
-from support.known_records import slow, white
+from support.known_records import slow
 
 
 def find(values):
@@ -23,17 +23,6 @@ def test_step_is_exact(step, offset):
 
 def test_step_is_the_divisor_of_all_differences():
     assert find(np.tile([0.0, 0.4, 1.0], 20)).value == pytest.approx(0.2, rel=1e-9)
-
-
-def test_step_of_printed_values_is_found_despite_their_rounding():
-    exact = np.round(slow(2000, 0) / 5e-3) * 5e-3
-    printed = np.array([float(f"{value:.7g}") for value in exact])
-    assert find(printed).value == pytest.approx(5e-3, rel=1e-6)
-
-
-def test_continuous_signal_is_not_quantised():
-    for seed in range(3):
-        assert find(white(2000, seed)).value is None
 
 
 def test_a_held_excitation_has_one_count_of_levels_and_no_converter():

@@ -103,13 +103,6 @@ WRITERS = {
 }
 
 
-def test_the_statistics_are_those_of_the_samples(tmp_path):
-    column = preview(table(tmp_path)).columns[2]
-    assert (column.samples, column.minimum, column.maximum) == (SAMPLES, Y.min(), Y.max())
-    assert column.mean == pytest.approx(Y.mean())
-    assert column.deviation == pytest.approx(Y.std())
-
-
 SLOW = {".mf4", ".mdf", ".xlsx", ".xlsm"}  # their libraries are imported in up to two seconds
 
 
@@ -198,12 +191,6 @@ def test_an_unusable_time_column_is_a_warning(tmp_path, time):
     assert seen.warnings == (refusal(file, ["u_V"], "y_um"),)
 
 
-def test_a_file_without_a_sampling_time_is_a_warning(tmp_path):
-    file = table(tmp_path, drop=["t_s"])
-    seen = preview(file)
-    assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
-
-
 def test_a_first_column_in_a_unit_of_time_that_increases_is_the_time(tmp_path):
     """Oscilloscopes write the source of the channels above the time: ``Source,CH1,CH2``."""
     rows = [f"{t - 0.1:+.7f},{u:.5f},{y:.5f}" for t, u, y in zip(T, U, Y, strict=True)]
@@ -223,15 +210,3 @@ def test_readers_of_rare_formats_import_their_libraries_on_demand():
     program = f"import sys, islands.records.reading; print([m for m in {rare} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-def test_only_warnings_that_prevent_reading_are_problems(tmp_path):
-    times = [*range(100), *range(150, 250)]
-    (tmp_path / "a.csv").write_text("\n".join(["t_s,u,y", *(f"{t},{t % 7},{t % 5}" for t in times)]))
-    found = preview(tmp_path / "a.csv")
-    assert found.problems == found.warnings
-    assert "gap" in found.problems[0]
-    days = (f"{45987.5 + k / 1440:.9f},{k % 7},{k % 5}" for k in range(100))
-    (tmp_path / "b.csv").write_text("\n".join(["Date,u,y", *days]))
-    found = preview(tmp_path / "b.csv")
-    assert (len(found.warnings), found.problems) == (1, ())

@@ -59,24 +59,11 @@ def test_every_dialect_returns_the_written_numbers(tmp_path, separator, comma, e
     assert record.dt == pytest.approx(0.01, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["r.csv", "r.txt", "r.tsv", "r.dat", "R.CSV"])
-def test_every_suffix_of_a_text_table_is_read(tmp_path, name):
-    assert read_record(written(tmp_path, name=name), ["u_V"], "y_um").samples == SAMPLES
-
-
 def test_a_record_carries_names_and_units_of_its_columns(tmp_path):
     record = read_record(written(tmp_path), ["u_V"], "y_um")
     assert (record.input_names, record.output_name) == (("u_V",), "y_um")
     assert (record.input_units, record.output_unit) == (("V",), "um")
     assert record.segments == (SAMPLES,)
-
-
-def test_a_byte_order_mark_and_trailing_blank_lines_are_accepted(tmp_path):
-    file = written(tmp_path)
-    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes() + b"\n  \n,,\n\n")
-    record = read_record(file, ["u_V"], "y_um")
-    assert record.samples == SAMPLES
-    assert record.dt == pytest.approx(0.01)
 
 
 # Time
@@ -155,20 +142,6 @@ def test_a_unit_follows_the_last_underscore_or_is_in_brackets(name, unit):
     assert parse_unit(name) == unit
 
 
-def test_time_printed_with_few_decimals_is_uniform_to_half_of_the_last(tmp_path):
-    t = 0.00317 * np.arange(2000)
-    rows = (f"{value:.3f},{k % 7},{k % 11}" for k, value in enumerate(t))
-    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *rows]))
-    assert read_record(tmp_path / "r.csv", ["u"], "y").dt == pytest.approx(0.00317, rel=1e-4)
-
-
-def test_the_given_sampling_time_is_used_without_a_time_column(tmp_path):
-    file = written(tmp_path)
-    file.write_text(file.read_text().replace("t_s", "k"))
-    record = read_record(file, ["u_V"], "y_um", dt=0.25, rows=slice(4, 44))
-    assert (record.dt, record.start, record.samples) == (0.25, 1.0, 40)
-
-
 # Rows
 
 
@@ -189,14 +162,6 @@ def test_rows_select_samples_counted_from_zero_without_the_header(tmp_path, rows
         assert record.start == pytest.approx(0.01 * first)
 
 
-def test_samples_outside_the_selected_rows_are_not_checked(tmp_path):
-    lines = written(tmp_path).read_text().splitlines()
-    lines[1:4] = ["5.0,nan,text", "too,short", ""]
-    (tmp_path / "r.csv").write_text("\n".join(lines))
-    record = read_record(tmp_path / "r.csv", ["u_V"], "y_um", rows=slice(3, None))
-    assert record.u[:, 0].tolist() == U[3:].tolist()
-
-
 # A missing output
 
 
@@ -211,15 +176,6 @@ def test_a_missing_output_after_the_warm_up_is_accepted_on_request(tmp_path, cel
 
 
 # NumPy archives
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("dt", 0.004), ("Ts", 0.004), ("fs", 250), ("fs", np.array([[250.0]]))]
-)
-def test_an_archive_may_state_its_sampling(tmp_path, name, value):
-    record = read_record(archive(tmp_path, **{name: value}), ["u"], "y", rows=slice(10, None))
-    assert record.dt == pytest.approx(0.004)
-    assert record.start == pytest.approx(0.04)
 
 
 # Column names and fingerprints

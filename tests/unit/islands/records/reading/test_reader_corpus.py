@@ -29,8 +29,3 @@ def test_an_odd_file_is_read_or_refused_with_its_remedy(tmp_path, case):
     wrong = int((record.u[:, 0] != U).sum() + (record.y != Y).sum())
     assert wrong == (1 if case.options.get("gaps") else 0)
     assert np.isfinite(record.u).all()
-
-
-def test_the_corpus_has_forty_files_of_which_a_third_is_refused():
-    assert len(ODD_FILES) >= 40
-    assert sum(bool(case.words) for case in ODD_FILES) >= 13

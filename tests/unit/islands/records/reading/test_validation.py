@@ -31,13 +31,6 @@ def test_an_output_without_any_value_is_refused(tmp_path):
     assert "column y_um has no value from line 2 to line 61: choose another column" in refusal(tmp_path, rows)
 
 
-@pytest.mark.parametrize("cell", ["inf", "-Infinity", "1e999"])
-def test_an_infinite_value_is_refused_even_in_an_optional_output(tmp_path, cell):
-    message = refusal(tmp_path, changed(20, 2, cell), missing_output=True)
-    assert "bad.csv, line 20, column y_um is infinite" in message
-    assert "leave the row out" in message
-
-
 @pytest.mark.parametrize("cell", ["1.5 V", "1_5", "1,5e", "0x1F", "--3"])
 def test_a_text_cell_is_refused_and_shown(tmp_path, cell):
     rows = [line.replace(",", ";") for line in lines()]
@@ -103,14 +96,6 @@ def test_a_decimal_comma_between_commas_is_recognised(tmp_path):
     assert "if it is a decimal comma, save with ';' between the columns" in message
 
 
-def test_a_blank_line_between_samples_is_refused(tmp_path):
-    rows = lines()
-    rows.insert(20, "")
-    message = refusal(tmp_path, rows)
-    assert "bad.csv, line 21 is blank" in message
-    assert "islands.join" in message
-
-
 def test_too_few_samples_are_refused_and_just_enough_are_not(tmp_path):
     message = refusal(tmp_path, lines(MIN_SAMPLES - 1))
     assert "29 samples, from line 2 to line 30, are too few: at least 30 are needed" in message
@@ -152,22 +137,6 @@ def test_a_repeated_time_stamp_is_refused(tmp_path):
     assert "resample" in message
 
 
-def test_a_jump_backwards_is_refused_as_the_start_of_another_recording(tmp_path):
-    rows = [*lines(), *lines()[1:]]
-    message = refusal(tmp_path, rows)
-    assert "line 62, column t_s jumps back to 0 from 0.59" in message
-    assert 'give gaps="split" for segments' in message
-
-
-def test_jittered_sampling_is_refused(tmp_path):
-    t = 0.01 * (np.arange(60) + np.random.default_rng(3).uniform(-0.1, 0.1, 60))
-    rows = [HEADER, *(f"{t[k]:.6f},{k % 7},{k % 11}" for k in range(60))]
-    message = refusal(tmp_path, rows)
-    assert "column t_s is off the uniform grid" in message
-    assert "give resample=0.01" in message
-    assert "dt=0.01" in message
-
-
 def test_a_time_column_and_a_sampling_time_that_disagree_are_refused(tmp_path):
     message = refusal(tmp_path, lines(), dt=0.0102)
     assert "0.01 s by column t_s and 0.0102 s by dt=" in message
@@ -176,14 +145,6 @@ def test_a_time_column_and_a_sampling_time_that_disagree_are_refused(tmp_path):
 @pytest.mark.parametrize("dt", [0.0, -0.01, float("nan"), float("inf")])
 def test_a_sampling_time_that_is_not_a_positive_number_is_refused(tmp_path, dt):
     assert f"positive number of seconds, got {dt}" in refusal(tmp_path, lines(), dt=dt)
-
-
-def test_a_file_without_a_sampling_time_is_refused(tmp_path):
-    rows = lines()
-    rows[0] = "k,u_V,y_um"
-    message = refusal(tmp_path, rows)
-    assert "bad.csv has no time column" in message
-    assert "give the sampling time by dt=, or name the column by time=" in message
 
 
 def test_two_possible_time_columns_are_refused(tmp_path):

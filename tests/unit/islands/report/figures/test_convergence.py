@@ -80,14 +80,6 @@ def test_front_shows_both_parts_over_the_number_of_terms():
     assert integer_ticks(get_axes(figure)) == [1, 2, 3]
 
 
-def test_diverged_and_exact_models_do_not_affect_the_error_axis():
-    models = ((1, np.nan, 30.0), (2, 2.0, 0.0), (3, 0.2, 0.3))
-    figure = draw_front(make_result(models=models))
-    low, high = get_axes(figure).get_ylim()
-    assert 0.0 < low < 0.2
-    assert 30.0 < high < 1000.0
-
-
 def test_islands_figure_has_a_line_per_island_and_one_for_the_best():
     figure = draw_islands(make_result(ISLANDS_HISTORY))
     *islands, best = (line.get_xydata() for line in get_axes(figure).lines)

@@ -1,6 +1,5 @@
 """Figures of a diagnosis: panels, lines and sizes."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -51,28 +50,6 @@ def test_residual_figure_has_a_panel_per_signal() -> None:
         coloured = {line.get_color() for line in panel.lines}
         assert {"#c56fa0", "#d55e00"} <= coloured
         assert all(np.isfinite(line.get_xydata()).all() for line in panel.lines)
-
-
-def divide(samples: int, boundary: int):
-    """Return a diagnosis whose record consists of two recordings; the input of the second one is shifted."""
-    found = diagnosis(samples=samples)
-    u = np.array(found.record.u)
-    u[boundary:] += 20.0
-    return replace(found, record=replace(found.record, u=u, segments=(boundary, samples - boundary)))
-
-
-@pytest.mark.ci
-def test_residual_structure_does_not_reach_across_recordings() -> None:
-    divided = draw_residual(divide(900, 600)).axes
-    single = residual_figure().axes
-    # The step of the input between the recordings is no rate.
-    largest = [
-        max(np.max(np.abs(line.get_xdata())) for line in each[2].lines[:2]) for each in (divided, single)
-    ]
-    assert largest[0] == pytest.approx(largest[1], rel=0.05)
-    # Windows of a quarter of the longest recording resolve less than those of a quarter of the record.
-    assert len(divided[4].lines[0].get_xdata()) == 75
-    assert len(single[4].lines[0].get_xdata()) == 112
 
 
 def test_spectrum_integrates_to_the_variance_of_the_residual() -> None:

@@ -3,15 +3,12 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 
-from islands.errors import SettingsError
 from islands.records.dataset import Dataset
 from islands.report.figures.diverging_lines import (
     annotate_divergence,
     divergence,
     finite_part,
-    limits,
     within_reach,
 )
 
@@ -31,21 +28,9 @@ def test_values_that_are_infinite_or_beyond_the_bound_are_not_drawn():
     np.testing.assert_array_equal(made, [1.0, NAN, NAN, NAN, NAN])
 
 
-def test_simulation_of_another_length_raises_settings_error():
-    with pytest.raises(SettingsError, match=r"each of the record's 3 samples, got shape \(2,\)"):
-        finite_part(record([0.0, 1.0, 2.0]), np.zeros(2))
-
-
 def test_axis_follows_the_simulation_without_measured_output():
     values = np.array([-1e5, 1e5])
     np.testing.assert_array_equal(within_reach(record([NAN, NAN]), values), values)
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"), [([0.0], (-1.0, 1.0)), ([5.0, 5.0], (4.75, 5.25)), ([NAN, NAN], (-1.0, 1.0))]
-)
-def test_limits_of_constant_or_missing_values_are_distinct(values, expected):
-    assert limits(np.array(values)) == pytest.approx(expected)
 
 
 def test_divergence_is_a_simulation_that_ends_before_its_segment():

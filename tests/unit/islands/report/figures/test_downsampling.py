@@ -27,15 +27,6 @@ def test_spike_of_a_single_sample_is_kept(sample, height):
     assert kept_y[kept_x == sample].tolist() == [height]
 
 
-def test_columns_keep_their_first_last_smallest_and_largest_sample():
-    x, y = noise()
-    kept_x, kept_y = downsample(x, y, vertices=400)
-    for column in range(100):
-        there, kept = slice(1000 * column, 1000 * (column + 1)), kept_x // 1000 == column
-        assert kept_x[kept][[0, -1]].tolist() == [there.start, there.stop - 1]
-        assert (kept_y[kept].min(), kept_y[kept].max()) == (y[there].min(), y[there].max())
-
-
 @pytest.mark.parametrize("gap", [slice(500, 501), slice(30_000, 40_000), slice(199, 201), slice(0, 250)])
 def test_gap_stays_open(gap):
     x, y = noise()

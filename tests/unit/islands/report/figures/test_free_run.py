@@ -45,10 +45,6 @@ def curve(axes: "Axes", colour: str) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
 
 
-def annotations(axes: "Axes") -> list[str]:
-    return [text.get_text() for text in axes.texts]
-
-
 def test_segments_are_separated_and_not_joined():
     record = sine(3, segments=(150, 250))
     figure = draw_free_run(record, record.y)
@@ -59,28 +55,6 @@ def test_segments_are_separated_and_not_joined():
     assert np.isnan(y[150])
     assert np.isnan(x[150])
     np.testing.assert_array_equal(np.delete(y, 150), record.y)
-
-
-def diverging(record: Dataset, at: int) -> np.ndarray:
-    k = np.arange(record.samples)
-    return np.where(k < at, np.exp(0.1 * np.minimum(k, at)) - 1.0, np.nan)
-
-
-@pytest.mark.ci
-def test_divergence_is_annotated_and_does_not_flatten_other_lines(tmp_path):
-    record = sine(3)
-    figure = draw_free_run(record, diverging(record, 120))
-    above, below = figure.axes
-    assert annotations(above) == ["diverged"]
-    low, high = above.get_ylim()
-    assert (low, high) == pytest.approx((-3.6, 9.6), abs=0.05)
-    assert below.get_title(loc="right") == ""
-    assert np.ptp(below.get_ylim()) < 20
-    mark = above.lines[-1]
-    assert mark.get_ydata()[0] == pytest.approx(high)
-    # exp(0.1 k) - 1 passes 9.6 between samples 23 and 24.
-    assert mark.get_xdata()[0] == pytest.approx(0.24)
-    save(figure, tmp_path / "diverged.svg")
 
 
 @pytest.mark.parametrize("y", [np.full(50, np.nan), np.zeros(50)])

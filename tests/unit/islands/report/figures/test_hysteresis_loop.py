@@ -5,7 +5,7 @@ import pytest
 
 from islands.records.dataset import Dataset
 from islands.report.figures.hysteresis_loop import draw_loop
-from islands.report.figures.style import MEASURED, SIMULATED, save
+from islands.report.figures.style import MEASURED, SIMULATED
 
 pytestmark = pytest.mark.usefixtures("without_layout")
 
@@ -32,13 +32,3 @@ def test_inputs_have_one_panel_each_with_name_and_unit(inputs):
         np.testing.assert_array_equal(measured.get_xdata(), record.u[:, channel])
         np.testing.assert_array_equal(measured.get_ydata(), record.y)
         np.testing.assert_array_equal(simulated.get_ydata(), 0.9 * record.y)
-
-
-@pytest.mark.parametrize(("periods", "part"), [(3, ""), (40, "the last 5 of 40 loops; ")])
-def test_divergence_is_in_the_title_and_does_not_flatten_the_loops(periods, part, tmp_path):
-    record = loops(periods)
-    k = np.arange(record.samples)
-    figure = draw_loop(record, np.where(k < 120, np.exp(0.1 * np.minimum(k, 120)), np.nan))
-    assert figure.axes[0].get_title(loc="left") == part + "the simulation diverged"
-    assert np.abs(figure.axes[0].get_ylim()).max() < 4.0
-    save(figure, tmp_path / "diverged.svg")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.report.figures.linear_system import LINEAR_FIGURES, draw_bode, draw_linear_system
-from support.latent_systems import SPRING, make_model
+from support.latent_systems import make_model
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = [pytest.mark.ci, pytest.mark.usefixtures("without_layout")]
@@ -33,16 +33,6 @@ def test_a_resonance_is_marked_with_its_damping_ratio():
     frequencies, magnitude = above.lines[0].get_data()
     # Damping moves the peak of the magnitude below the frequency of the mode.
     assert frequencies[magnitude.argmax()] == pytest.approx(5.189, rel=0.1)
-
-
-def test_an_input_without_an_effect_has_no_line():
-    parameters = {f"{name}_1" if name in ("b1", "b2") else name: value for name, value in SPRING.items()}
-    model = make_model(parameters, input_names=("u_V", "load_N"), operating_inputs=(0.0, 0.0))
-    above, below = draw_bode(model.linearise()).axes
-    labels = [line.get_label() for line in above.lines if not line.get_label().startswith("_")]
-    assert labels == ["y (mm) over u (V)", "y (mm) over load (N): no effect"]
-    assert [line.get_label() for line in below.lines if not line.get_label().startswith("_")] == labels[:1]
-    assert above.get_ylabel() == "magnitude"
 
 
 @pytest.mark.parametrize("kind", LINEAR_FIGURES)

@@ -13,7 +13,7 @@ import pytest
 
 from islands.records.dataset import Dataset
 from islands.report.figures.free_run import draw_free_run
-from islands.report.figures.style import house_style, label, save
+from islands.report.figures.style import label, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,14 +46,6 @@ def matplotlib() -> ModuleType:
 )
 def test_label_is_the_name_with_the_unit_in_parentheses(name, unit, expected):
     assert label(name, unit) == expected
-
-
-def test_matplotlib_settings_are_restored_after_drawing(matplotlib):
-    before = dict(matplotlib.rcParams.copy())
-    example()
-    with house_style():
-        assert matplotlib.rcParams["svg.hashsalt"] == "islands"
-    assert dict(matplotlib.rcParams.copy()) == before
 
 
 def test_file_has_no_date_no_image_and_no_font(tmp_path, matplotlib):

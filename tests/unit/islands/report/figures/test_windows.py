@@ -22,11 +22,3 @@ def test_section_has_the_median_residual():
     record = sine(25)
     residual = np.repeat([5.0, 1.0, 4.0, 3.0, 2.0], 500)
     assert representative_window(record, residual) == slice(1500, 2000)
-
-
-def test_sections_do_not_cross_segments_that_are_long_enough():
-    record = sine(30, segments=(700, 1300, 1000))
-    section = representative_window(record, np.arange(3000.0))
-    assert section is not None
-    assert any(begin <= section.start and section.stop <= end for begin, end in record.bounds)
-    assert section == slice(1200, 1700)

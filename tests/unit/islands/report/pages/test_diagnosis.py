@@ -1,9 +1,7 @@
 """Sentences of the diagnosis report."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +31,7 @@ def summarise(found: Diagnosis) -> str:
     return DiagnosisResult.from_diagnosis(found).summary
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_report_shows_equations_as_the_cause_or_as_an_equivalent_of_it(diagnosis: Diagnosis) -> None:
     # Without an extension, the equations of the terms are all that is known.
     as_cause = replace(diagnosis, verdict=Verdict.DISCOVERED, discovery=EQUATIONS, trial=None)
@@ -57,22 +55,6 @@ def test_report_typesets_the_extended_simulation_and_states_its_values(diagnosis
     assert re.search(r"Its values: .*tau = 0\.0\d+ s \(", page)
     assert "Extended simulation: output = G[u(t - tau)]." in summarise(diagnosis).replace("\n    ", " ")
     assert "delay of the input (<code>delay</code>)" in page
-
-
-@pytest.mark.ci
-def test_figures_are_drawn_by_the_map_and_keep_the_order_of_the_report(diagnosis: Diagnosis) -> None:
-    figures: dict[str, Any] = {}
-
-    def draw_backwards(function: Callable[[Any], Any], names: Iterable[Any], /) -> Iterator[Any]:
-        order = list(names)
-        figures.update((name, function(name)) for name in reversed(order))
-        return iter([figures[name] for name in order])
-
-    report = diagnosis_report(Origin("record"), diagnosis, parallel_map=draw_backwards).decode()
-    assert sorted(figures) == ["ladder", "over-time", "residual"]
-    # Each figure is drawn once: the layout of a second drawing may differ in a digit.
-    places = [report.index(str(figures[name])) for name in ("over-time", "residual", "ladder")]
-    assert places == sorted(places)
 
 
 @pytest.mark.ci

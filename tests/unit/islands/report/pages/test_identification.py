@@ -1,12 +1,8 @@
 """HTML report of an identification: order, parameters, other models."""
 
-import re
-from html import unescape
-
 import pytest
 
 import islands
-from islands.models.equations import named_term
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
 from islands.report.pages.identification import identification_report
@@ -30,14 +26,6 @@ def write(found, figures=FIGURES, **changes):
     return identification_report(
         Origin("job"), document, found.best.model.equation().mathml, figures
     ).decode()
-
-
-def test_terms_have_the_names_of_the_columns(found):
-    page = unescape(write(found))
-    for place in range(found.best.model.size):
-        term = named_term(found.best.model, place)
-        assert re.search(r"[uy]_(V|um)\(k", term)
-        assert f'<th scope="row">{term}</th>' in page
 
 
 def test_names_of_columns_are_text(found):

@@ -2,12 +2,11 @@
 
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from islands.errors import RecordError, SettingsError
+from islands.errors import SettingsError
 from islands.expressions.evaluation import value
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
@@ -116,15 +115,6 @@ def test_diverging_free_run_is_nan_from_the_diverged_sample(name):
     assert np.isnan(found.y[sample:]).all()
 
 
-def test_divergence_only_ends_its_own_interval():
-    data = record(spikes(s100=1e9), segments=(90, 60, 150))
-    found = multiple_shooting(model((1.0, "u(k-1)")), data, 20).y
-    # Intervals of the second segment begin at 91 and 111.
-    assert np.isnan(found[101:111]).all()
-    predicted = np.r_[1:90, 91:101, 111:150, 151:300]
-    assert np.array_equal(found[predicted], data.u[predicted - 1, 0])
-
-
 @pytest.mark.parametrize(
     ("y", "scale"),
     [
@@ -154,23 +144,6 @@ def test_output_known_only_as_zero_does_not_give_a_zero_bound():
 
 
 # Invalid arguments.
-
-
-@pytest.mark.parametrize("simulate", [one_step_ahead, free_run])
-def test_missing_output_in_a_warm_up_is_refused(simulate):
-    data = record()
-    y = data.y.copy()
-    y[1] = math.nan
-    with pytest.raises(RecordError) as caught:
-        simulate(model((0.5, "y(k-2)")), replace(data, y=y))
-    assert "the output is missing at sample 1, where a simulation starts from it" in str(caught.value)
-    assert "fill the gap" in str(caught.value)
-
-
-@pytest.mark.parametrize("interval", [0, -1])
-def test_empty_interval_is_refused(interval):
-    with pytest.raises(SettingsError, match=f"at least 1 sample, got {interval}$"):
-        multiple_shooting(model((1.0, "u(k-1)")), record(), interval)
 
 
 @pytest.mark.parametrize("warm_up", [0, 3, -1])

@@ -22,7 +22,6 @@ from islands.persistence.models import model_from_json
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.fmu.simulator import FmuSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.factory import make_simulator
@@ -111,16 +110,6 @@ def test_a_simulator_is_sent_to_another_process_by_its_path() -> None:
     content = pickle.dumps(simulator)
     assert len(content) < 10_000
     assert np.array_equal(simulate(pickle.loads(content), record), simulate(simulator, record))
-
-
-def test_steps_are_refined_until_a_simulation_does_not_diverge() -> None:
-    """At 10 steps per period of sampling, a stiff spring needs more than one step of the integrator."""
-    record = oscillation()
-    found = make_simulator(f"fmu:{oscillator()}?parameters=k=1e6", record)
-    assert isinstance(found, FmuSimulator)
-    assert found.system.steps > 1
-    with pytest.raises(RecordError, match=r"ends the simulation after .*check its parameters and units"):
-        make_simulator(f"fmu:{oscillator()}?parameters=k=1e6&steps=1", record)
 
 
 @pytest.mark.parametrize(

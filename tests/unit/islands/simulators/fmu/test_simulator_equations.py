@@ -1,6 +1,5 @@
 """Equations around FMUs: terms and effects act as in written equations, and missing terms are discovered."""
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -21,9 +20,6 @@ from islands.export.fmu import find_compiler
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
-from islands.simulators.fmu.fmi_description import FmiVariable, read_description
-from islands.simulators.fmu.model import choose_variables
-from islands.simulators.fmu.system import make_fmu_system
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
@@ -218,29 +214,6 @@ def test_equations_that_do_not_fit_the_fmu_are_refused(fields: dict[str, object]
 def test_a_fmu_in_written_equations_is_refused() -> None:
     with pytest.raises(ValueError, match="an FMU does not compute v: take one of none here"):
         make_equations({"v": "+ fmu(v)"})
-
-
-def test_equations_are_written_as_they_are_read() -> None:
-    spec = make_fmu({**TERMS, "v": f"{TERMS['v']} - force/m"}, force=True)
-    model = spec.make_model()
-    system = spec.make_system(model)
-    again = FmuSpec.from_system(model, system)
-    assert again.make_system(again.make_model()) == system
-    assert again.equations.startswith("dv/dt = fmu(v) - d*x**3")
-
-
-def test_names_of_an_fmu_become_names_of_equations() -> None:
-    states = FmiVariable("body[1].v", 3), FmiVariable("t", 4)
-    description = replace(
-        read_description(oscillator()),
-        inputs=(FmiVariable("in", 1),),
-        outputs=(FmiVariable("y", 2),),
-        states=states,
-    )
-    model = choose_variables(description)
-    assert model.symbols == {"in": "in_", "body[1].v": "body_1__v", "t": "t_", "y": "y"}
-    system = make_fmu_system(model, "dt_/dt = fmu(t_) + in_*body_1__v\noutput = fmu(y)**2\n")
-    assert system.of_fmu == ("body_1__v", "t_", "y")
 
 
 def test_formats_of_difference_equations_refuse_an_extended_fmu() -> None:

@@ -25,14 +25,6 @@ def test_the_delay_of_a_held_signal_keeps_its_mean() -> None:
     assert delayed.start[0] == FORCE[0]
 
 
-def test_the_rate_of_a_parabola_is_exact() -> None:
-    time = np.array([0.0, 0.1, 0.2])
-    parabola = SampledSignal.join(*((time + ahead) ** 2 for ahead in (0.0, 0.05, 0.1)))
-    rate = parabola.differentiate(0.1)
-    for part, ahead in ((rate.start, 0.0), (rate.middle, 0.05), (rate.end, 0.1)):
-        assert part == pytest.approx(2 * (time + ahead), abs=1e-12)
-
-
 @pytest.mark.parametrize("width", [0.02, 0.3, 1.7])
 def test_the_rate_of_a_signal_with_kinks_has_the_length_of_its_path(width: float) -> None:
     """A hysteresis that does not depend on the rate follows the path of its input alone."""

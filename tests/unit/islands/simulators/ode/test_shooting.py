@@ -69,19 +69,6 @@ def test_change_of_fitted_states_is_their_first_order(axis: tuple[ExtendedSimula
         assert np.std(change - expected) < 0.05 * np.std(expected) + 1e-11, parameter.name
 
 
-def test_derivatives_change_no_other_output(axis: tuple[ExtendedSimulator, np.ndarray]) -> None:
-    """Neither the order of the calls nor their number changes an output."""
-    simulation, values = axis
-    points = np.vstack([values + simulation.scales, values])
-    alone = simulation.simulate_batch(points)
-    first = simulation.simulate_batch(points, np.array([1, 1]))
-    assert np.array_equal(first[1], alone[1])
-    others = np.vstack([values - simulation.scales, points])
-    again = simulation.simulate_batch(others, np.array([0, 2, 2]))
-    assert np.array_equal(again[1:], first)
-    assert np.array_equal(simulation.simulate_batch(points), alone)
-
-
 def test_shooting_fits_the_states_of_every_interval() -> None:
     """The equations are right, so that only the fitted positions and rates determine the output."""
     case = made()["rigid-axis"]

@@ -14,8 +14,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import BatchSimulator, SimulationRun, Simulator
-from islands.simulators.intersample import InterSample, ResampledSimulator
-from islands.simulators.specification.description import describe_extension
+from islands.simulators.intersample import ResampledSimulator
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import parse_spec
 from support.repository import DOCS
@@ -172,21 +171,6 @@ def fields(name: str) -> dict[str, object]:
     }
 
 
-def test_a_stiff_simulation_takes_as_many_steps_as_it_needs(tmp_path: Path) -> None:
-    """A damper that stops the mass within a tenth of a sample: the spring alone moves it."""
-    text = (EQUATIONS / "second-order.toml").read_text().replace("value = 4.0", "value = 500.0")
-    (tmp_path / "stiff.toml").write_text(text)
-    record = make_record("second-order")
-    simulation = extend(make_simulator(f"ode:{tmp_path}/stiff.toml", record), record)
-    assert simulation.simulator.system.steps == 4
-    finer = extend(ResampledSimulator(simulation.simulator, InterSample.FOH, 8), record)
-    output = simulation.simulate(simulation.nominal)
-    assert np.max(np.abs(output - finer.simulate(simulation.nominal))) < 1e-2 * np.ptp(output)
-    spec = describe_extension(simulation.simulator, simulation.nominal, ("drive",), "y")
-    again = extend(make_simulator(spec, record), record)
-    assert np.array_equal(again.simulate(again.nominal), output)
-
-
 #: A sensor without dynamics.
 STATIC = """
 name = "sensor"
@@ -204,16 +188,6 @@ def make_static(tmp_path: Path) -> tuple[str, Dataset]:
     u = wave(400)
     noise = 0.05 * np.random.default_rng(0).normal(size=u.size)
     return f"ode:{tmp_path}/sensor.toml", recorded(u, 2.2 * u + 1e-3 * u**3 + noise)
-
-
-def test_equations_without_states_are_simulated(tmp_path: Path) -> None:
-    path, record = make_static(tmp_path)
-    simulation = extend(make_simulator(path, record), record)
-    assert [each.name for each in simulation.parameters] == ["k"]
-    assert np.array_equal(simulation.simulate(np.array([3.0])), 3.0 * record.u[:, 0])
-    spec = describe_extension(simulation.simulator, np.array([3.0]), record.input_names, "y_um")
-    again = extend(make_simulator(spec, record), record)
-    assert np.array_equal(again.simulate(again.nominal), 3.0 * record.u[:, 0])
 
 
 @pytest.mark.nightly

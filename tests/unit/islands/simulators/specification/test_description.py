@@ -228,17 +228,3 @@ def test_an_invalid_document_is_refused_with_a_reason(reason: str) -> None:
     with pytest.raises(error) as raised:
         simulate_spec(document, oscillator.record)
     assert words in str(raised.value)
-
-
-def test_a_document_has_the_states_at_the_first_sample_of_its_record() -> None:
-    """A program starts from them. With shooting intervals, that is the measured state."""
-    fit = extend(made()["second-order"], [])
-    values = fit.values.copy()
-    values[-2:] = (0.25, -0.5)
-    document = json.loads(extended_json(replace(fit, values=values), made()["second-order"].record))
-    assert document["start"] == {"x": 0.25, "v": -0.5}
-    axis = made()["rigid-axis"]
-    document = json.loads(extended_json(extend(axis, []), axis.record))
-    assert document["start"] == {"x": axis.record.y[0], "v": 0.0}
-    linear = made()["linear"]
-    assert json.loads(extended_json(extend(linear, []), linear.record))["start"] == {}

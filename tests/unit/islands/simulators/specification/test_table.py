@@ -35,11 +35,6 @@ def test_the_remote_union_has_the_remote_models_of_the_table() -> None:
     assert members(SimulationSpec) == remote | {ExtendedSpec}
 
 
-def test_an_entry_has_its_name_as_key_and_kind(entry: SimulatorEntry) -> None:
-    assert SIMULATORS[entry.name] is entry
-    assert entry.name in get_args(entry.spec.model_fields["kind"].annotation)
-
-
 def test_a_factory_can_be_imported_and_takes_three_arguments(entry: SimulatorEntry) -> None:
     assert len(signature(resolve_name(entry.factory)).parameters) == 3
 

@@ -51,10 +51,3 @@ def test_a_damaged_archive_is_refused(tmp_path):
     message = refusal(tmp_path, bytes(content), inputs=["u"], output="y", name="bad.npz")
     assert "column u cannot be read" in message
     assert "the file is damaged, write it again" in message
-
-
-def test_an_array_with_a_damaged_type_is_refused(tmp_path):
-    np.savez(tmp_path / "whole.npz", u=np.arange(500.0), y=np.arange(500.0), dt=0.01)
-    content = (tmp_path / "whole.npz").read_bytes().replace(b"'<f8'", b"',f8'")
-    message = refusal(tmp_path, content, inputs=["u"], output="y", name="bad.npz")
-    assert "column u cannot be read" in message

@@ -127,26 +127,6 @@ def test_the_defaults_find_the_law_of_columns_of_different_clocks(tmp_path, case
     assert best.metrics["validation"]["free_run"].rmse < 1.2 * NOISE
 
 
-def test_an_input_that_is_held_with_the_output_does_not_hide_its_clock(tmp_path):
-    """Two sensors of one slow logger, one of them an input or another output, and a fast command."""
-    frame = hold(0.1)
-    frame["other"] = np.repeat(np.random.default_rng(6).normal(size=600), 10)
-    frame.to_csv(tmp_path / "r.csv", index=False)
-    record = read_record(tmp_path / "r.csv", ["u_V", "other"], "y_mm")
-    assert (record.dt, record.samples) == (0.1, 600)
-    assert np.array_equal(record.u[:, 1], frame["other"].to_numpy()[::10])
-
-
-def test_a_faster_input_of_a_static_system_is_sampled_by_default(tmp_path):
-    rng = np.random.default_rng(7)
-    time = 0.01 * np.arange(6000)
-    u = np.convolve(rng.normal(size=6007), np.ones(8) / 8, "valid")
-    y = np.where(np.arange(6000) % 10 == 0, 2.0 * u + rng.normal(0.0, NOISE, 6000), np.nan)
-    record = read(tmp_path, pd.DataFrame({"time_s": time, "u_V": u, "y_mm": y}))
-    assert np.std(record.y - 2.0 * record.u[:, 0]) < 1.1 * NOISE
-    assert "the value at each for u_V" in record.reading[0]
-
-
 def test_a_faster_input_that_varies_between_samples_is_averaged_by_default(tmp_path):
     rng = np.random.default_rng(8)
     u = np.repeat(rng.uniform(0.0, 5.0, 2000), 3)
@@ -158,19 +138,6 @@ def test_a_faster_input_that_varies_between_samples_is_averaged_by_default(tmp_p
     assert "the mean from each to the next for u_V" in read(tmp_path, frame).reading[0]
     errors = [fit_law(read(tmp_path, frame, rates=rates))[2] for rates in ("mean", "sample")]
     assert errors[0] < 0.3 * errors[1]
-
-
-def test_a_mean_of_a_smooth_input_is_its_integral(tmp_path):
-    """A smooth input that were held between its samples would be late by half of their step."""
-    fast, slow = 0.03 * np.arange(2000), 0.1 * np.arange(600)
-    rng = np.random.default_rng(0)
-    rows = [(t, f"{t:.3f},{np.sin(2.0 * t):.9f},") for t in fast + 0.001]
-    rows += [(t, f"{t:.3f},,{rng.normal():.6f}") for t in slow]
-    (tmp_path / "r.csv").write_text("\n".join(["t_s,u,y", *(text for _, text in sorted(rows))]) + "\n")
-    record = read_record(tmp_path / "r.csv", ["u"], "y")
-    times = record.start + 0.1 * np.arange(record.samples)
-    means = (np.cos(2.0 * times) - np.cos(2.0 * (times + 0.1))) / 0.2
-    assert np.abs(record.u[:-1, 0] - means[:-1]).max() < 1e-3
 
 
 @pytest.mark.parametrize("step", [0.05, 0.1, 0.2])

@@ -33,13 +33,6 @@ def blank(values, *samples):
     return values
 
 
-def test_gaps_become_segments(tmp_path):
-    record = read(tmp_path, gone(rows(), 50, 120, 121, 122), gaps="split")
-    assert record.segments == (48, 69, 279)
-    assert record.dt == pytest.approx(DT, rel=1e-9)
-    assert record.reading == ("split at 2 gaps into 3 segments, the first gap is before line 50",)
-
-
 def test_segments_may_begin_between_the_samples_of_the_grid(tmp_path):
     t = T + 0.1 + np.where(K >= 200, 0.0537, 0.0)
     record = read(tmp_path, rows(t), gaps="split")
@@ -113,12 +106,6 @@ def test_repeated_rows_are_left_out_and_other_rows_of_equal_time_averaged(tmp_pa
     assert averaged.y[29] == pytest.approx((Y[29] + 0.5) / 2, abs=1e-6)
 
 
-def test_a_clock_that_is_set_back_separates_segments(tmp_path):
-    table = [*rows(), *rows()[1:]]
-    assert "line 402, column t_s jumps back to 0 from 3.99" in refusal(tmp_path, table)
-    assert read(tmp_path, table, gaps="split").segments == (400, 400)
-
-
 def test_a_coarser_grid_is_filtered_against_folding(tmp_path):
     # 47 Hz folds to 3 Hz at 50 Hz; 2 Hz is kept.
     fast = np.sin(2 * np.pi * 47.0 * T)
@@ -128,20 +115,6 @@ def test_a_coarser_grid_is_filtered_against_folding(tmp_path):
     assert record.samples == 100
     assert np.abs(record.u[inner, 0] - kept[inner]).max() < 0.01
     assert record.reading[0].startswith("resampled from 0.01 s to 0.04 s by a linear-phase low-pass filter")
-
-
-def test_rows_between_the_samples_of_a_uniform_record_are_named_where_they_are(tmp_path):
-    """A battery cycler writes a further row at the end of each step."""
-    table = rows()
-    for place in (300, 200, 100):
-        time, _, rest = table[place].partition(",")
-        table.insert(place, f"{float(time) - 2e-6:.6f},{rest}")
-    message = refusal(tmp_path, table)
-    assert "line 102, column t_s is off the uniform grid" in message
-    assert "(3 of 402 steps differ)" in message
-    assert read(tmp_path, table, resample=0.01).reading == (
-        "resampled to uniform steps of 0.01 s by linear interpolation",
-    )
 
 
 def test_resampling_does_not_cross_a_gap_unless_it_is_to_be_interpolated(tmp_path):

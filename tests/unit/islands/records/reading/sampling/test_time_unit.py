@@ -53,22 +53,6 @@ def test_seconds_of_the_size_of_days_remain_seconds(tmp_path, first, step, digit
 
 
 @pytest.mark.parametrize(
-    ("name", "step"), [("t_s", 60 / 86_400), ("Time (ms)", 0.06 / 86_400), ("t_d", 60.0)]
-)
-def test_a_unit_in_the_name_is_true(tmp_path, name, step):
-    record = read(tmp_path, name, 45987.5 + K / 1440)
-    assert (record.dt, record.reading) == (pytest.approx(step, rel=1e-6), ())
-
-
-def test_numbers_that_may_be_both_are_read_by_their_header_and_said_so(tmp_path):
-    assert read(tmp_path, "Date", 45987 + K, 0).dt == 86_400
-    record = read(tmp_path, "time", 45987 + K, 0)
-    assert record.dt == 1.0
-    assert "read as seconds; its numbers are also possible as days: 45987 is 2025-11-26" in record.reading[0]
-    assert read(tmp_path, "time", 45987 + K, 0, time_unit="d").dt == 86_400
-
-
-@pytest.mark.parametrize(
     ("unit", "step"), [("s", 60 / 86_400), ("ms", 0.06 / 86_400), ("h", 2.5), ("d", 60.0), ("min", 60 / 1440)]
 )
 def test_a_given_unit_overrules_what_is_inferred(tmp_path, unit, step):

@@ -2,72 +2,18 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from islands.evolution.settings import Settings
 from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome, JobState, Submission
-from islands_service.domain.job_spec import Identification
 from islands_service.store.blobs import Blobs
 from support.command_line import COLUMNS
 from support.service import Service, held
 from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
-
-#: A value of every setting on the command line, and in the job.
-VALUES: dict[str, tuple[str, Any]] = {
-    "population": ("40", 40),
-    "generations": ("7", 7),
-    "elite": ("0.2", 0.2),
-    "crossover": ("0.7", 0.7),
-    "mutation": ("0.3", 0.3),
-    "prune": ("0.4", 0.4),
-    "prune_copies": ("true", True),
-    "tolerance": ("1e-4", 1e-4),
-    "err_target": ("increment", "increment"),
-    "shifts": ("1,2", [1, 2]),
-    "tournament": ("2", 2),
-    "overlong": ("parent", "parent"),
-    "distinct": ("true", True),
-    "niches": ("true", True),
-    "select": ("fitness", "fitness"),
-    "max_terms": ("6", 6),
-    "max_height": ("4", 4),
-    "shooting": ("50", 50),
-    "library_delays": ("3", [3]),
-    "primitives": ("mul,phi1", ["mul", "phi1"]),
-    "constraints": ("none", "none"),
-    "estimator": ("free-run", "free-run"),
-    "refit": ("all", "all"),
-    "average": ("20", "20"),
-    "feedthrough": ("no", "no"),
-    "islands": ("3", 3),
-    "topology": ("ring", "ring"),
-    "migrate_every": ("2,5:3", "2,5:3"),
-    "migrants": ("2", "2"),
-    "emigrants": ("front", "front"),
-    "replaced": ("random", "random"),
-    "characters": ("plain,explorer", ["plain", "explorer"]),
-    "max_evaluations": ("100000", 100_000),
-    "target_error": ("0.001", 0.001),
-    "structure": ("free", "free"),
-    "fitness": ("shooting", "shooting"),
-    "high_level": ("0.4", 0.4),
-    "outer": ("0.6", 0.6),
-    "initial_terms": ("2,5", [2, 5]),
-    "initial_height": ("2", 2),
-    "library": ("polynomial", "polynomial"),
-    "library_degree": ("2", 2),
-    "library_lags": ("4", 4),
-    "swap_search": ("false", False),
-    "from_library": ("0.5", 0.5),
-    "refine": ("no", False),
-    "model_class": ("narx", "narx"),
-}
 
 
 # Submit.
@@ -91,19 +37,6 @@ def test_submitted_job_is_stored_and_printed_as_json(run: Run, service: Service,
         "preset",
         "seed",
     }  # options that are not given are not sent
-
-
-@pytest.mark.ci
-def test_all_settings_reach_the_job(run: Run, service: Service, owner: str) -> None:
-    assert set(VALUES) == {each.name for each in fields(Settings)}
-    given = [word for name, (text, _) in VALUES.items() for word in ("--set", f"{name}={text}")]
-    words = ("--seed", 9, "--dt", 0.01, "--rows", "0:150", "--json")
-    code, out, err = run("submit", "r.csv", *COLUMNS, *given, *words)
-    assert code == 0, err
-    spec = json.loads(out)["spec"]
-    assert {name: spec[name] for name in ("seed", "dt", "rows")} == {"seed": 9, "dt": 0.01, "rows": "0:150"}
-    assert spec["settings"] == {name: value for name, (_, value) in VALUES.items()}
-    assert Identification.model_validate(spec).changes.keys() == set(VALUES)
 
 
 # Discrepancy jobs.

@@ -54,17 +54,6 @@ def test_a_file_may_state_its_sampling(save, version, name, value):
     assert record.start == pytest.approx(0.04)
 
 
-@pytest.mark.parametrize("version", WITH_STRUCTURES)
-def test_a_vector_named_ts_does_not_state_the_sampling(save, version):
-    assert read_record(save(version, u=U, y=Y, ts=T, t=T), ["u"], "y").dt == pytest.approx(0.01)
-
-
-def test_a_signalling_nan_is_a_missing_value(save):
-    u = U.astype("f4")
-    u.view("u4")[17] = 0x7F800001
-    assert "r.mat, sample 17, column u is empty or NaN" in refusal(save("7", u=u, y=Y, Ts=0.1))
-
-
 # Matrices
 
 
@@ -124,11 +113,6 @@ def test_each_structure_has_its_own_time_and_sampling_time(save, version):
     )
     assert "0.02 s by column t and 0.25 s by array fourth.Ts" in message
     assert "0.5" not in message
-
-
-def test_a_field_that_may_be_a_time_in_an_unknown_unit_is_named(save):
-    message = refusal(save("7", run={"u": U, "y": Y, "t_weeks": T}), ["run.u"], "run.y")
-    assert "if run.t_weeks is the time, end its name in one of the units s, ms" in message
 
 
 # Unsupported classes

@@ -59,15 +59,6 @@ def test_a_name_a_number_and_a_unit_are_not_missing(word):
     assert not is_missing(word)
 
 
-def test_a_missing_input_is_refused_until_gaps_are_repaired(tmp_path):
-    path = write(tmp_path, ["OL", "Bad"], column=1)
-    with pytest.raises(RecordError, match="line 12, column u_V and 1 more of its cells"):
-        read_record(path, ["u_V"], "y_um")
-    record = read_record(path, ["u_V"], "y_um", gaps="split")
-    assert record.segments == (10, 48)
-    assert record.reading[0] == "column u_V: OL, Bad are read as missing in 2 cells, the first in line 12"
-
-
 def test_words_of_the_user_are_missing_values(tmp_path):
     path = write(tmp_path, ["Sensor 3 tot", "-9999", "-9999.00"])
     with pytest.raises(RecordError, match=r"'Sensor 3 tot' is not a number.*missing"):

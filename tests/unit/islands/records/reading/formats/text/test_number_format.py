@@ -1,12 +1,9 @@
 """Numbers of text tables: decimal marks and separated thousands, or a refusal with its remedy."""
 
-import time as clocks
-
 import numpy as np
 import pytest
 
 from islands.records.reading import preview, read_record
-from islands.records.reading.formats.text.number_format import is_number
 from support.bad_records import refusal
 
 VALUES = 1234.5 + 7.25 * np.arange(60)
@@ -62,19 +59,3 @@ def test_semicolons_tell_that_commas_are_decimal(tmp_path):
 def test_a_mark_that_contradicts_the_file_is_refused(tmp_path):
     message = refusal(tmp_path, table(["0.5", *"1" * 59]), ["u"], "y", decimal="comma")
     assert "line 2, column y (0.5) is not a number with the decimal mark ','" in message
-
-
-def recognition_seconds(cell):
-    """Return the least CPU time of several recognitions."""
-    times = []
-    for _ in range(5):
-        began = clocks.process_time()
-        is_number(cell)
-        times.append(clocks.process_time() - began)
-    return min(times)
-
-
-@pytest.mark.parametrize("unit", ["1", "1.", "1,234", "1e", " "])
-def test_a_long_cell_is_recognised_in_linear_time(unit):
-    # Time that grows with the square of the length is seconds here; the linear time is a millisecond.
-    assert recognition_seconds(unit * (8000 // len(unit)) + "x") < 0.05

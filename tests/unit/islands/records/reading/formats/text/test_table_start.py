@@ -1,6 +1,5 @@
 """The header of a table is found below a description of the measurement, and above a row of units."""
 
-import numpy as np
 import pytest
 
 from islands.errors import RecordError
@@ -62,28 +61,6 @@ def test_a_quote_in_the_header_that_is_never_closed_is_refused():
 def test_samples_without_a_header_are_refused():
     with pytest.raises(RecordError, match="line 3 is the first sample, and no line above has"):
         start("Motor 3", "x;y", *SAMPLES[:8])
-
-
-def test_an_instrument_file_is_read(tmp_path):
-    path = tmp_path / "logger.csv"
-    path.write_text("\n".join(["Logger 7", "rate: 100 Hz", "", "t;u;y", "s;V;um", *SAMPLES]))
-    record = read_record(path, "u [V]", "y [um]")
-    assert (record.dt, record.input_units, record.output_unit) == (pytest.approx(0.01), ("V",), "um")
-    np.testing.assert_array_equal(record.y, np.arange(60) % 11)
-    warnings = preview(path).warnings
-    assert "the header of logger.csv is line 4; the lines above are ignored" in warnings
-    assert "line 5 of logger.csv is read as the units of the columns" in warnings
-    path.write_text(path.read_text().replace("0.02;2;2", "0.02;x;2"))
-    with pytest.raises(RecordError, match=r"logger\.csv, line 8, column u \[V\]"):
-        read_record(path, "u [V]", "y [um]")
-
-
-@pytest.mark.parametrize("time", ["t/s", "Zeit [s]", "Time (s)", "zeit_s", "t [s]"])
-def test_common_names_of_the_time_are_read(tmp_path, time):
-    path = tmp_path / "named.csv"
-    path.write_text("\n".join([f"{time};U_1/mV;v_m/s", *SAMPLES]))
-    record = read_record(path, "U_1/mV", "v_m/s")
-    assert (record.dt, record.input_units, record.output_unit) == (pytest.approx(0.01), ("mV",), "m/s")
 
 
 @pytest.mark.parametrize("above", [(), ("Motor 3", "")])

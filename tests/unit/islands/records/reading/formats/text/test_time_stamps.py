@@ -51,11 +51,6 @@ def test_a_common_form_gives_elapsed_seconds_across_midnight(tmp_path, form):
     assert (record.start, record.samples) == (0.0, SAMPLES)
 
 
-def test_nanoseconds_since_a_date_are_exact(tmp_path):
-    stamps = [f"2026-11-22T14:05:03.{k * 100:09d}Z" for k in range(SAMPLES)]
-    assert read(tmp_path, table(stamps)).dt == pytest.approx(1e-7, rel=1e-9)
-
-
 def test_days_without_a_proof_of_their_order_are_refused_unless_it_is_given(tmp_path):
     rows = table(moment.strftime("%d/%m/%Y") for moment in moments(datetime(2026, 3, 4), 86400.0, 9))
     assert "column Timestamp: 04/03/2026 may be the day 04 of the month 03" in refusal(
