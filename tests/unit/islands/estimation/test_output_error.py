@@ -74,6 +74,21 @@ def test_model_has_a_constant_only_if_the_output_has_an_offset():
         )
 
 
+def test_models_far_from_zero_do_not_depend_on_the_zero():
+    record = make_record(2, [0.3], [1.0, -0.9], 0.05)
+    fits = [
+        # In the first units, the law of gain 3 needs no constant.
+        fit_output_error(replace(record, y=record.y + y, u=record.u + u))
+        for y, u in ((3000.0, 1000.0), (-2000.0, 500.0))
+    ]
+    assert [each.model.parameter_names for each in fits[0]] == [
+        each.model.parameter_names for each in fits[1]
+    ]
+    for one, other in zip(*fits, strict=True):
+        assert one.residual_variance == pytest.approx(other.residual_variance, rel=1e-6)
+        assert "1" in one.model.parameter_names
+
+
 def test_initial_states_differ_between_segments():
     parts = [make_tank(seed, 120) for seed in range(4)]
     record = join(tuple(replace(part, y=part.y + 5.0 * place) for place, part in enumerate(parts)))
