@@ -374,7 +374,7 @@ def _select(
             is_given = len(searches) <= len(subsets)
             started.append(subsets[len(searches) - 1] if is_given else searches[-1].structures)
             starts += started[-1]
-        exchanged = select_pool(pool, problem, settings.max_terms)
+        exchanged = select_pool(problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
         structures += [(structure, offsets) for structure in chosen]
     return list(dict.fromkeys(structures)), tuple(searches), tuple(started), warm_up
