@@ -265,7 +265,7 @@ def answer(table: Table, find: Callable[..., Any], folder: Path) -> Answer:
     choice = found.search_result.settings.get("choice") or {}
     errors = [found.best.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
     kind = f"{type(found.best.model).__name__} {choice.get('kind', '')} {choice.get('delays', '')}"
-    return Answer(kind, tuple(error / np.ptp(table.y) for error in errors), found.best.equation)
+    return Answer(kind, tuple(error / (np.ptp(table.y) or 1.0) for error in errors), found.best.equation)
 
 
 def compare(first: Answer, second: Answer, resolution: float) -> str:
@@ -286,7 +286,7 @@ def run_case(case: Case, folder: Path) -> tuple[str, str]:
     except Exception:
         return "traceback", traceback.format_exc()
     # Text of d digits resolves 10^(1-d) of the largest value; a free run accumulates some of these roundings.
-    largest = float(np.abs(case.transformed.y).max() / np.ptp(case.transformed.y))
+    largest = float(np.abs(case.transformed.y).max() / (np.ptp(case.transformed.y) or 1.0))
     resolution = largest * 10.0 ** (1 - min(case.transformed.digits, 15))
     return compare(first, second, resolution), f"  {first}\n  {second}"
 

@@ -202,9 +202,21 @@ def test_the_candidates_of_a_search_do_not_follow_rounding():
     terms = library("polynomial", 3, inputs=3)
 
     def select(record):
-        return select_pool(terms, make_selection_problem(terms, record), 10)
+        return select_pool(make_selection_problem(terms, record), 10)
 
     pool = select(Dataset(u, y, 0.1))
     assert len(pool) == MAX_POOL < len(terms)
     assert select(Dataset(np.round(u, 7), np.round(y, 7), 0.1)) == pool
     assert select(Dataset(1e9 * u, 1e-6 * y, 0.1)) == pool
+
+
+def test_of_equal_columns_the_simplest_is_the_candidate():
+    """The sign of a positive output is a constant: rounding must not choose between them."""
+    u = white(200, 0)
+    record = Dataset(u, 5.0 + narx(u, 0.01, 0), 0.1)
+    problem = make_selection_problem(candidates("friction", 2, LAGS, 1), record)
+    free = texts(item for direction in problem.free for item in direction.regressors)
+    assert {"1", "sign(y(k-1) - y(k-2))", "sign(u(k-1) - u(k-2))"} <= set(free)
+    assert "sign(y(k-1))" not in free
+    assert "y(k-1)*sign(y(k-1))" not in free
+    assert len(problem.gram) == len(free) + 1

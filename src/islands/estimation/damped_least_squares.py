@@ -115,15 +115,25 @@ class Minimisation:
 
 
 def find_directions(
-    theta: NDArray[np.float64], constrained: Constrained
+    theta: NDArray[np.float64], constrained: Constrained, scale: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64] | EvaluationOutcome:
     """Return the directions along which the constraints hold, shape (terms, free); INFEASIBLE without any.
 
-    Each parameter is scaled by its magnitude: the magnitudes differ by many orders.
+    Parameters
+    ----------
+    theta : ndarray, shape (terms,)
+    constrained : Constrained
+    scale : ndarray, shape (terms, terms), optional
+        Steps of similar size, one for each column; by default those of `scale_parameters`.
     """
-    unit = np.where(theta == 0.0, 1.0, np.abs(theta))
-    found = null_space(constrained.S * unit, constrained.c)
-    return found if isinstance(found, EvaluationOutcome) else unit[:, None] * found[1]
+    scale = np.diag(scale_parameters(theta)) if scale is None else scale
+    found = null_space(constrained.S @ scale, constrained.c)
+    return found if isinstance(found, EvaluationOutcome) else scale @ found[1]
+
+
+def scale_parameters(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the magnitudes of parameters, which differ by many orders; 1 for a parameter that is 0."""
+    return np.where(theta == 0.0, 1.0, np.abs(theta))
 
 
 def approximate_jacobian(

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from islands.estimation.constraints.conditions import Direction
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.froe import froe
+from islands.expressions.tree import walk
 from islands.models.narx import canonical_order
 from islands.models.regressor import Regressor
 from islands.program.regressor_matrix import gram_matrix
 from islands.records.dataset import Dataset
-from islands.rounding import ROUNDING
+from islands.rounding import RESOLUTION, ROUNDING
 from islands.simulation.outcome import EvaluationOutcome
 
 Structure = tuple[Regressor, ...]
@@ -37,7 +38,8 @@ class SelectionProblem:
     fixed : tuple of Regressor
         Regressors of every model.
     free : tuple of Direction
-        Candidates. Ties go to the first.
+        Candidates, the simplest first; ties go to the first. Of candidates that are multiples of each other
+        on the record, the first one.
     gram : ndarray, shape (candidates + 1, candidates + 1)
         Inner products of the candidates and, last, the target.
     rows : int
@@ -66,11 +68,30 @@ def make_selection_problem(
     if isinstance(found, EvaluationOutcome):
         return found
     warm_up = max(item.maximum_lag for item in library)
-    # Ties go to the first candidate: take the one of the lowest degree.
-    free = sorted(found.free, key=lambda direction: max(item.degree for item in direction.regressors))
+    free = sorted(found.free, key=_measure_complexity)
     gram = gram_matrix([*(direction.expression for direction in free), found.target], record, warm_up)
+    kept = _find_distinct(gram[:-1, :-1])
+    places = np.append(kept, len(free))
     rows = sum(max(0, length - warm_up) for length in record.segments)
-    return SelectionProblem(found.fixed, tuple(free), gram, rows)
+    return SelectionProblem(
+        found.fixed, tuple(free[place] for place in kept), gram[np.ix_(places, places)], rows
+    )
+
+
+def _measure_complexity(direction: Direction) -> tuple[int, int]:
+    """Return the degree of a candidate, and the size of its expression."""
+    return max(item.degree for item in direction.regressors), sum(1 for _ in walk(direction.expression))
+
+
+def _find_distinct(gram: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the candidates that are not a multiple of an earlier one on the record.
+
+    Rounding would choose between a constant and the sign of a positive output.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        norms = np.sqrt(np.diag(gram))
+        is_multiple = 1.0 - (gram / norms[:, None] / norms) ** 2 <= RESOLUTION**2
+    return np.flatnonzero(~np.triu(is_multiple, 1).any(axis=0))
 
 
 def forward_selection(
@@ -125,17 +146,16 @@ def select_forward(
     return tuple(structures)
 
 
-def select_pool(
-    library: Sequence[Regressor], problem: SelectionProblem, max_terms: int
-) -> Sequence[Regressor]:
+def select_pool(problem: SelectionProblem, max_terms: int) -> Sequence[Regressor]:
     """Return the regressors for a search by exchange.
 
-    They are the library or, if it has more than `MAX_POOL`, the largest structure of forward selection and
-    the candidates that would reduce its error most. Further steps of the selection would follow the rounding
-    of the record: a few hundred rows are explained by fewer terms than the pool has.
+    They are those of the candidates or, if these are more than `MAX_POOL`, the largest structure of forward
+    selection and the candidates that would reduce its error most. Further steps of the selection would follow
+    the rounding of the record: a few hundred rows are explained by fewer terms than the pool has.
     """
-    if len(library) <= MAX_POOL:
-        return library
+    candidates = dict.fromkeys(item for direction in problem.free for item in direction.regressors)
+    if len(candidates | dict.fromkeys(problem.fixed)) <= MAX_POOL:
+        return canonical_order([*problem.fixed, *candidates])
     chosen = froe(problem.gram, max_terms=max_terms).order
     pool: dict[Regressor, None] = dict.fromkeys(problem.compose(chosen))
     for at in _rank_by_gain(problem.gram, chosen):

@@ -106,7 +106,9 @@ class LinearProblem:
         return replace(self, columns=self.columns.take(rows, axis=1), y=self.y[rows], ends=ends)
 
     def with_constant(self) -> "LinearProblem":
-        """Return the problem with a constant."""
+        """Return the problem with a constant; the problem itself if it has one."""
+        if self.has_constant:
+            return self
         columns = np.vstack([self.columns, np.ones(self.y.size)])
         return replace(self, terms=(*self.terms, Constant(1.0)), columns=columns)
 

@@ -30,6 +30,7 @@ from islands.estimation.linear_simulation import (
     minimise,
     solve,
 )
+from islands.estimation.structure_selection.deviations import LARGE_OFFSET, find_offsets
 from islands.expressions.tree import Expression, Lagged
 from islands.kernels.linear_filter import divide_rows
 from islands.models.narx import Model, make_model
@@ -75,18 +76,23 @@ def fit_output_error(
     Returns
     -------
     list of FittedStructure
-        Difference equations of x, one for each order at most, with a constant if it reduces the information
-        criterion of Schwarz. Orders after two that do not reduce it are left out, also those whose error is
-        much larger than the least. After them, of the models that minimise a whitened residual the one with
-        the least criterion, if the residual is coloured; its residual variance is that of the whitened one.
+        Difference equations of x, one for each order at most, with a constant if the signals are far from
+        zero or if it reduces the information criterion of Schwarz. Orders after two that do not reduce the
+        criterion are left out, also those whose error is much larger than the least. After them, of the
+        models that minimise a whitened residual the one with the least criterion, if the residual is
+        coloured; its residual variance is that of the whitened one.
     """
     record = record[:_LARGEST_SAMPLES]
     late = tuple(delays) or (0,) * record.inputs
+    # The constant that an offset requires belongs to the unit, not to the law.
+    is_far = any(find_offsets(record, least=LARGE_OFFSET))
     found: list[LinearSimulation] = []
     least, failed = inf, 0
     for order in range(1, min(_LARGEST_ORDER, lags) + 1):
         problem = make_problem(record, order, late, lags)
-        best = _fit_order(problem, max_terms) if problem else None
+        if problem and is_far:
+            problem = problem.with_constant()
+        best = _fit_order(problem, max_terms + is_far) if problem else None
         failed = 0 if best and best.criterion < least else failed + 1
         if best:
             found.append(best)
@@ -174,7 +180,7 @@ def _fit_order(problem: LinearProblem, max_terms: int) -> LinearSimulation | Non
     if found is not None:
         return found
     fits = []
-    for each in (problem, problem.with_constant()):
+    for each in dict.fromkeys((problem, problem.with_constant())):
         start = find_start(each) if each.is_determined and len(each.terms) <= max_terms else None
         if start is not None:
             fits.append(minimise(start, _MIN_GAIN))

@@ -18,6 +18,7 @@ from islands.estimation.damped_least_squares import (
     Minimisation,
     find_directions,
     mean_square,
+    scale_parameters,
 )
 from islands.estimation.parameter_constraints import constrain_model
 from islands.estimation.shooting_residual import (
@@ -27,10 +28,13 @@ from islands.estimation.shooting_residual import (
     make_free_run_residual,
     make_residual,
 )
+from islands.expressions.tree import Constant, Lagged
 from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.records.compatibility import match_record
 from islands.records.coupled import AnyRecord, CoupledRecord, match_coupled
+from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 
@@ -189,7 +193,7 @@ def begin_refinement(
     else:
         record = match_record(cast("DynamicModel", model), record)
     theta = np.array(model.parameters)
-    directions = find_directions(theta, constrained)
+    directions = find_directions(theta, constrained, _scale_steps(model, record))
     if isinstance(directions, EvaluationOutcome):
         return directions
     free = make_free_run_residual(model, record, warm_up) if interval is None else None
@@ -206,3 +210,21 @@ def begin_refinement(
         lambda values: constrained.has_signs(values[:terms]),
     )
     return Refinement(model, residual, minimisation, directions)
+
+
+def _scale_steps(model: AnyModel, record: AnyRecord) -> NDArray[np.float64]:
+    """Return steps of similar size, one for each column, shape (terms, terms).
+
+    The steps of a model with a constant turn about the mean of the record, so that their damping does not
+    depend on the zeros of the units.
+    """
+    scale = np.diag(scale_parameters(np.array(model.parameters)))
+    if isinstance(model, Model) and isinstance(record, Dataset):
+        means = np.mean(np.vstack([record.y, record.u.T]), axis=1)
+        expressions = [item.expression for item in model.regressors]
+        for constant in (place for place, each in enumerate(expressions) if isinstance(each, Constant)):
+            for place, each in enumerate(expressions):
+                if isinstance(each, Lagged):
+                    scale[constant, place] = -scale[place, place] * means[each.channel]
+            scale[constant, constant] = np.std(record.y) or 1.0
+    return scale

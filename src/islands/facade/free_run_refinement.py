@@ -15,7 +15,9 @@ import numpy as np
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import LEAST_SQUARES, SIGNIFICANT, refinement_criterion
 from islands.estimation.refinement import refine
+from islands.estimation.structure_selection.deviations import LARGE_OFFSET, find_offsets
 from islands.evolution.search_result import SearchResult, keep_best_of_sizes
+from islands.expressions.tree import Constant
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
@@ -68,6 +70,7 @@ def refine_models(
         All models that were refined; none if the given result is returned.
     """
     record = found.split.estimation
+    is_far = any(find_offsets(record, constraints, LARGE_OFFSET))
 
     def refine_one(model: DynamicModel) -> Assessment | None:
         if steps.skip(REFINEMENT):
@@ -78,7 +81,7 @@ def refine_models(
         return assess(refined.model, found.split, shooting, warm_up, constraints, _FREE_RUN)
 
     def eliminate(entry: Assessment | None) -> Iterator[Assessment]:
-        while entry and (kept := _keep_significant(entry)):
+        while entry and (kept := _keep_significant(entry, is_far)):
             start = estimate(kept, record, constraints, warm_up, standard_errors=False)
             entry = None if isinstance(start, EvaluationOutcome) else refine_one(start.model)
             if entry:
@@ -109,15 +112,18 @@ def _add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResu
     return replace(found, models=keep_best_of_sizes((*found.models, *models)))
 
 
-def _keep_significant(entry: Assessment) -> tuple[Regressor, ...]:
+def _keep_significant(entry: Assessment, is_far: bool) -> tuple[Regressor, ...]:
     """Return the regressors of a refined model without the least significant one.
 
-    Empty if every parameter is significant, or if the parameters are not refined.
+    The constant of signals that are far from zero belongs to the unit, not to the law. Empty if every other
+    parameter is significant, or if the parameters are not refined.
     """
     model = entry.model
     if entry.criterion != _FREE_RUN or not isinstance(model, Model) or model.standard_errors is None:
         return ()
     errors = np.array(model.standard_errors)
+    if is_far:
+        errors[[isinstance(item.expression, Constant) for item in model.regressors]] = 0.0
     # The parameter of an exact equation has no error.
     ratios = np.full(model.size, inf)
     np.divide(np.abs(model.parameters), errors, out=ratios, where=errors > 0.0)

@@ -49,6 +49,7 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.candidate_library import full_set
+from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
@@ -126,6 +127,15 @@ class LibraryFit:
         """Return the fit with further settings in its result."""
         settings = {**self.found.settings, **further}
         return replace(self, found=replace(self.found, settings=settings))
+
+    def is_within(self, library: TrialLibrary) -> bool:
+        """Return whether a library, at the rate of the record, has all terms of the recommended model."""
+        record, model = self.found.split.estimation, self.found.recommended.model
+        pool = library.at_rate(self.average).screen(record)
+        return isinstance(model, Model) and any(
+            set(model.regressors).issubset(add_offsets(pool, offsets))
+            for offsets in _list_offsets(record, library.constraints)
+        )
 
     def complete(self) -> SearchResult:
         """Return the result with certificates and prediction bands.
@@ -349,15 +359,12 @@ def _select(
     steps: Steps,
 ) -> tuple[list[tuple[Structure, Offsets]], tuple[SubsetSearch, ...], tuple[Subsets, ...], int]:
     """Return structures with the offsets of their signals, searches, their subsets, and the largest lag."""
-    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
-    # in deviations from it. The validation data tell which one holds.
     record, constraints = split.estimation, settings.constraints
-    tried = [find_offsets(record, constraints, limit) for limit in (LARGE_OFFSET, 0.0)]
     structures: list[tuple[Structure, Offsets]] = []
     searches: list[SubsetSearch] = []
     started: list[Subsets] = []
     warm_up = 0
-    for offsets in dict.fromkeys(tried):
+    for offsets in _list_offsets(record, constraints):
         deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
         pool = library.screen(deviations.estimation)
         warm_up = max(item.maximum_lag for item in pool)
@@ -374,10 +381,20 @@ def _select(
             is_given = len(searches) <= len(subsets)
             started.append(subsets[len(searches) - 1] if is_given else searches[-1].structures)
             starts += started[-1]
-        exchanged = select_pool(pool, problem, settings.max_terms)
+        exchanged = select_pool(problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
         structures += [(structure, offsets) for structure in chosen]
     return list(dict.fromkeys(structures)), tuple(searches), tuple(started), warm_up
+
+
+def _list_offsets(record: Dataset, constraints: str) -> Sequence[Offsets]:
+    """Return the offsets with which structures are selected.
+
+    A law in the units of the record has fewer terms there, a law around an operating point has fewer terms in
+    deviations from it. The validation data tell which one holds.
+    """
+    found = (find_offsets(record, constraints, limit) for limit in (LARGE_OFFSET, 0.0))
+    return list(dict.fromkeys(found))
 
 
 def _search_swaps(

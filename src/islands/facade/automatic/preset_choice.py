@@ -12,7 +12,7 @@ from islands.facade.automatic.kind_choice import Choice, choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
 from islands.facade.fit_settings import FitSettings
 from islands.facade.library_fit import LibraryFit, fit_library
-from islands.facade.trials.library import make_trial_library, take_library
+from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import Split, split_data
@@ -98,4 +98,18 @@ def fit_chosen_library(
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
     choice, fits = choose_kind(split.estimation, libraries, settings.delays, fit_one, Steps(progress, stop))
     chosen = fits.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
-    return chosen.with_settings(choice=choice.to_document())
+    return chosen.with_settings(choice=_name_by_model(choice, libraries, chosen).to_document())
+
+
+def _name_by_model(choice: Choice, libraries: Mapping[str, TrialLibrary], fit: LibraryFit) -> Choice:
+    """Return the choice with the first kind whose library has all terms of the recommended model.
+
+    A larger library may be the only one in which a search finds a model of a smaller one.
+    """
+    for kind, library in libraries.items():
+        if kind == choice.kind:
+            break
+        if fit.is_within(library.with_delays(choice.delays)):
+            sentence = f"Its recommended model has terms of {kind} alone."
+            return replace(choice, kind=kind, reasons=(*choice.reasons, sentence))
+    return choice

@@ -372,7 +372,11 @@ def _find_caused(firsts: NDArray[np.int64], u: Signal) -> set[int]:
 
 
 def _find_stuck(y: Signal, u: Signal) -> tuple[tuple[int, int], ...]:
-    """Return the parts of a noisy output in which it is exactly constant, within its range, under motion."""
+    """Return the parts of a noisy output in which it is exactly constant, within its range, under motion.
+
+    The output at rest is constant, too, until it responds to the first motion: motion in the last samples of
+    a part does not count.
+    """
     increments = np.diff(y)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], increments == 0.0, [False]]).astype(np.int8)))
     runs = [(int(first), int(last) + 1) for first, last in edges.reshape(-1, 2)]
@@ -389,7 +393,7 @@ def _find_stuck(y: Signal, u: Signal) -> tuple[tuple[int, int], ...]:
     return tuple(
         (first, last)
         for first, last in stuck
-        if y[first] not in extremes and bool((np.ptp(u[first:last], axis=0) > least).any())
+        if y[first] not in extremes and bool((np.ptp(u[first : last - _LAGS], axis=0) > least).any())
     )
 
 

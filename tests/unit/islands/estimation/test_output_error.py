@@ -67,6 +67,21 @@ def test_model_has_a_constant_only_if_the_output_has_an_offset():
         )
 
 
+def test_models_far_from_zero_do_not_depend_on_the_zero():
+    record = make_record(2, [0.3], [1.0, -0.9], 0.05)
+    fits = [
+        # In the first units, the law of gain 3 needs no constant.
+        fit_output_error(replace(record, y=record.y + y, u=record.u + u))
+        for y, u in ((3000.0, 1000.0), (-2000.0, 500.0))
+    ]
+    assert [each.model.parameter_names for each in fits[0]] == [
+        each.model.parameter_names for each in fits[1]
+    ]
+    for one, other in zip(*fits, strict=True):
+        assert one.residual_variance == pytest.approx(other.residual_variance, rel=1e-6)
+        assert "1" in one.model.parameter_names
+
+
 def test_dead_times_shift_the_lags_of_their_inputs():
     random = np.random.default_rng(4)
     u = np.repeat(random.uniform(-1.0, 1.0, (200, 2)), 4, axis=0)

@@ -111,6 +111,35 @@ def test_model_without_free_directions_is_unchanged():
     assert found.before == found.after
 
 
+def test_steps_do_not_depend_on_the_zeros_of_the_units():
+    record = make_record({"y(k-1)": 0.7, "u(k-1)": 0.5, "u(k-2)": 0.2}, noise=0.05)
+    found = []
+    for offset in (50.0, 3000.0):
+        shifted = replace(record, y=record.y + offset, u=record.u + 10.0 * offset)
+        # The constant of the unit: y rests where 0.8 (y - offset) = 0.6 (u - 10 offset).
+        terms = {"y(k-1)": 0.2, "u(k-1)": 0.6, "1": 0.8 * offset - 6.0 * offset}
+        found.append(refine(model(terms), shifted, None, max_steps=2, standard_errors=False))
+    assert found[0].after == pytest.approx(found[1].after, rel=1e-6)
+    assert found[0].model.parameters[0] == pytest.approx(found[1].model.parameters[0], rel=1e-6)
+
+
+def test_standard_errors_match_a_monte_carlo():
+    """With measurement noise only, compare the standard errors with the spread over 60 records."""
+    clean = make_record(HYSTERESIS, samples=400)
+    rng = np.random.default_rng(12)
+    found = []
+    for _ in range(60):
+        # The first two samples, the initial values of a run, are free of noise.
+        noise = np.where(np.arange(400) < 2, 0.0, 0.02 * rng.normal(size=400))
+        found.append(refine_model(model(HYSTERESIS), replace(clean, y=clean.y + noise), None).model)
+    spread = np.std([each.parameters for each in found], axis=0)
+    predicted = np.mean([each.standard_errors for each in found], axis=0)
+    # The standard deviation of 60 draws has a relative error of 9 %; allow three times that.
+    assert predicted == pytest.approx(spread, rel=0.28)
+    mean = np.mean([each.parameters for each in found], axis=0)
+    assert np.all(np.abs(mean - model(HYSTERESIS).parameters) < 4 * predicted / np.sqrt(60))
+
+
 @pytest.mark.parametrize("interval", [30, None])
 def test_jacobian_matches_higher_order_finite_differences(interval):
     record = make_record(HYSTERESIS, noise=0.02)

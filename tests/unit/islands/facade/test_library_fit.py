@@ -1,10 +1,14 @@
-"""Fit of one library: the certificates are those of a fit that starts from their subsets."""
+"""Fit of one library: its certificates, and the libraries to which its model belongs."""
 
 from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
 
 from islands.facade.fit_settings import FitSettings
 from islands.facade.library_fit import fit_library
 from islands.facade.trials.library import take_library
+from islands.records.dataset import Dataset
 from islands.records.split import split_data
 from support.portfolio_records import KINDS
 
@@ -26,3 +30,15 @@ def test_a_better_subset_of_the_certificates_is_fitted():
     assert certified != list(fit.subsets[0])
     assert [each.model for each in complete.models] == [each.model for each in again.found.models]
     assert replace(again, refit=None).complete().search.certificates == complete.search.certificates
+
+
+def test_a_model_is_within_each_library_that_has_its_terms():
+    rng = np.random.default_rng(0)
+    u = rng.uniform(2.0, 3.0, 200)
+    y = lfilter([0.0, 0.2], [1.0, -0.8], u) + 7.0
+    record = Dataset(u, y + 1e-3 * rng.standard_normal(200), 0.1)
+    settings = FitSettings(max_terms=3, certificate=0, estimator="least-squares", average=1)
+    library = take_library("magnitude", 1, 1, None)
+    fit = fit_library(record, split_data(record, 0.25), library, settings)
+    assert fit.is_within(take_library("polynomial", 1, 1, None))
+    assert not fit.is_within(take_library("phi-polynomial", 2, 2, None))

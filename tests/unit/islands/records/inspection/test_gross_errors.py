@@ -40,6 +40,14 @@ def test_a_part_with_a_stuck_sensor_is_found():
     assert found(y, u).stuck == ((600, 660),)
 
 
+def test_an_output_that_rests_until_it_responds_to_an_input_is_not_stuck():
+    u = stepped()
+    u[600:700] = u[700] - 5.0
+    y = lagged(u)
+    y[650:701] = y[650]
+    assert not found(y, u).samples.size
+
+
 def pulses():
     u = np.zeros(3000)
     u[[300, 301, 900, 901, 1500, 1501, 2200]] = 1.0
