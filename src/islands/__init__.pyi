@@ -10,7 +10,7 @@ from islands.errors import ModelError as ModelError
 from islands.errors import RecordError as RecordError
 from islands.errors import SettingsError as SettingsError
 from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
-from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
+from islands.evolution.migration import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
 from islands.expressions.parsing import parse as parse
