@@ -24,7 +24,7 @@ _PUBLIC = {
     "effects.interface.effect": ("Effect", "Site"),
     "errors": ("ExtrapolationWarning", "IslandsError", "ModelError", "RecordError", "SettingsError"),
     "estimation.estimator_table": ("ESTIMATORS",),
-    "evolution.migration.topology": ("TOPOLOGIES",),
+    "evolution.migration": ("TOPOLOGIES",),
     "evolution.presets": ("PRESETS",),
     "evolution.settings": ("Settings",),
     "expressions.parsing": ("parse",),
