@@ -69,12 +69,7 @@ class AuditEntry:
 
 
 class AuditTrail:
-    """Read access to the audit trail.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Read access to the audit trail."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

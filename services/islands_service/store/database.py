@@ -81,12 +81,7 @@ class StorageFullError(StoreError):
 
 
 class Database:
-    """A database by its URL: ``sqlite:////path/islands.db`` or ``postgresql+psycopg://...``.
-
-    Parameters
-    ----------
-    url : str
-    """
+    """A database by its URL: ``sqlite:////path/islands.db`` or ``postgresql+psycopg://...``."""
 
     def __init__(self, url: str) -> None:
         self.url = url

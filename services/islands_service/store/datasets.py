@@ -73,12 +73,7 @@ class StoredDataset:
 
 
 class Datasets:
-    """Data set operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Data set operations of the store."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

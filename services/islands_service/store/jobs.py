@@ -135,12 +135,7 @@ class JobRows:
 
 
 class Jobs:
-    """Job operations of the store, used by the REST API on behalf of owners.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Job operations of the store, used by the REST API on behalf of owners."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -69,12 +69,7 @@ class Key:
 
 
 class Keys:
-    """Key operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Key operations of the store."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -93,12 +93,7 @@ GAVE_UP = {
 
 
 class Leases:
-    """Lease operations of the store, used by coordinators.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Lease operations of the store, used by coordinators."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -88,12 +88,7 @@ class MonitorStatistics:
 
 
 class Monitors:
-    """Monitor operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Monitor operations of the store."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

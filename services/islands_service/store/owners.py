@@ -28,12 +28,7 @@ class OwnerNotFoundError(IslandsError):
 
 
 class Owners:
-    """Owner operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Owner operations of the store."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -23,12 +23,7 @@ class StoredModel:
 
 
 class Results:
-    """Result operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Result operations of the store."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

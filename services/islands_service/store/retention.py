@@ -29,12 +29,7 @@ def _change_datasets(order: Update, owner: str, connection: Connection) -> int:
 
 
 class Retention:
-    """Retention operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Retention operations of the store."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -52,12 +52,7 @@ _DUE_WEBHOOKS = select(webhooks).where(
 
 
 class Webhooks:
-    """Webhook operations of the store, used by the REST API on behalf of owners.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Webhook operations of the store, used by the REST API on behalf of owners."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -201,12 +196,7 @@ def queue_event(connection: Connection, event: str, owner: str, job: str, body: 
 
 
 class Deliveries:
-    """Delivery operations of the store, used by the process that sends.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """Delivery operations of the store, used by the process that sends."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -5,16 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from islands.effects.filters import low_pass
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    Formula,
-    FormulaQuantity,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Formula, FormulaQuantity, MapEquation, Site
 from islands.records.segments import is_resting
 
 #: Largest step before the first sample, times the fraction that creeps, relative to the largest output.

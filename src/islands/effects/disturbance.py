@@ -7,8 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.effects.channels import CHANNEL_NOTE, channel, channel_range, channel_unit, has_channel
-from islands.effects.interface.context import LINE_WIDTH, Parameter, compute_spectrum, find_single_frequency
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import (
+    LINE_WIDTH,
+    Parameter,
+    Signal,
+    SimulationContext,
+    compute_spectrum,
+    find_single_frequency,
+)
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 
 #: Error of the frequency of a line in the spectrum, relative to the resolution.
 LINE_ERROR = 0.1

@@ -3,8 +3,8 @@
 from math import tanh
 from typing import Any
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, Site
 
 
 def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:

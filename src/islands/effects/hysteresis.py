@@ -4,16 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    ForceLaw,
-    Formula,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, MapEquation, Site
 from islands.kernels.memory_operators import jumper, play_from, slider
 from islands.records.segments import MAX_RANGE_AT_REST
 

@@ -5,15 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import (
     Effect,
     EffectTemplate,
     Formula,
     FormulaQuantity,
     MapEquation,
-    Signal,
-    SimulationContext,
     Site,
 )
 from islands.effects.interface.force import ForceLaw

@@ -7,16 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    ForceLaw,
-    Formula,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, MapEquation, Site
 
 #: Least number of periods of cogging within the range of the position; fewer are a static curve.
 MIN_COGGING_PERIODS = 3

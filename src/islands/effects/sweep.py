@@ -6,8 +6,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from islands.effects.interface.context import LINE_WIDTH, Parameter
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import LINE_WIDTH, Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 
 #: Largest length of the first windows, in samples.
 WINDOW = 512

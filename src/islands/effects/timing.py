@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from islands.effects.filters import low_pass
-from islands.effects.interface.context import Parameter, find_single_frequency
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import Parameter, Signal, SimulationContext, find_single_frequency
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 from islands.kernels.lagrange import interpolate_at
 from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import lag_by_gap, limit_rate

@@ -10,7 +10,7 @@ import scipy
 import islands
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json
 from islands.simulators.external import RecordedOutput
