@@ -285,6 +285,13 @@ class Database:
         return results
 
 
+class DatabaseOperations:
+    """Group of operations on a database; see `islands_service.store.operations.Store`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+
 def ignore_duration(_seconds: float) -> None:
     """Do nothing with the duration of a write; the default of observers."""
 

@@ -38,7 +38,7 @@ from islands_service.domain.job import (
     Renewal,
 )
 from islands_service.store import dialect
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.fair_queue import (
     QueuePlace,
@@ -92,11 +92,8 @@ GAVE_UP = {
 }
 
 
-class Leases:
+class Leases(DatabaseOperations):
     """Lease operations of the store, used by coordinators."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def claim(
         self,
