@@ -10,7 +10,8 @@ from islands.diagnosis.calibration.preparation import select_effects
 from islands.diagnosis.detectability import STRENGTHS, Injection
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.diagnosis.result import Diagnosis
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 from islands.records.dataset import Dataset
 from islands.records.noise_model import NoiseModel, fit_noise
 from islands.records.segments import count_runs

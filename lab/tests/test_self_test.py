@@ -11,7 +11,8 @@ from islands.diagnosis.detectability import NOTHING, STRENGTHS, Injection, SelfT
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Candidate, Diagnosis
-from islands.effects.interface.effect import Effect, Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
+from islands.effects.interface.effect import Effect
 from islands.records.noise_model import fit_noise
 from islands.simulators.external import RecordedOutput
 from lab.diagnosis.injection.measurement import inject

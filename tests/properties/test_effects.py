@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import SimulationContext, Site
+from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.effect import Site
 from islands.simulators.extended import ExtendedSimulator
 from support.built_in_simulators import make_piezo
 

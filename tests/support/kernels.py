@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import SimulationContext
+from islands.effects.interface.context import SimulationContext
 from islands.facade.identify import identify_record
 from islands.simulators.extended import ExtendedSimulator
 from support.built_in_simulators import make_piezo

@@ -13,7 +13,8 @@ from islands.diagnosis.planning.experiment_setup import make_experiment
 from islands.diagnosis.planning.pair_separation import CausePair
 from islands.diagnosis.planning.response_dictionary import ResponseDictionary
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 from islands.records.dataset import Dataset
 from islands.records.noise_model import NoiseModel
 from islands.simulators.external import PythonFunctionSimulator

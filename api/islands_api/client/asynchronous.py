@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from http import HTTPStatus
 from math import inf
 from time import monotonic
-from types import TracebackType
 
 import httpx
 
@@ -34,12 +33,7 @@ class AsyncClient(BaseClient[httpx.AsyncClient]):
     async def __aenter__(self) -> "AsyncClient":
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_error: object) -> None:
         await self.close()
 
     async def call(self, call: RequestSpec[T], until: float = inf) -> T:

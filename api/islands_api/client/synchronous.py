@@ -5,7 +5,6 @@ from contextlib import ExitStack
 from http import HTTPStatus
 from math import inf
 from time import monotonic, sleep
-from types import TracebackType
 
 import httpx
 
@@ -52,12 +51,7 @@ class Client(BaseClient[httpx.Client]):
     def __enter__(self) -> "Client":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def call(self, call: RequestSpec[T], until: float = inf) -> T:

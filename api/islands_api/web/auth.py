@@ -65,12 +65,7 @@ class Principal:
 
 
 class KeyCache:
-    """Cache of recently used keys.
-
-    Parameters
-    ----------
-    state : AppState
-    """
+    """Cache of recently used keys."""
 
     def __init__(self, state: AppState) -> None:
         self._state = state

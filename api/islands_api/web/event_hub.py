@@ -43,13 +43,7 @@ class JobFeed:
 
 
 class JobEventHub:
-    """Feeds of all jobs that have subscribers.
-
-    Parameters
-    ----------
-    store : Store
-    executor : BlockingExecutor
-    """
+    """Feeds of all jobs that have subscribers."""
 
     def __init__(self, store: Store, executor: BlockingExecutor) -> None:
         self._store, self._executor = store, executor

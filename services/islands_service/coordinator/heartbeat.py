@@ -10,7 +10,6 @@ from pathlib import Path
 from sys import maxsize
 from threading import Event, Thread
 from time import monotonic, process_time
-from types import TracebackType
 from typing import TYPE_CHECKING, NoReturn
 
 import structlog
@@ -121,12 +120,7 @@ class Heartbeat:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._over.set()
         self._thread.join()
 

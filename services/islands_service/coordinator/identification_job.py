@@ -70,13 +70,7 @@ FREE_RUN_EVERY = 2.0
 
 
 class StoredFreeRun:
-    """The free run that the store has, or gets with the next report.
-
-    Parameters
-    ----------
-    job : Job
-    blobs : Blobs
-    """
+    """The free run that the store has, or gets with the next report."""
 
     def __init__(self, job: Job, blobs: Blobs) -> None:
         self._job, self._blobs = job.id, blobs

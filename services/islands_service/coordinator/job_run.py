@@ -38,13 +38,7 @@ RETRY_SECONDS = 0.5
 
 
 class JobNotes:
-    """Adds messages of the engine to the progress of a job.
-
-    Parameters
-    ----------
-    lease : Lease
-    store : Store
-    """
+    """Adds messages of the engine to the progress of a job."""
 
     def __init__(self, lease: Lease, store: Store) -> None:
         self._lease, self._store = lease, store

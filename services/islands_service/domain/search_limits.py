@@ -111,12 +111,7 @@ class JobMemoryError(IslandsError):
 
 @dataclass(frozen=True, slots=True)
 class JobMemory:
-    """Estimated memory of the individuals of a search.
-
-    Attributes
-    ----------
-    population, islands : int
-    """
+    """Estimated memory of the individuals of a search."""
 
     population: int
     islands: int

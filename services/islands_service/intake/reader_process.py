@@ -9,7 +9,6 @@ import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from threading import Lock
-from types import TracebackType
 from typing import IO, Self
 
 from islands_service.intake.confined_process import ENVIRONMENT, REQUESTS, make_command
@@ -38,9 +37,7 @@ class ReaderProcess:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._control.close()
 
     def kill(self) -> None:

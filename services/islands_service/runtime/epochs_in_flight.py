@@ -20,14 +20,7 @@ References = tuple["ray.ObjectRef", "ray.ObjectRef"]
 
 
 class EpochsInFlight:
-    """Submitted tasks, and references to values that actors hold or will compute.
-
-    Parameters
-    ----------
-    scheduler : EpochScheduler
-    pool : IslandActorPool
-    deadlines : EpochDeadlines
-    """
+    """Submitted tasks, and references to values that actors hold or will compute."""
 
     def __init__(
         self, scheduler: EpochScheduler[PackedEpoch], pool: IslandActorPool, deadlines: EpochDeadlines

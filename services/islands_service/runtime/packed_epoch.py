@@ -115,10 +115,6 @@ class LazyIslands(Sequence[Island]):
     """Sequence of islands, each of which is read at its first access; equal to their tuple.
 
     An iteration over all islands does not keep them: thousands take gigabytes.
-
-    Parameters
-    ----------
-    size : int
     """
 
     def __init__(self, size: int) -> None:

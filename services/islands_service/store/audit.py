@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from islands_service.domain.job import Requester
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.tables import audit
 
@@ -68,16 +68,8 @@ class AuditEntry:
     details: str | None = None
 
 
-class AuditTrail:
-    """Read access to the audit trail.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class AuditTrail(DatabaseOperations):
+    """Read access to the audit trail."""
 
     def entries(
         self, owner: str | None = None, since: float | None = None, limit: int = 100

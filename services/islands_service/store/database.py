@@ -81,12 +81,7 @@ class StorageFullError(StoreError):
 
 
 class Database:
-    """A database by its URL: ``sqlite:////path/islands.db`` or ``postgresql+psycopg://...``.
-
-    Parameters
-    ----------
-    url : str
-    """
+    """A database by its URL: ``sqlite:////path/islands.db`` or ``postgresql+psycopg://...``."""
 
     def __init__(self, url: str) -> None:
         self.url = url
@@ -288,6 +283,13 @@ class Database:
             ) from error
         self.observe_commit(monotonic() - began)
         return results
+
+
+class DatabaseOperations:
+    """Group of operations on a database; see `islands_service.store.operations.Store`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
 
 
 def ignore_duration(_seconds: float) -> None:

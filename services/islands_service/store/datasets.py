@@ -13,7 +13,7 @@ from islands_service.domain.job import ACTIVE, QuotaError, Requester
 from islands_service.domain.uploaded_fmu import FMU_SUFFIX
 from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.job_rows import delete_unused_datasets
 from islands_service.store.tables import datasets, jobs, owners
@@ -72,16 +72,8 @@ class StoredDataset:
     idle_since: float | None = None
 
 
-class Datasets:
-    """Data set operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Datasets(DatabaseOperations):
+    """Data set operations of the store."""
 
     def add(
         self,

@@ -28,7 +28,7 @@ from islands_service.domain.job import (
 )
 from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.job_rows import (
     append_event,
@@ -134,16 +134,8 @@ class JobRows:
     after: tuple[float, str] | None
 
 
-class Jobs:
-    """Job operations of the store, used by the REST API on behalf of owners.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Jobs(DatabaseOperations):
+    """Job operations of the store, used by the REST API on behalf of owners."""
 
     def submit(
         self,

@@ -13,7 +13,7 @@ from islands.errors import IslandsError, SettingsError, suggest
 from islands_service.domain.job import Requester
 from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.tables import keys
 
@@ -68,16 +68,8 @@ class Key:
         return self.revoked is None and not self.expired
 
 
-class Keys:
-    """Key operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Keys(DatabaseOperations):
+    """Key operations of the store."""
 
     def create(
         self,

@@ -38,7 +38,7 @@ from islands_service.domain.job import (
     Renewal,
 )
 from islands_service.store import dialect
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.fair_queue import (
     QueuePlace,
@@ -92,16 +92,8 @@ GAVE_UP = {
 }
 
 
-class Leases:
-    """Lease operations of the store, used by coordinators.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Leases(DatabaseOperations):
+    """Lease operations of the store, used by coordinators."""
 
     def claim(
         self,

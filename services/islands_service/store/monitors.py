@@ -40,7 +40,7 @@ from islands_service.domain.monitoring import (
 from islands_service.domain.webhook import ALARM_EVENT, make_alarm_body
 from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.job_rows import cancel_job
 from islands_service.store.tables import jobs, monitor_records, monitors
@@ -87,16 +87,8 @@ class MonitorStatistics:
     alarms: int
 
 
-class Monitors:
-    """Monitor operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Monitors(DatabaseOperations):
+    """Monitor operations of the store."""
 
     def create(
         self,

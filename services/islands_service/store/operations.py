@@ -1,7 +1,5 @@
 """The store: one database, and the groups of operations of owners, coordinators and the API."""
 
-from types import TracebackType
-
 from islands_service.store.audit import AuditTrail
 from islands_service.store.database import Database
 from islands_service.store.datasets import Datasets
@@ -69,10 +67,5 @@ class Store:
     def __enter__(self) -> "Store":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()

@@ -19,7 +19,7 @@ from islands_service.domain.owner import (
 )
 from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.tables import datasets, jobs, keys, owners
 
 
@@ -27,16 +27,8 @@ class OwnerNotFoundError(IslandsError):
     """No key, job or data set has this owner."""
 
 
-class Owners:
-    """Owner operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Owners(DatabaseOperations):
+    """Owner operations of the store."""
 
     def quotas(self, owner: str, defaults: Quotas) -> Quotas:
         """Return the quotas of an owner; those that are not set have their defaults."""

@@ -28,10 +28,6 @@ class Readiness:
 
     A complete check of a large file takes seconds. `watch` does it in the background, and `check` raises the
     error that the last one has found.
-
-    Parameters
-    ----------
-    database : Database
     """
 
     def __init__(self, database: Database) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import Connection, delete, insert, select
 
 from islands_service.domain.job import JobNotFoundError, JobOutcome
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.monitors import update_monitor
 from islands_service.store.tables import artefacts, jobs, models, points, results
 
@@ -22,16 +22,8 @@ class StoredModel:
     file: str
 
 
-class Results:
-    """Result operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Results(DatabaseOperations):
+    """Result operations of the store."""
 
     def history(self, job: str, after: int = -1, limit: int | None = None) -> list[list[Any]]:
         """Return points after a generation, each a list: generation, evaluations, best, islands."""

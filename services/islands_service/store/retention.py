@@ -10,7 +10,7 @@ from sqlalchemy import Column, ColumnElement, Connection, Update, delete, select
 
 from islands_service.domain.job import TERMINAL, Requester, find_datasets
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.job_rows import delete_unused_datasets
 from islands_service.store.tables import artefacts, audit, datasets, jobs, owners, retired_keys
@@ -28,16 +28,8 @@ def _change_datasets(order: Update, owner: str, connection: Connection) -> int:
     return len(hidden)
 
 
-class Retention:
-    """Retention operations of the store.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Retention(DatabaseOperations):
+    """Retention operations of the store."""
 
     def delete_expired(self, seconds: float) -> int:
         """Delete the jobs that finished more than the given seconds ago; return their number.

@@ -30,7 +30,7 @@ from islands_service.domain.webhook import (
 )
 from islands_service.store import dialect
 from islands_service.store.audit import Action, record_change
-from islands_service.store.database import Database
+from islands_service.store.database import DatabaseOperations
 from islands_service.store.dialect import now
 from islands_service.store.tables import deliveries, webhooks
 
@@ -51,16 +51,8 @@ _DUE_WEBHOOKS = select(webhooks).where(
 )
 
 
-class Webhooks:
-    """Webhook operations of the store, used by the REST API on behalf of owners.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Webhooks(DatabaseOperations):
+    """Webhook operations of the store, used by the REST API on behalf of owners."""
 
     def create(
         self, owner: str, url: str, events: Sequence[str], most: int, by: Requester | None = None
@@ -200,16 +192,8 @@ def queue_event(connection: Connection, event: str, owner: str, job: str, body: 
             connection.execute(insert(deliveries), values)
 
 
-class Deliveries:
-    """Delivery operations of the store, used by the process that sends.
-
-    Parameters
-    ----------
-    database : Database
-    """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
+class Deliveries(DatabaseOperations):
+    """Delivery operations of the store, used by the process that sends."""
 
     def claim(self, seconds: float, most: int) -> tuple[DueDelivery, ...]:
         """Claim the oldest due delivery of each webhook to which no process is sending.

@@ -20,7 +20,7 @@ from islands.diagnosis.inference.finding import Finding
 from islands.diagnosis.inference.verdict import Verdict, choose_reference_fit
 from islands.diagnosis.result import Diagnosis
 from islands.effects.hysteresis import is_held
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.noise_model import fit_noise
 
 #: Coloured part of the misfit up to which a cause explains it.

@@ -12,7 +12,7 @@ from islands.diagnosis.inference.confidence import CONFIDENCE_TEMPERATURE
 from islands.diagnosis.inference.finding import Finding, Value
 from islands.diagnosis.inference.noise_detectors import DETECTORS, QUANTISATION
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
-from islands.effects.interface.effect import Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.records.noise_model import is_rounding_error
 from islands.records.segments import count_runs
 

@@ -21,7 +21,7 @@ from islands.diagnosis.inference.noise_detectors import COLOURED_NOISE
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import CalibratedValue, Diagnosis, NoiseClaim
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 
 
 def list_calibrated_values(found: Diagnosis, target: Target) -> tuple[CalibratedValue, ...]:

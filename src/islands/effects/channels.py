@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from islands.effects.interface.effect import Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.errors import RecordError
 from islands.records.channel_names import TEMPERATURES
 

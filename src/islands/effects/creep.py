@@ -5,16 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from islands.effects.filters import low_pass
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    Formula,
-    FormulaQuantity,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Points, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Formula, FormulaQuantity, MapEquation, Site
 from islands.records.segments import is_resting
 
 #: Largest step before the first sample, times the fraction that creeps, relative to the largest output.
@@ -58,9 +50,7 @@ def _limit_tau(context: SimulationContext) -> tuple[float, float]:
     return 5 * context.dt, 1.5 * context.fit_end_time
 
 
-def _exponential_creep_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _exponential_creep_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     taus = (max(part * context.fit_end_time, 6 * context.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
     return tuple((0.03, float(np.log(tau))) for tau in taus)
 

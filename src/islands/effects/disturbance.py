@@ -7,8 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.effects.channels import CHANNEL_NOTE, channel, channel_range, channel_unit, has_channel
-from islands.effects.interface.context import LINE_WIDTH, Parameter, compute_spectrum, find_single_frequency
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import (
+    LINE_WIDTH,
+    Parameter,
+    Points,
+    Signal,
+    SimulationContext,
+    compute_spectrum,
+    find_single_frequency,
+)
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 
 #: Error of the frequency of a line in the spectrum, relative to the resolution.
 LINE_ERROR = 0.1
@@ -23,9 +31,7 @@ def _second_input_parameters(context: SimulationContext) -> tuple[Parameter, ...
     return (Parameter("k", unit, 0.0, 0.01 * context.input_peak / channel_range(context, False)),)
 
 
-def _second_input_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _second_input_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     size = context.input_peak / channel_range(context, False)
     return ((0.02 * size,), (0.5 * size,))
 
@@ -102,9 +108,7 @@ def _find_input_harmonics(
     return (order >= 1) & (distance < (LINE_WIDTH + LINE_ERROR * order) / context.fit_end_time)
 
 
-def _periodic_disturbance_starting_points(
-    context: SimulationContext, residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _periodic_disturbance_starting_points(context: SimulationContext, residual: Signal) -> Points:
     fitted = int(context.fit_end_time / context.dt)
     spectrum = compute_spectrum(residual[:fitted])
     frequencies = np.fft.rfftfreq(4 * fitted, context.dt)

@@ -5,7 +5,7 @@ from math import exp, factorial
 
 import numpy as np
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.kernels.linear_filter import low_pass_cubic
 
 #: Coefficients of s^0 to s^3 of the cubic Lagrange polynomials, one row for each neighbour at -1, 0, 1, 2.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from islands.effects.filters import low_pass
-from islands.effects.interface.context import Parameter
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import (
     Effect,
     ForceLaw,
@@ -20,8 +20,6 @@ from islands.effects.interface.effect import (
     MakeEquation,
     Map,
     MapEquation,
-    Signal,
-    SimulationContext,
     Site,
     write_curve_formula,
 )

@@ -3,8 +3,8 @@
 from math import tanh
 from typing import Any
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, ForceLaw, Formula, Signal, SimulationContext, Site
+from islands.effects.interface.context import Parameter, Points, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, Site
 
 
 def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
@@ -60,7 +60,7 @@ def _viscous_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _viscous_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _viscous_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate,),)
 
 

@@ -4,16 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    ForceLaw,
-    Formula,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Points, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, MapEquation, Site
 from islands.kernels.memory_operators import jumper, play_from, slider
 from islands.records.segments import MAX_RANGE_AT_REST
 
@@ -47,7 +39,7 @@ def _stiction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("breakaway", context.input_unit, 0.0, 0.005 * peak, 0.0, _MAX_BREAKAWAY * peak),)
 
 
-def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     # The response to the breakaway distance is discontinuous, so that derivatives do not lead to the optimum:
     # a fine grid replaces them.
     if not is_held(context.u):
@@ -276,9 +268,7 @@ def _second_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter
     )
 
 
-def _second_hysteresis_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _second_hysteresis_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     coordinate = context.force_coordinate
     return tuple(
         (0.03 * coordinate.force / coordinate.peak, chi / coordinate.peak, g * chi / coordinate.peak, 0.0)

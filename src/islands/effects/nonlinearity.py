@@ -5,15 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
+from islands.effects.interface.context import Parameter, Points, Signal, SimulationContext
 from islands.effects.interface.effect import (
     Effect,
     EffectTemplate,
     Formula,
     FormulaQuantity,
     MapEquation,
-    Signal,
-    SimulationContext,
     Site,
 )
 from islands.effects.interface.force import ForceLaw
@@ -193,9 +191,7 @@ def _output_saturation_parameters(context: SimulationContext) -> tuple[Parameter
     return (Parameter("cut", "", 0.0, 0.02, lower, upper),)
 
 
-def _output_saturation_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _output_saturation_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     """Return limits below the largest measured value: a record reaches its limit, but for the noise."""
     peak = _measure_peak(context)
     return tuple((1.0 - (1.0 - cut) * peak,) for cut in _OUTPUT_CUTS)
@@ -351,7 +347,7 @@ def state_clip(state: str, unit: str = "", size: float = 0.0, spills: bool = Tru
         level = Parameter(label, own, _MAX_LEVEL * peak, 0.01 * peak, 0.1 * peak, _MAX_LEVEL * peak)
         return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0)) if spills else (level,)
 
-    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def starting_points(context: SimulationContext, _residual: Signal) -> Points:
         levels = [level * (size or context.output_peak) for level in _LEVELS]
         return (
             tuple((level, caught) for level in levels for caught in _CAUGHT) if spills else tuple(zip(levels))
@@ -391,7 +387,7 @@ def state_range(state: str, unit: str) -> Effect:
             Parameter(f"{label} upper", unit, most, 0.01 * span, low, most),
         )
 
-    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def starting_points(context: SimulationContext, _residual: Signal) -> Points:
         low, high = find_range(context)
         cuts = [-_FREE * (high - low), *(cut * (high - low) for cut in _CUTS)]
         return tuple((low + below, high - above) for below in cuts for above in cuts)[1:]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 
 #: Width of the ramp between two levels, relative to the step. A jump would have no derivatives.
 _RAMP = 0.005

@@ -7,16 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    ForceLaw,
-    Formula,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Points, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Formula, MapEquation, Site
 
 #: Least number of periods of cogging within the range of the position; fewer are a static curve.
 MIN_COGGING_PERIODS = 3
@@ -99,7 +91,7 @@ def _list_starting_points(
     size: float,
     periods: int,
     highest: float,
-) -> tuple[tuple[float, ...], ...]:
+) -> Points:
     """Return points with the frequencies of the largest lines in spectra over the position.
 
     Parameters
@@ -143,7 +135,7 @@ def _cogging_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _cogging_starting_points(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _cogging_starting_points(context: SimulationContext, residual: Signal) -> Points:
     coordinate = context.force_coordinate
     # At its typical rate, the position passes at most one period in a sample.
     highest = 1.0 / max(coordinate.rate * context.dt, np.finfo(float).tiny)
@@ -188,9 +180,7 @@ def _cyclic_error_parameters(context: SimulationContext) -> tuple[Parameter, ...
     return _list_parameters(span, unit, context.output_peak, unit, MIN_CYCLIC_PERIODS)
 
 
-def _cyclic_error_starting_points(
-    context: SimulationContext, residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _cyclic_error_starting_points(context: SimulationContext, residual: Signal) -> Points:
     measured = _take_fitted(context)
     # The position passes at most one period in a sample, or is known to within a radian of it.
     change = float(np.std(context.take_differences(measured)))

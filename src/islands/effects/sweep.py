@@ -6,8 +6,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from islands.effects.interface.context import LINE_WIDTH, Parameter
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import LINE_WIDTH, Parameter, Points, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 
 #: Largest length of the first windows, in samples.
 WINDOW = 512
@@ -164,9 +164,7 @@ def _output_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return _list_parameters(context, context.output_unit, context.output_peak)
 
 
-def _starting_points(
-    context: SimulationContext, residual: Signal, site: Site
-) -> tuple[tuple[float, ...], ...]:
+def _starting_points(context: SimulationContext, residual: Signal, site: Site) -> Points:
     fitted = round(context.fit_end_time / context.dt)
     residual = residual[:fitted] - residual[:fitted].mean()
     size = float(np.max(np.abs(residual)))  # Squares of very large or small numbers are not finite, or zero.

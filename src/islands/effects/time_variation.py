@@ -7,16 +7,8 @@ import numpy as np
 import scipy
 
 from islands.effects.channels import TEMPERATURE_NOTE, channel, channel_range, channel_unit, has_channel
-from islands.effects.interface.context import Parameter
-from islands.effects.interface.effect import (
-    Effect,
-    Formula,
-    FormulaQuantity,
-    MapEquation,
-    Signal,
-    SimulationContext,
-    Site,
-)
+from islands.effects.interface.context import Parameter, Signal, SimulationContext
+from islands.effects.interface.effect import Effect, Formula, FormulaQuantity, MapEquation, Site
 
 #: Names of the effects that change the gain.
 GAIN_EFFECTS = frozenset(("gain-step", "ageing"))

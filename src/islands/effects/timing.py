@@ -5,8 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from islands.effects.filters import low_pass
-from islands.effects.interface.context import Parameter, find_single_frequency
-from islands.effects.interface.effect import Effect, Formula, MapEquation, Signal, SimulationContext, Site
+from islands.effects.interface.context import (
+    Parameter,
+    Points,
+    Signal,
+    SimulationContext,
+    find_single_frequency,
+)
+from islands.effects.interface.effect import Effect, Formula, MapEquation, Site
 from islands.kernels.lagrange import interpolate_at
 from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import lag_by_gap, limit_rate
@@ -75,9 +81,7 @@ def _varying_delay_parameters(context: SimulationContext) -> tuple[Parameter, ..
     )
 
 
-def _varying_delay_starting_points(
-    context: SimulationContext, residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _varying_delay_starting_points(context: SimulationContext, residual: Signal) -> Points:
     """Return starting points with the frequency at which the residual follows the rate of the output most.
 
     The residual is that rate times minus the delay, as far as the delay is short for the output.
@@ -175,9 +179,7 @@ def _rate_limit_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _rate_limit_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _rate_limit_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     least, peak = _get_rate_range(context)
     rates = np.geomspace(0.9 * peak, 2.0 * least, _STARTING_RATES)
     return tuple((1.0 / float(rate),) for rate in rates)
@@ -246,9 +248,7 @@ def _growing_lag_parameters(context: SimulationContext) -> tuple[Parameter, ...]
     )
 
 
-def _growing_lag_starting_points(
-    context: SimulationContext, _residual: Signal
-) -> tuple[tuple[float, ...], ...]:
+def _growing_lag_starting_points(context: SimulationContext, _residual: Signal) -> Points:
     times = (2 * context.dt, 6 * context.dt)
     return tuple((tau, part * tau / context.output_peak) for tau in times for part in (1.0, 5.0))
 

@@ -10,7 +10,8 @@ from islands.diagnosis.planning.experiment_plan import plan_experiment as plan_w
 from islands.diagnosis.procedure import diagnose as diagnose_simulator
 from islands.diagnosis.settings import DiagnosisSettings
 from islands.effects.catalogue import EFFECTS
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.models.narx import Model

@@ -13,7 +13,7 @@ from islands.diagnosis.calibration.starts_calibrator import (
     CalibrationTask,
     StartsCalibrator,
 )
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.parallel import ParallelMap, intercepted_map
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.effects.timing import DELAY
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator

@@ -13,7 +13,7 @@ from islands.diagnosis.calibration.problem import (
     simulate_together,
 )
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.noise_model import (
     NoiseModel,
     fit_noise,

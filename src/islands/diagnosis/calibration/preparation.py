@@ -7,7 +7,8 @@ import numpy as np
 from islands.diagnosis.calibration.resolution import measure_resolution
 from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import EFFECTS
-from islands.effects.interface.effect import Effect, SimulationContext, Site
+from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.effect import Effect, Site
 from islands.effects.scale import wrong_parameter
 from islands.errors import RecordError, SettingsError, check_type, suggest
 from islands.records.dataset import Dataset

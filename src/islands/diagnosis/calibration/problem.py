@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.simulators.extended import ExtendedSimulator
 
 #: Finite-difference step, as a fraction of the scale of a parameter.

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, prior_precision
 from islands.diagnosis.calibration.problem import DIFFERENCE_STEP
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 
 
 class Projection:

@@ -6,7 +6,7 @@ explain them with any certainty (Widrow and Kollar, Quantization Noise, section 
 
 import numpy as np
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 
 #: Resolution of an output without a coarser lattice, relative to its range. Simulations differ by as much
 #: through their integration.

@@ -18,7 +18,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 )
 from islands.diagnosis.calibration.pattern_search import search_jumps
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.parallel import ParallelMap
 from islands.simulators.extended import ExtendedSimulator
 

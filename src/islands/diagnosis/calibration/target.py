@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.diagnosis.calibration.resolution import is_unresolved
-from islands.effects.interface.effect import Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.records.noise_model import NoiseModel
 from islands.records.segments import delay_samples, find_bounds, map_segments
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.rounding import NORMAL_MEDIAN
 
 #: Candidate strengths k, times the largest absolute output.

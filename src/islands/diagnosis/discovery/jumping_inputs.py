@@ -40,7 +40,8 @@ from islands.diagnosis.inference.screening import (
 )
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.hysteresis import BACKLASH, STICTION, is_held, stick
-from islands.effects.interface.effect import Effect, Signal, Site, apply_map
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect, Site, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.errors import RecordError
 from islands.simulators.extended import ExtendedSimulator

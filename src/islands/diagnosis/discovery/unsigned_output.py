@@ -20,7 +20,7 @@ from islands.diagnosis.discovery.state_equations import (
 )
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.effects.nonlinearity import UNSIGNED_SENSOR
 from islands.errors import RecordError
 from islands.kernels.linear_filter import filter_linearly

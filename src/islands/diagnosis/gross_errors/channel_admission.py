@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.channel_names import TEMPERATURES
 from islands.records.dataset import Dataset
 

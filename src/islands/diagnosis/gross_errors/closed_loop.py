@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.record_finding import RecordFinding
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 
 #: What is done about feedback within a sample, and what else the user can do about it.
 WITHIN_A_SAMPLE = (

@@ -15,7 +15,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
 from islands.diagnosis.calibration.preparation import make_target
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.correction import Correction
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.errors import RecordError
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 
 

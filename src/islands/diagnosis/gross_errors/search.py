@@ -22,7 +22,7 @@ from islands.diagnosis.gross_errors.scale_corrections import (
     correct_sign,
 )
 from islands.diagnosis.gross_errors.time_offset import correct_time_offset
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
 from islands.records.noise_model import estimate_effective_samples

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from islands.diagnosis.gross_errors.correction import Correction, shift_signal
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 
 #: Longest delay of the output in samples that is an effect of the catalogue, and no gross error.

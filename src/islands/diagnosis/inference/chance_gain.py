@@ -20,7 +20,8 @@ from islands.diagnosis.inference.noise_surrogates import (
     list_noise_models,
 )
 from islands.diagnosis.inference.screening import DEPENDENCE, extend, simulate_starting_points
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 
 #: Number of surrogates of each kind.
 SURROGATES = 300

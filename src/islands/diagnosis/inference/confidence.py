@@ -15,7 +15,7 @@ import scipy
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.holdout import BLOCKS, sum_by_block
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 
 #: Number of draws of the weights of the blocks.
 DRAWS = 2000

@@ -13,7 +13,8 @@ import scipy
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.screening import transfer_parameters
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 from islands.records.segments import map_segments
 
 #: Factors on the strength of the confounder in its simulations; each moves the slips to other instants.

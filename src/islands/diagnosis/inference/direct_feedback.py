@@ -23,7 +23,8 @@ from islands.diagnosis.gross_errors.closed_loop import (
     measure_feedback,
     whiten,
 )
-from islands.effects.interface.effect import Effect, Signal, Site
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect, Site
 from islands.simulators.linear import LinearSimulator
 from islands.simulators.output_equation import OutputEquation, add_output_equation
 

@@ -21,7 +21,8 @@ from islands.diagnosis.inference.screening import (
     simulate_starting_points,
 )
 from islands.diagnosis.run import DiagnosisRun
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 from islands.simulators.extended import ExtendedSimulator
 
 #: Largest squared correlation of the responses of a pair. More similar ones differ by less than the error of

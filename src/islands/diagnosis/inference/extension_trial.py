@@ -17,7 +17,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import (
     evaluate_fit,
 )
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.records.dataset import Dataset
 from islands.records.signal_ranges import SignalRange, measure_ranges
 

@@ -32,7 +32,8 @@ from islands.diagnosis.inference.verdict import (
 )
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 
 #: Effects whose scores are within this margin of the named one cannot be distinguished from it.
 EQUIVALENCE_MARGIN = 9.0

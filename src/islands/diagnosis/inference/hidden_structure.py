@@ -26,7 +26,7 @@ from islands.diagnosis.inference.noise_surrogates import (
 )
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.residual_structure import MIN_DISTANCE, SHIFTS
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.kernels.linear_filter import filter_linearly
 from islands.records.noise_model import fit_noise
 from islands.records.segments import delay_samples, find_runs, map_segments

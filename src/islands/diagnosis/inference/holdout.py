@@ -8,7 +8,7 @@ import numpy as np
 from islands.diagnosis.calibration.initial_states import fit_initial_states
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult, calibrate
 from islands.diagnosis.calibration.target import Target
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 from islands.records.segments import find_bounds
 

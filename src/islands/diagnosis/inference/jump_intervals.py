@@ -12,7 +12,8 @@ from islands.diagnosis.inference.curve_ends import MAX_INCREASE
 from islands.diagnosis.inference.pulse_response import convolve, respond_to_pulse
 from islands.diagnosis.inference.screening import transfer_parameters
 from islands.effects.hysteresis import is_held
-from islands.effects.interface.effect import Effect, Signal, apply_map
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect, apply_map
 
 #: Factors of a width that are compared, and changes of a distance relative to the width.
 _CHANGES = np.geomspace(5e-4, 0.9, 32)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.diagnosis.calibration.variance_model import fit_variance_model
-from islands.effects.interface.effect import Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from islands.records.channel_names import simplify_unit
 from islands.records.noise_model import fit_noise
 from islands.records.segments import find_bounds

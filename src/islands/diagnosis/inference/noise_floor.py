@@ -11,7 +11,7 @@ from islands.diagnosis.inference.noise_surrogates import (
     list_noise_models,
 )
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.kernels.linear_filter import filter_linearly
 from islands.kernels.memory_operators import play_from
 from islands.records.noise_model import fit_noise

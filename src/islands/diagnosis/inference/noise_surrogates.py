@@ -5,7 +5,7 @@ from enum import Enum, auto
 
 import numpy as np
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.noise_model import NoiseModel, fit_integrated_noise, fit_noise
 from islands.records.segments import find_bounds
 

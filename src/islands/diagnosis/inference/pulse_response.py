@@ -8,7 +8,7 @@ import scipy
 
 from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult
 from islands.diagnosis.gross_errors.closed_loop import PULSE
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.segments import map_segments
 
 

@@ -7,7 +7,8 @@ from islands.diagnosis.calibration.levenberg_marquardt import CalibrationResult,
 from islands.diagnosis.calibration.resolution import DITHERED_RMS, is_unresolved
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.hypothesis import Hypothesis, without_effect
-from islands.effects.interface.effect import Effect, Signal, Site
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect, Site
 from islands.simulators.extended import ExtendedSimulator
 
 #: Probability that the confidence region of a strength contains it.

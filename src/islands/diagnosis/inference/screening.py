@@ -13,7 +13,8 @@ from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.gross_errors.closed_loop import acts_at_once
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import ACTUATOR_MAPS, SENSOR_MAPS
-from islands.effects.interface.effect import Effect, Signal, Site, invalid_effect_error
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect, Site, invalid_effect_error
 from islands.records.segments import fill_gaps
 from islands.simulators.extended import ExtendedSimulator
 

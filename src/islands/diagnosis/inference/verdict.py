@@ -18,7 +18,8 @@ from islands.diagnosis.inference.holdout import (
 from islands.diagnosis.inference.hypothesis import Hypothesis, without_effect
 from islands.diagnosis.inference.screening import bic_penalty
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 
 #: Minimum fraction of the explainable misfit that the effects have to explain.
 MIN_EXPLAINED_FRACTION = 0.5

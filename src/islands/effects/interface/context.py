@@ -13,6 +13,9 @@ from islands.records.segments import find_bounds, map_segments
 
 Signal = NDArray[np.float64]
 
+#: Starting points of a calibration, each with a value for every parameter.
+Points = tuple[tuple[float, ...], ...]
+
 #: Half width of a line in the spectrum, relative to the resolution.
 LINE_WIDTH = 2.0
 

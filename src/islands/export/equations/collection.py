@@ -7,7 +7,8 @@ from math import isinf
 import numpy as np
 
 from islands.effects.catalogue import CATALOGUE, get_summary
-from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site
+from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Site
 from islands.effects.time_variation import GAIN_EFFECTS
 from islands.errors import ModelError
 from islands.export.equations.extended_system import (

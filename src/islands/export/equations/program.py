@@ -23,10 +23,6 @@ class EquationProgram(ABC):
     """Writer of the program of an extended simulation.
 
     A subclass has a language, and writes what only this language requires.
-
-    Parameters
-    ----------
-    equations : ExtendedEquations
     """
 
     language: ClassVar[Language]

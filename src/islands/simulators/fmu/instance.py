@@ -85,10 +85,6 @@ class FmuInstance:
     FMU is extracted to is deleted as soon as the library is loaded, or with the instance if the FMU has
     resources, which it may read later.
 
-    Parameters
-    ----------
-    description : FmiDescription
-
     Attributes
     ----------
     description : FmiDescription

@@ -11,7 +11,8 @@ from math import inf
 
 from islands.effects.baseline import input_offset
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import Effect, ForceLaw, Signal, SimulationContext, Site
+from islands.effects.interface.context import Signal, SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Site
 from islands.effects.nonlinearity import outflow_law, state_clip, state_range
 from islands.effects.time_variation import GAIN_EFFECTS
 from islands.errors import ModelError, suggest

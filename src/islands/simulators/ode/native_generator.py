@@ -175,10 +175,6 @@ class NativeGenerator:
     """Generator of the function that integrates a program.
 
     The arguments are those of `NativeCode.integrate`: sizes, the step, and addresses of arrays.
-
-    Parameters
-    ----------
-    program : ProgramCode
     """
 
     def __init__(self, program: ProgramCode) -> None:

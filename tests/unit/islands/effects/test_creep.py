@@ -5,7 +5,8 @@ import pytest
 import scipy
 
 from islands.effects.creep import LOGARITHMIC_CREEP
-from islands.effects.interface.effect import SimulationContext, apply_map
+from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.effect import apply_map
 
 SAMPLES = 900
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from islands.effects.hysteresis import STICTION
-from islands.effects.interface.effect import Effect, Signal, SimulationContext, apply_map
+from islands.effects.interface.context import Signal, SimulationContext
+from islands.effects.interface.effect import Effect, apply_map
 from islands.effects.quantiser import QUANTISED_INPUT
 
 #: Part of an input in which a rounded value is between two levels.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.effects.interface.effect import Signal, SimulationContext
+from islands.effects.interface.context import Signal, SimulationContext
 from support import own_primitive
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator

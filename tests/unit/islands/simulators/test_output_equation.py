@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.external import PythonFunctionSimulator

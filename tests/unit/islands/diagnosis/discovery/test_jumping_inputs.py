@@ -19,7 +19,7 @@ from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.hysteresis import BACKLASH, STICTION
 from islands.effects.hysteresis import stick as stick_between_samples
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.kernels.memory_operators import play_from
 from islands.records.dataset import Dataset

@@ -9,7 +9,7 @@ import scipy
 
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 from islands.simulators.external import RecordedOutput
 from islands.simulators.interface import Simulator

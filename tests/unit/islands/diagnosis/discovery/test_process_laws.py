@@ -12,7 +12,7 @@ from islands.diagnosis.discovery.process_laws import describe_law
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import EFFECTS
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.records.dataset import Dataset
 from islands.report.documents.extension_json import extended_json

@@ -12,7 +12,7 @@ from islands.diagnosis.discovery.unsigned_output import fit_unsigned_output
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.run import DiagnosisRun
 from islands.effects.catalogue import CATALOGUE
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.effects.nonlinearity import UNSIGNED_SENSOR
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.simulators.extended import ExtendedSimulator, make_context

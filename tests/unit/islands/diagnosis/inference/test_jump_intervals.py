@@ -13,7 +13,8 @@ from islands.diagnosis.calibration.preparation import count_fitted_samples, make
 from islands.diagnosis.calibration.target import Target
 from islands.diagnosis.inference.jump_intervals import find_jump_intervals
 from islands.effects.hysteresis import STICTION, stick
-from islands.effects.interface.effect import Effect, Signal
+from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect
 from islands.effects.quantiser import QUANTISED_INPUT
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context

@@ -6,7 +6,7 @@ import scipy
 
 from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.diagnosis.inference.stepwise_search import MIN_GAIN
-from islands.effects.interface.effect import SimulationContext
+from islands.effects.interface.context import SimulationContext
 
 SAMPLES = 4000
 

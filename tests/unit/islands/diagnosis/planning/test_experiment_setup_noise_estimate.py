@@ -9,7 +9,7 @@ import scipy
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.planning.channel_noise import ChannelNoise, NoiseOrigin
 from islands.diagnosis.planning.experiment_setup import make_experiment
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.errors import RecordError
 from islands.records.dataset import Dataset
 from lab.diagnosis.injection.noise import NOISES

@@ -10,7 +10,7 @@ from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.preparation import count_fitted_samples, make_target
 from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.planning.next_experiment import NextExperiment, design_next_experiment
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
 from islands.report.documents.experiment_json import (
     describe_next_experiment,

@@ -10,7 +10,8 @@ from islands.effects.catalogue import CATALOGUE, OF_EACH, find_entry
 from islands.effects.channels import channel
 from islands.effects.filters import low_pass
 from islands.effects.hysteresis import stick
-from islands.effects.interface.effect import Effect, ForceLaw, SimulationContext, Site, apply_map
+from islands.effects.interface.context import SimulationContext
+from islands.effects.interface.effect import Effect, ForceLaw, Site, apply_map
 from islands.effects.time_variation import GAIN_EFFECTS, gain_over_time
 from islands.effects.timing import RESONANCE
 from islands.expressions.evaluation import evaluate

@@ -9,7 +9,7 @@ import pytest
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.procedure import diagnose
 from islands.effects.catalogue import EFFECTS
-from islands.effects.interface.effect import Signal
+from islands.effects.interface.context import Signal
 from islands.errors import IslandsError
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
