@@ -11,6 +11,7 @@ import typer
 from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
+from islands.cli.recordings import parse_held_out
 from islands.cli.settings_options import NONE, Given, with_settings
 from islands.diagnosis.settings import DiagnosisSettings
 from islands.errors import SettingsError
@@ -51,10 +52,7 @@ def submit(
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: Given = NONE,
-    validation: Annotated[
-        str | None,
-        typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
-    ] = None,
+    validation: options.Validation = None,
     model: Annotated[
         str, typer.Option("--model", help=f"Class of the models: {', '.join((NARX, *MODEL_CLASSES))}.")
     ] = NARX,
@@ -73,7 +71,7 @@ def submit(
     names, outputs = options.columns(inputs), options.columns(output_columns)
     read = ReadingOptions(**reading).changes()
     _, output_column = join_columns(names, outputs)
-    held_out = _parse_validation(validation)
+    held_out = parse_held_out(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with open_client(url, key) as client:
@@ -173,7 +171,7 @@ def show(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for the result with its models, figures and report.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    force: options.Force = False,
     report: Annotated[
         Path | None, typer.Option("--report", help="HTML file for the report, or for the comparison.")
     ] = None,
@@ -271,28 +269,6 @@ def _make_name(name: str, records: Sequence[Path]) -> str:
     """Return the name of a job; if it is empty, the file names of the recordings."""
     files = ", ".join(record.name for record in records)
     return name or "".join(each for each in files if each.isprintable())[:MAX_NAME_LENGTH]
-
-
-def _parse_validation(text: str | None) -> Path | str | float | None:
-    """Read ``--validation`` before any upload: a file, rows of the record, or a fraction of its end.
-
-    Raises
-    ------
-    SettingsError
-        The text is none of the three.
-    """
-    if text is None:
-        return None
-    if Path(text).exists():
-        return Path(text)
-    if ":" in text:
-        return text
-    try:
-        return float(text)
-    except ValueError:
-        raise SettingsError(
-            f"--validation {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
-        ) from None
 
 
 def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool) -> None:

@@ -55,8 +55,8 @@ def add(
     simulated: Annotated[
         str | None, typer.Option("--simulation", help="Simulation to follow, as for islands jobs diagnose.")
     ] = None,
-    inputs: Annotated[list[str] | None, typer.Option("--input", help="Its input column.")] = None,
-    output_column: Annotated[str | None, typer.Option("--output", help="Its output column.")] = None,
+    inputs: options.InputsOrNone = None,
+    output_column: options.OutputOrNone = None,
     channels: simulation_options.Channels = None,
     dt: options.SamplingTime = None,
     changes: Given = NONE,

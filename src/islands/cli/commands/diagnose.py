@@ -70,22 +70,20 @@ SELF_TEST_MODULE = "lab.diagnosis.self_test"
 @with_settings(changes=DiagnosisSettings, reading=ReadingOptions, plan=PlanOptions)
 def diagnose(
     inputs: options.Inputs,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
+    out: options.Out,
     simulated: simulation_options.Simulated,
     records: Annotated[
         list[Path] | None,
         typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; one for --plan."),
     ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; not needed for --plan.")
-    ] = None,
+    output_column: options.OutputOrNone = None,
     channels: simulation_options.Channels = None,
     changes: Given = NONE,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
     reading: Given = NONE,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
+    seed: options.Seed = 0,
     tested: Annotated[
         bool,
         typer.Option(
@@ -98,7 +96,7 @@ def diagnose(
         int | None,
         typer.Option("--workers", min=1, help="Largest number of processes; by default one for each core."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    force: options.Force = False,
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
     planning, file_options, settings = (

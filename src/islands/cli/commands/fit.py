@@ -1,11 +1,8 @@
 """``islands fit``: forward selection from a library with (constrained) least squares."""
 
 from functools import partial
-from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 import islands
 from islands.cli import options
@@ -32,20 +29,15 @@ def fit(
     records: options.Records,
     inputs: options.Inputs,
     output_columns: options.Outputs,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
+    out: options.Out,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: Given = NONE,
     preprocessing: Given = NONE,
-    validation: Annotated[
-        str | None,
-        typer.Option(
-            "--validation", help="FILE, FRACTION of the record's end (default 0.25), or START:STOP."
-        ),
-    ] = None,
+    validation: options.Validation = None,
     changes: Given = NONE,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    seed: options.Seed = 0,
+    force: options.Force = False,
     figures: options.Figures = FREE_RUN,
 ) -> None:
     """Fit small models to recordings of a system by subset selection and least squares, and assess them."""

@@ -29,7 +29,7 @@ RUN_OPTIONS = ("resume", "figures", GIVEN, *(field.name for field in fields(RunS
 def identify(
     context: typer.Context,
     records: options.RecordsOrNone = None,
-    inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeatable.")] = None,
+    inputs: options.InputsOrNone = None,
     output_columns: Annotated[
         list[str] | None,
         typer.Option("--output", help="Output column; several, as inputs, for a model that couples them."),
@@ -39,10 +39,7 @@ def identify(
     rows: options.Rows = None,
     reading: Given = NONE,
     preprocessing: Given = NONE,
-    validation: Annotated[
-        str | None,
-        typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
-    ] = None,
+    validation: options.Validation = None,
     test: Annotated[
         str | None,
         typer.Option(
@@ -53,7 +50,7 @@ def identify(
     changes: Given = NONE,
     seed: options.Seed = 0,
     run_settings: Given = NONE,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    force: options.Force = False,
     resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to continue.")] = None,
     figures: options.Figures = FREE_RUN,
 ) -> None:

@@ -18,13 +18,8 @@ from islands.report.text.inspection import format_inspection
 @with_settings(reading=ReadingOptions)
 def inspect(
     record: options.Record,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option("--input", help="Input column; by default chosen by name and prediction."),
-    ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; by default chosen likewise.")
-    ] = None,
+    inputs: options.InputsOrNone = None,
+    output_column: options.OutputOrNone = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: Given = NONE,

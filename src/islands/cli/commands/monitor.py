@@ -75,13 +75,8 @@ def monitor(
             "continue.",
         ),
     ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option("--input", help="Input column; by default that of the extended simulation."),
-    ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; by default that of the simulation.")
-    ] = None,
+    inputs: options.InputsOrNone = None,
+    output_column: options.OutputOrNone = None,
     channels: simulation_options.Channels = None,
     changes: Given = NONE,
     follow: Annotated[bool, typer.Option("--follow", help="Wait for further records, until Ctrl-C.")] = False,

@@ -124,10 +124,7 @@ def simulate(
         Path | None,
         typer.Option("--out", help="CSV file for time and y_sim, with --bands also for y_low and y_high."),
     ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option("--input", help="Input column; by default that of the model."),
-    ] = None,
+    inputs: options.InputsOrNone = None,
     output_columns: Annotated[
         list[str] | None, typer.Option("--output", help="Output column; by default that of the model.")
     ] = None,
