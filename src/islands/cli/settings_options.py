@@ -43,7 +43,7 @@ def with_settings(**groups: type) -> Callable[[Callable[..., None]], Callable[..
             texts = given.pop(GIVEN) or []
             from_file = context.lookup_default(GIVEN) or []
             values: dict[str, Any] = {**split_settings(from_file)}
-            values |= {name: given[name] for name in daily if given[name]}
+            values |= {name: given[name] for name in daily if given[name] not in (None, False, [])}
             values |= split_settings(() if texts == from_file else texts)
             found: dict[str, dict[str, Any]] = {group: {} for group in groups}
             for name, value in values.items():
