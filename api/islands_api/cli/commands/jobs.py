@@ -12,7 +12,7 @@ from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.recordings import parse_held_out
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.diagnosis.settings import DiagnosisSettings
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
@@ -44,24 +44,25 @@ _MODEL = re.compile("([0-9a-f]{32})(?::([1-9][0-9]*))?")
 
 
 @jobs.command()
-@with_settings(reading=ReadingOptions, changes=Settings, submission=SubmissionSettings)
+@with_settings
 def submit(
+    *,
     records: options.Records,
     inputs: options.Inputs,
     output_columns: options.Outputs,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
     validation: options.Validation = None,
     model: Annotated[
         str, typer.Option("--model", help=f"Class of the models: {', '.join((NARX, *MODEL_CLASSES))}.")
     ] = NARX,
     preset: options.Preset = AUTO,
-    changes: Given = NONE,
+    changes: Annotated[Given, Settings],
     seed: options.Seed = 0,
     name: Name = "",
     tags: Tags = None,
-    submission: Given = NONE,
+    submission: Annotated[Given, SubmissionSettings],
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Watch = False,
@@ -69,7 +70,7 @@ def submit(
 ) -> None:
     """Upload recordings and submit a job that identifies one model of them."""
     names, outputs = options.columns(inputs), options.columns(output_columns)
-    read = ReadingOptions(**reading).changes()
+    read = reading.changes()
     _, output_column = join_columns(names, outputs)
     held_out = parse_held_out(validation)
     if isinstance(held_out, str) and len(records) > 1:
@@ -105,22 +106,23 @@ def submit(
 
 
 @jobs.command()
-@with_settings(changes=DiagnosisSettings, reading=ReadingOptions, submission=SubmissionSettings)
+@with_settings
 def diagnose(
+    *,
     records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     simulated: simulation_options.Simulated,
     channels: simulation_options.Channels = None,
-    changes: Given = NONE,
+    changes: Annotated[Given, DiagnosisSettings],
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
     seed: options.Seed = 0,
     name: Name = "",
     tags: Tags = None,
-    submission: Given = NONE,
+    submission: Annotated[Given, SubmissionSettings],
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Watch = False,
@@ -132,7 +134,7 @@ def diagnose(
     spec = parse_spec(simulated)
     simulation = {} if isinstance(spec, FmuSpec) else parse_simulation(simulated)
     columns = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
-    read = ReadingOptions(**reading).changes()
+    read = reading.changes()
     with open_client(url, key) as client:
         if isinstance(spec, FmuSpec):
             simulation = name_uploaded(spec, client.upload_fmu(spec.file))

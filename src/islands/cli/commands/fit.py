@@ -2,7 +2,7 @@
 
 from functools import partial
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 import islands
 from islands.cli import options
@@ -10,7 +10,7 @@ from islands.cli.output_folder import check_folder, keep_models, show_result
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.cli.stop_requests import REPEAT, stop_requests
 from islands.errors import SettingsError
 from islands.evolution.settings import NARX
@@ -24,18 +24,19 @@ from islands.records.reading.options import ReadingOptions
 from islands.report.figures.names import FREE_RUN, parse_figures
 
 
-@with_settings(reading=ReadingOptions, preprocessing=PreprocessingSteps, changes=FitSettings)
+@with_settings
 def fit(
+    *,
     records: options.Records,
     inputs: options.Inputs,
     output_columns: options.Outputs,
     out: options.Out,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
-    preprocessing: Given = NONE,
+    reading: ReadingOptions,
+    steps: PreprocessingSteps,
     validation: options.Validation = None,
-    changes: Given = NONE,
+    changes: Annotated[Given, FitSettings],
     seed: options.Seed = 0,
     force: options.Force = False,
     figures: options.Figures = FREE_RUN,
@@ -43,13 +44,12 @@ def fit(
     """Fit small models to recordings of a system by subset selection and least squares, and assess them."""
     check_folder(out, force)
     drawn, settings = parse_figures(figures), FitSettings(**changes)
-    file_options, steps = ReadingOptions(**reading), PreprocessingSteps(**preprocessing)
     outputs = options.columns(output_columns)
     names, output_column = join_columns(options.columns(inputs), outputs)
     if len(outputs) == 1:
-        recordings = Recordings(records, names, output_column, dt, file_options, steps)
+        recordings = Recordings(records, names, output_column, dt, reading, steps)
     else:
-        recordings = Recordings(records, measured_names(names, steps), output_column, dt, file_options)
+        recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
     # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
     with progress("fit") as show:
         show("reading", 0.0)

@@ -8,7 +8,7 @@ import typer
 import islands
 from islands.cli import options
 from islands.cli.console import output
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import with_settings
 from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
 from islands.models.coupled_narx import CoupledModel
@@ -25,8 +25,9 @@ from islands.report.text.layout import term_table, wrap
 REPORT = "report"
 
 
-@with_settings(reading=ReadingOptions)
+@with_settings
 def show(
+    *,
     model: options.ModelFile,
     kind: Annotated[
         str | None,
@@ -52,7 +53,7 @@ def show(
     record: Annotated[Path | None, typer.Option("--record", help="Record of --figure.")] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
 ) -> None:
     """Show or write a model as an equation, a program, a block for a simulator, or JSON.
 
@@ -64,7 +65,7 @@ def show(
     The report of a result folder is one HTML file, which prints on A4, with its figures.
     """
     if figure is not None:
-        _draw(model, figure, record, out, dt, parse_rows(rows), ReadingOptions(**reading))
+        _draw(model, figure, record, out, dt, parse_rows(rows), reading)
         return
     if record is not None:
         raise SettingsError("--record is for --figure: name one")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import with_settings
 from islands.errors import ExtrapolationWarning, RecordError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import load
@@ -115,8 +115,9 @@ class _Request:
             raise SettingsError(f"{model} reads the record as measured: leave out --set detrend")
 
 
-@with_settings(reading=ReadingOptions, settings=SimulationSettings)
+@with_settings
 def simulate(
+    *,
     model: options.ModelFile,
     record: options.Record,
     mode: Annotated[str, typer.Option("--mode", help="one-step, shooting or free-run.")] = "free-run",
@@ -130,8 +131,8 @@ def simulate(
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
-    settings: Given = NONE,
+    reading: ReadingOptions,
+    settings: SimulationSettings,
     bands: Annotated[
         float | None,
         typer.Option(
@@ -146,7 +147,7 @@ def simulate(
     """
     request = _Request(
         *(record, mode, out, options.columns(inputs or []), options.columns(output_columns or []), dt),
-        *(parse_rows(rows), ReadingOptions(**reading), SimulationSettings(**settings), bands),
+        *(parse_rows(rows), reading, settings, bands),
     )
     match load(model):
         case Result() as result:
