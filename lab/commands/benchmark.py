@@ -35,36 +35,15 @@ if TYPE_CHECKING:
     from lab.published_sets.definition import BenchmarkData
     from lab.published_sets.peers.comparison import PeerRow
 
-benchmark = typer.Typer(
-    help="Published sets of measurements: list them, run the searches or other packages on them.",
-    no_args_is_help=True,
-    add_completion=False,
-)
-
 #: Name of all sets whose files are in the folder.
 ALL = "all"
 
-DataFolder = Annotated[
-    Path | None,
-    typer.Option("--data", envvar="ISLANDS_MEASURED_DIR", help="Folder with the files of the sets."),
-]
 
-
-@benchmark.command("list")
-def list_benchmarks(data: DataFolder = None) -> None:
-    """List the sets: tests with the least published errors, samples, where the data are, licence, rule."""
-    for name, entry in MEASURED.items():
-        output.print(Text("\n".join([name, *(f"  {line}" for line in _describe(entry, data))])))
-    with progress("benchmark") as show:
-        show("sets of the package", None)
-        of_package = list_package_sets()
-    if of_package:
-        output.print(f"loaded by their package: {', '.join(of_package)}", markup=False)
-
-
-@benchmark.command()
-def run(
-    names: Annotated[list[str], typer.Argument(help=f"Names from the list, or {ALL} that are present.")],
+def benchmark(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help=f"Names of sets, or {ALL} that are present; without them, the sets are listed."),
+    ] = None,
     classes: Annotated[
         list[str] | None,
         typer.Option("--model", help=f"Class of models; repeatable: {', '.join(CLASSES)}; by default all."),
@@ -76,14 +55,59 @@ def run(
         float | None,
         typer.Option("--budget", help="Seconds after which a search ends with its best model so far."),
     ] = None,
+    peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--peer",
+            help=f"Measure another package in place of the searches; repeatable: {', '.join(PEERS)}; {ALL}.",
+        ),
+    ] = None,
+    environments: Annotated[
+        Path | None,
+        typer.Option(
+            "--environments",
+            help="Folder for the virtual environments of the packages; by default in the user's cache.",
+        ),
+    ] = None,
+    limit: Annotated[float, typer.Option("--limit", help="CPU seconds of a package on a set.")] = 300.0,
     out: Annotated[Path | None, typer.Option("--json", help="JSON file for the results.")] = None,
-    data: DataFolder = None,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", envvar="ISLANDS_MEASURED_DIR", help="Folder with the files of the sets."),
+    ] = None,
 ) -> None:
-    """Search models on the estimation data of sets, and measure them on their tests.
+    """List published sets, or measure searches or other packages on their tests.
 
-    Ctrl-C keeps the complete searches.
+    Each package is installed from the package index into its own virtual environment. Ctrl-C keeps the
+    complete searches and runs.
     """
-    for each in classes or ():
+    if not names:
+        _list(data)
+    elif peer:
+        _measure_peers(names, [*PEERS] if ALL in peer else peer, environments, limit, out, data)
+    else:
+        _measure_searches(names, classes or [*CLASSES], seeds, budget, out, data)
+
+
+def _list(data: Path | None) -> None:
+    for name, entry in MEASURED.items():
+        output.print(Text("\n".join([name, *(f"  {line}" for line in _describe(entry, data))])))
+    with progress("benchmark") as show:
+        show("sets of the package", None)
+        of_package = list_package_sets()
+    if of_package:
+        output.print(f"loaded by their package: {', '.join(of_package)}", markup=False)
+
+
+def _measure_searches(
+    names: Sequence[str],
+    classes: Sequence[str],
+    seeds: int,
+    budget: float | None,
+    out: Path | None,
+    data: Path | None,
+) -> None:
+    for each in classes:
         lookup(dict.fromkeys(CLASSES), each, "class of models")
     chosen = {name: find_benchmark(name) for name in _expand(names, data)}
     found = _read(chosen, data, out)
@@ -91,7 +115,7 @@ def run(
     # The searches load the kernels, which the help of the command does not need.
     from lab.published_sets.comparison import ComparisonSettings, compare
 
-    settings = ComparisonSettings(tuple(classes or CLASSES), seeds, budget)
+    settings = ComparisonSettings(tuple(classes), seeds, budget)
     rows: list[BenchmarkRow] = []
     incomplete: list[str] = []
     with progress("benchmark") as show, stop_requests() as stop:
@@ -106,34 +130,17 @@ def run(
     stop.end(out, incomplete, "repeat the command for all searches")
 
 
-@benchmark.command()
-def peers(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Names from the list; by default all that are present.")
-    ] = None,
-    peer: Annotated[
-        list[str] | None,
-        typer.Option("--peer", help=f"Package; repeatable: {', '.join(PEERS)}; by default all."),
-    ] = None,
-    environments: Annotated[
-        Path | None,
-        typer.Option(
-            "--environments",
-            help="Folder for the virtual environments of the packages; by default in the user's cache.",
-        ),
-    ] = None,
-    limit: Annotated[float, typer.Option("--limit", help="CPU seconds of a package on a set.")] = 300.0,
-    out: Annotated[Path | None, typer.Option("--json", help="JSON file for the results.")] = None,
-    data: DataFolder = None,
+def _measure_peers(
+    names: Sequence[str],
+    peers: Sequence[str],
+    environments: Path | None,
+    limit: float,
+    out: Path | None,
+    data: Path | None,
 ) -> None:
-    """Measure other packages on sets, by the same rule as the searches, with their CPU seconds.
-
-    Each package is installed from the package index into its own virtual environment. Ctrl-C keeps the
-    complete runs.
-    """
-    selected = {each: lookup(PEERS, each, "package") for each in peer or PEERS}
+    selected = {each: lookup(PEERS, each, "package") for each in peers}
     check_seconds(limit, "the limit")
-    chosen = {name: find_benchmark(name) for name in _expand(names or [ALL], data)}
+    chosen = {name: find_benchmark(name) for name in _expand(names, data)}
     found = _read(chosen, data, out)
     # They load the simulation of models, which the help of the command does not need.
     from lab.published_sets.peers.comparison import compare_peer

@@ -35,7 +35,7 @@ def folder(tmp_path):
 def test_a_run_has_a_row_for_each_class_and_test(folder):
     out = folder / "new" / "rows.json"
     shown = succeed(
-        "benchmark", "run", "cascaded-tanks", "--data", folder, "--seeds", "2", "--budget", "1", "--json", out
+        "benchmark", "cascaded-tanks", "--data", folder, "--seeds", "2", "--budget", "1", "--json", out
     )
     document = json.loads(out.read_text())
     assert document["budget_s"] == 1.0
@@ -64,7 +64,7 @@ def test_a_package_of_the_index_is_measured(folder):
     if answered.returncode != 0:
         pytest.skip("the package index does not answer")
     arguments = ("--peer", "fastcan", "--environments", folder / "venv", "--json", folder / "rows.json")
-    succeed("benchmark", "peers", "cascaded-tanks", "--data", folder, *arguments)
+    succeed("benchmark", "cascaded-tanks", "--data", folder, *arguments)
     (row,) = json.loads((folder / "rows.json").read_text())["results"]
     assert row["reason"] is None
     assert row["error"] == pytest.approx(0.02, rel=0.2)

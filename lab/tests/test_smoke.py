@@ -7,7 +7,7 @@ from support.command_line import fail, succeed
 
 
 def test_a_command_runs_in_a_checkout() -> None:
-    assert "cascaded_tanks.csv is missing" in succeed("benchmark", "list", "--data", "absent")
+    assert "cascaded_tanks.csv is missing" in succeed("benchmark", "--data", "absent")
 
 
 @pytest.mark.parametrize("name", MEASUREMENTS)

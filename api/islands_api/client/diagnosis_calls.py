@@ -3,7 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from islands.diagnosis.settings import DiagnosisSettings
 from islands.errors import SettingsError
+from islands.settings_schema import document_settings
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import SIMULATORS, innermost, parse_spec
 from islands_api.client.calls import (
@@ -22,6 +24,7 @@ from islands_api.schemas import JobView
 from islands_api.simulation_schemas import SimulationList, SimulationPreview, SimulationView
 
 
+@document_settings(DiagnosisSettings, "settings")
 def diagnose(
     dataset: DatasetRef,
     input: str,  # noqa: A002 - the name in the request body
@@ -29,8 +32,6 @@ def diagnose(
     simulation: str | Mapping[str, Any],
     *,
     channels: str | Sequence[str] = (),
-    tolerance: Mapping[str, float] | None = None,
-    noise_level: float | None = None,
     seed: int = 0,
     dt: float | None = None,
     rows: str | None = None,
@@ -40,6 +41,7 @@ def diagnose(
     tags: str | Sequence[str] = (),
     priority: int = 0,
     idempotency_key: str | None = None,
+    **settings: Any,
 ) -> RequestSpec[JobView]:
     """Submit a job that diagnoses the errors of a simulation on a record, or on several recordings.
 
@@ -52,10 +54,6 @@ def diagnose(
         the request body: an FMU is ``{"kind": "fmu", "file": client.upload_fmu("FILE.fmu").id}``.
     channels : str or sequence of str
         Columns that may couple in, for example a temperature.
-    tolerance : mapping, optional
-        Relative standard deviations of the simulation's parameters, by name.
-    noise_level : float, optional
-        Standard deviation of the noise of the output, in its unit. A residual far above it is no noise.
     dt : float, optional
         Sampling time in seconds, if the record has no time column.
     rows : str, optional
@@ -66,6 +64,7 @@ def diagnose(
         A recording that is held out as a whole, instead of the last quarter of the record.
     tags : str or sequence of str
         Words by which `jobs` finds the job.
+    **settings
 
     Raises
     ------
@@ -76,8 +75,8 @@ def diagnose(
         A model file cannot be read.
     """
     given = {
-        **_describe_simulated(dataset, input, output, channels, simulation, tolerance),
-        "noise_level": noise_level,
+        **_describe_simulated(dataset, input, output, channels, simulation),
+        **settings,
         "seed": seed,
         "dt": dt,
         "rows": rows,
@@ -158,7 +157,8 @@ def preview(
         As for `diagnose`.
     """
     given = {
-        **_describe_simulated(dataset, input, output, channels, simulation, tolerance),
+        **_describe_simulated(dataset, input, output, channels, simulation),
+        "tolerance": dict(tolerance or {}) or None,
         "dt": dt,
         "rows": rows,
         "points": points,
@@ -173,7 +173,6 @@ def _describe_simulated(
     output: str,
     channels: str | Sequence[str],
     simulation: str | Mapping[str, Any],
-    tolerance: Mapping[str, float] | None,
 ) -> dict[str, Any]:
     """Return the fields that a diagnosis and its preview have in common."""
     return {
@@ -182,7 +181,6 @@ def _describe_simulated(
         "output": output,
         "channels": as_list(channels) or None,
         "simulation": parse_simulation(simulation) if isinstance(simulation, str) else simulation,
-        "tolerance": dict(tolerance or {}) or None,
     }
 
 

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
+from islands.diagnosis.settings import MonitoringSettings
+from islands.settings_schema import document_settings
 from islands_api.client.calls import DatasetRef, JobRef, RequestSpec, as_list, get_id, make_submission
 from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.client.responses import read_as
@@ -14,6 +16,7 @@ from islands_api.schemas import JobView
 MonitorRef = MonitorSummary | str
 
 
+@document_settings(MonitoringSettings, "settings")
 def create_monitor(
     diagnosis: JobRef | None = None,
     *,
@@ -22,12 +25,9 @@ def create_monitor(
     output: str | None = None,
     channels: str | Sequence[str] = (),
     dt: float | None = None,
-    tolerance: Mapping[str, float] | None = None,
-    false_alarms: str | None = None,
-    interval: float | None = None,
-    training: int | None = None,
     name: str = "",
     priority: int = 0,
+    **settings: Any,
 ) -> RequestSpec[MonitorView]:
     """Create a monitor of the simulation of a diagnosis, or of a given one.
 
@@ -41,16 +41,9 @@ def create_monitor(
         Columns of the records, as for `diagnose`.
     dt : float, optional
         Sampling time in seconds, if the records have no time column.
-    tolerance : mapping, optional
-        Relative standard deviations of parameters, by name.
-    false_alarms : str, optional
-        Rate of false alarms; ``1 per month`` by default.
-    interval : float, optional
-        Seconds from one record to the next; by default the duration of the first record.
-    training : int, optional
-        Number of first records that are the undisturbed state; 24 by default.
     priority : int
         Of the jobs that analyse the records.
+    **settings
 
     Raises
     ------
@@ -64,12 +57,9 @@ def create_monitor(
         "output": output,
         "channels": as_list(channels) or None,
         "dt": dt,
-        "tolerance": dict(tolerance or {}) or None,
-        "false_alarms": false_alarms,
-        "interval": interval,
-        "training": training,
         "name": name or None,
         "priority": priority or None,
+        **settings,
     }
     body = {field: value for field, value in given.items() if value is not None}
     return RequestSpec("POST", "/v1/monitors", read_as(MonitorView), json=body, repeatable=False)

@@ -17,6 +17,12 @@ HeldOut = Annotated[
     Path | None,
     typer.Option("--validation", help="Recording that is held out as a whole, not the last quarter."),
 ]
+Validation = Annotated[
+    str | None,
+    typer.Option(
+        "--validation", help="FILE, FRACTION of the end of each record (default 0.25), or START:STOP."
+    ),
+]
 
 Records = Annotated[
     list[Path],
@@ -32,7 +38,14 @@ RecordsOrNone = Annotated[
 Inputs = Annotated[
     list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")
 ]
+InputsOrNone = Annotated[
+    list[str] | None,
+    typer.Option("--input", help="Input column; by default that of the model or simulation, or chosen."),
+]
 Output = Annotated[str, typer.Option("--output", help="Output column.")]
+OutputOrNone = Annotated[
+    str | None, typer.Option("--output", help="Output column; by default that of the simulation, or chosen.")
+]
 Outputs = Annotated[
     list[str],
     typer.Option("--output", help="Output column; several, as inputs, for a model that couples them."),
@@ -52,6 +65,8 @@ ModelFile = Annotated[
     ),
 ]
 
+Out = Annotated[Path, typer.Option("--out", help="Folder for the result.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")]
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESET_NAMES))]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
 

@@ -38,6 +38,28 @@ def state_extrapolation(data: Dataset, held_out: Dataset | float, outputs: int =
         print_message(f"Validation extrapolates: {statement}.")
 
 
+def parse_held_out(text: str | None, option: str = "--validation") -> Path | str | float | None:
+    """Read the value of an option for validation data: a file, rows of the record, or a fraction of its end.
+
+    Raises
+    ------
+    SettingsError
+        The text is none of the three.
+    """
+    if text is None:
+        return None
+    if Path(text).exists():
+        return Path(text)
+    if ":" in text:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise SettingsError(
+            f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
+        ) from None
+
+
 @dataclass(frozen=True, slots=True)
 class Recordings:
     """Files with recordings of one system, their columns, and how they are read.
@@ -96,20 +118,17 @@ class Recordings:
         SettingsError
             The text is none of the three, or the rows overlap those used for estimation.
         """
-        if text is None:
-            return FRACTION
-        if Path(text).exists():
-            return self._preprocess_held_out(self._read_file(Path(text)), used)
-        if ":" in text:
-            if used is None or overlap(parse_rows(used), parse_rows(text)):
-                raise SettingsError(f"{option} {text}: give --rows START:STOP, other samples for estimation")
-            return self._preprocess_held_out(self._read_measured(text), used)
-        try:
-            return float(text)
-        except ValueError:
-            raise SettingsError(
-                f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
-            ) from None
+        match parse_held_out(text, option):
+            case Path() as path:
+                return self._preprocess_held_out(self._read_file(path), used)
+            case str() as rows:
+                if used is None or overlap(parse_rows(used), parse_rows(rows)):
+                    raise SettingsError(
+                        f"{option} {rows}: give --rows START:STOP, other samples for estimation"
+                    )
+                return self._preprocess_held_out(self._read_measured(rows), used)
+            case fraction:
+                return FRACTION if fraction is None else fraction
 
     def _preprocess_held_out(self, record: Dataset, used: str | None) -> Dataset:
         """Do the steps with the offsets of the estimation data."""

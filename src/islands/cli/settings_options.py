@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from inspect import Parameter, signature
-from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 from pydantic.fields import FieldInfo
@@ -15,19 +14,22 @@ from islands.settings_schema import has_items, is_daily, list_settings, parse_se
 #: Parameter with the values of ``--set``.
 GIVEN = "given_settings"
 
-#: Settings that a command receives, by name, and its default for a parameter that is replaced.
+#: Settings that were given, by name: ``Annotated[Given, Settings]``.
 Given = Mapping[str, Any]
-NONE: Given = MappingProxyType({})
 
 _SET = typer.Option("--set", metavar="NAME=VALUE", help="Change a setting; islands settings lists them.")
 
 
-def with_settings(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Replace parameters of a command by options of their classes of settings.
+def with_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """Replace parameters of a command that are settings by options of their classes.
 
-    Each of these parameters receives the settings that were given, by name. Those of the command line take
-    precedence over those of a file.
+    The annotation of such a parameter is a class of settings, or `Given` with one. Settings of the command
+    line take precedence over those of a file.
     """
+    declared = signature(command)
+    groups = {
+        name: cls for name, each in declared.parameters.items() if (cls := _find_class(each.annotation))
+    }
     owners = {name: (group, cls) for group, cls in groups.items() for name, _, _ in list_settings(cls)}
     options = {
         group: [_make_option(*each) for each in list_settings(cls) if is_daily(each[1])]
@@ -35,46 +37,47 @@ def with_settings(**groups: type) -> Callable[[Callable[..., None]], Callable[..
     }
     daily = {option.name for listed in options.values() for option in listed}
 
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        declared = signature(command)
+    @wraps(command)
+    def run(context: typer.Context, **given: Any) -> None:
+        texts = given.pop(GIVEN) or []
+        from_file = context.lookup_default(GIVEN) or []
+        values: dict[str, Any] = {**split_settings(from_file)}
+        values |= {name: given[name] for name in daily if given[name] not in (None, False, [])}
+        values |= split_settings(() if texts == from_file else texts)
+        found: dict[str, dict[str, Any]] = {group: {} for group in groups}
+        for name, value in values.items():
+            if name not in owners:
+                raise SettingsError(
+                    f"--set {name}: not one of those that islands settings lists{suggest(name, owners)}"
+                )
+            group, cls = owners[name]
+            found[group][name] = parse_setting(cls, name, value)
+        if "context" in declared.parameters:
+            given["context"] = context
+        settings = {
+            group: changes if get_args(declared.parameters[group].annotation) else groups[group](**changes)
+            for group, changes in found.items()
+        }
+        command(**settings, **{name: value for name, value in given.items() if name not in daily})
 
-        @wraps(command)
-        def run(context: typer.Context, **given: Any) -> None:
-            texts = given.pop(GIVEN) or []
-            from_file = context.lookup_default(GIVEN) or []
-            values: dict[str, Any] = {**split_settings(from_file)}
-            values |= {name: given[name] for name in daily if given[name]}
-            values |= split_settings(() if texts == from_file else texts)
-            found: dict[str, dict[str, Any]] = {group: {} for group in groups}
-            for name, value in values.items():
-                if name not in owners:
-                    raise SettingsError(
-                        f"--set {name}: not one of those that islands settings lists{suggest(name, owners)}"
-                    )
-                group, cls = owners[name]
-                found[group][name] = parse_setting(cls, name, value)
-            if "context" in declared.parameters:
-                given["context"] = context
-            command(**found, **{name: value for name, value in given.items() if name not in daily})
+    shown = [
+        parameter
+        for each in declared.parameters.values()
+        for parameter in options.get(each.name, [each])
+        if parameter.name != "context"
+    ]
+    context = Parameter("context", Parameter.KEYWORD_ONLY, annotation=typer.Context)
+    annotation = Annotated[list[str] | None, _SET]
+    last = Parameter(GIVEN, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+    run.__signature__ = declared.replace(parameters=[context, *shown, last])  # type: ignore[attr-defined]
+    run.settings = tuple(groups.values())  # type: ignore[attr-defined]
+    return run
 
-        shown = [
-            parameter
-            for each in declared.parameters.values()
-            for parameter in options.get(each.name, [each])
-            if parameter.name != "context"
-        ]
-        context = Parameter("context", Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
-        last = Parameter(
-            GIVEN,
-            Parameter.POSITIONAL_OR_KEYWORD,
-            default=None,
-            annotation=Annotated[list[str] | None, _SET],
-        )
-        run.__signature__ = declared.replace(parameters=[context, *shown, last])  # type: ignore[attr-defined]
-        run.settings = tuple(groups.values())  # type: ignore[attr-defined]
-        return run
 
-    return decorate
+def _find_class(annotation: Any) -> type | None:
+    """Return the class of settings of a parameter; None for other parameters."""
+    *_, cls = get_args(annotation) or (annotation,)
+    return cls if isinstance(cls, type) and hasattr(cls, "__pydantic_fields__") else None
 
 
 def list_classes(command: Any) -> tuple[type, ...]:
@@ -118,7 +121,7 @@ def _make_option(name: str, info: FieldInfo, values: str) -> Parameter:
     kind: Any = bool if is_flag else list[str] | None if is_mapping else str | None
     return Parameter(
         name,
-        Parameter.POSITIONAL_OR_KEYWORD,
+        Parameter.KEYWORD_ONLY,
         default=False if is_flag else None,
         annotation=Annotated[kind, option],
     )

@@ -11,7 +11,8 @@ import typer
 from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.recordings import parse_held_out
+from islands.cli.settings_options import Given, with_settings
 from islands.diagnosis.settings import DiagnosisSettings
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
@@ -43,27 +44,25 @@ _MODEL = re.compile("([0-9a-f]{32})(?::([1-9][0-9]*))?")
 
 
 @jobs.command()
-@with_settings(reading=ReadingOptions, changes=Settings, submission=SubmissionSettings)
+@with_settings
 def submit(
+    *,
     records: options.Records,
     inputs: options.Inputs,
     output_columns: options.Outputs,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
-    validation: Annotated[
-        str | None,
-        typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
-    ] = None,
+    reading: ReadingOptions,
+    validation: options.Validation = None,
     model: Annotated[
         str, typer.Option("--model", help=f"Class of the models: {', '.join((NARX, *MODEL_CLASSES))}.")
     ] = NARX,
     preset: options.Preset = AUTO,
-    changes: Given = NONE,
+    changes: Annotated[Given, Settings],
     seed: options.Seed = 0,
     name: Name = "",
     tags: Tags = None,
-    submission: Given = NONE,
+    submission: Annotated[Given, SubmissionSettings],
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Watch = False,
@@ -71,9 +70,9 @@ def submit(
 ) -> None:
     """Upload recordings and submit a job that identifies one model of them."""
     names, outputs = options.columns(inputs), options.columns(output_columns)
-    read = ReadingOptions(**reading).changes()
+    read = reading.changes()
     _, output_column = join_columns(names, outputs)
-    held_out = _parse_validation(validation)
+    held_out = parse_held_out(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with open_client(url, key) as client:
@@ -107,22 +106,23 @@ def submit(
 
 
 @jobs.command()
-@with_settings(changes=DiagnosisSettings, reading=ReadingOptions, submission=SubmissionSettings)
+@with_settings
 def diagnose(
+    *,
     records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     simulated: simulation_options.Simulated,
     channels: simulation_options.Channels = None,
-    changes: Given = NONE,
+    changes: Annotated[Given, DiagnosisSettings],
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
     seed: options.Seed = 0,
     name: Name = "",
     tags: Tags = None,
-    submission: Given = NONE,
+    submission: Annotated[Given, SubmissionSettings],
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Watch = False,
@@ -134,7 +134,7 @@ def diagnose(
     spec = parse_spec(simulated)
     simulation = {} if isinstance(spec, FmuSpec) else parse_simulation(simulated)
     columns = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
-    read = ReadingOptions(**reading).changes()
+    read = reading.changes()
     with open_client(url, key) as client:
         if isinstance(spec, FmuSpec):
             simulation = name_uploaded(spec, client.upload_fmu(spec.file))
@@ -173,7 +173,7 @@ def show(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for the result with its models, figures and report.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    force: options.Force = False,
     report: Annotated[
         Path | None, typer.Option("--report", help="HTML file for the report, or for the comparison.")
     ] = None,
@@ -271,28 +271,6 @@ def _make_name(name: str, records: Sequence[Path]) -> str:
     """Return the name of a job; if it is empty, the file names of the recordings."""
     files = ", ".join(record.name for record in records)
     return name or "".join(each for each in files if each.isprintable())[:MAX_NAME_LENGTH]
-
-
-def _parse_validation(text: str | None) -> Path | str | float | None:
-    """Read ``--validation`` before any upload: a file, rows of the record, or a fraction of its end.
-
-    Raises
-    ------
-    SettingsError
-        The text is none of the three.
-    """
-    if text is None:
-        return None
-    if Path(text).exists():
-        return Path(text)
-    if ":" in text:
-        return text
-    try:
-        return float(text)
-    except ValueError:
-        raise SettingsError(
-            f"--validation {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
-        ) from None
 
 
 def _follow(url: str, key: str | None, job: JobView, as_json: bool, watch: bool) -> None:

@@ -8,7 +8,7 @@ import typer
 
 from islands.cli import options, simulation_options
 from islands.cli.console import errors, output
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.cli.watched_folder import find_time, hash_file, order_of_recording
 from islands.diagnosis.settings import MonitoringSettings
 from islands.errors import SettingsError
@@ -40,8 +40,9 @@ class RecordJobSettings:
 
 
 @monitors.command()
-@with_settings(changes=MonitoringSettings, jobs=RecordJobSettings, reading=ReadingOptions)
+@with_settings
 def add(
+    *,
     records: options.RecordsOrNone = None,
     monitor: Annotated[
         str | None, typer.Option("--monitor", help="Id of a monitor; without one, a new one is created.")
@@ -55,14 +56,14 @@ def add(
     simulated: Annotated[
         str | None, typer.Option("--simulation", help="Simulation to follow, as for islands jobs diagnose.")
     ] = None,
-    inputs: Annotated[list[str] | None, typer.Option("--input", help="Its input column.")] = None,
-    output_column: Annotated[str | None, typer.Option("--output", help="Its output column.")] = None,
+    inputs: options.InputsOrNone = None,
+    output_column: options.OutputOrNone = None,
     channels: simulation_options.Channels = None,
     dt: options.SamplingTime = None,
-    changes: Given = NONE,
+    changes: Annotated[Given, MonitoringSettings],
     name: Annotated[str, typer.Option("--name", help="Name of a new monitor, for display.")] = "",
-    jobs: Given = NONE,
-    reading: Given = NONE,
+    jobs: Annotated[Given, RecordJobSettings],
+    reading: ReadingOptions,
     url: Url = LOCAL,
     key: ApiKey = None,
     watch: Annotated[
@@ -96,7 +97,7 @@ def add(
         for path in sorted(records or [], key=order_of_recording):
             content = hash_file(path)
             if (path.name, content) not in known:
-                added.append(_add_file(client, monitor, path, content, ReadingOptions(**reading)))
+                added.append(_add_file(client, monitor, path, content, reading))
     if not watch:
         for job in added:
             output.print(f"job {job.id}: {job.name}", markup=False)

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from islands.cli.console import errors
-from islands.cli.settings_options import GIVEN, NONE, Given, split_settings, with_settings
+from islands.cli.settings_options import GIVEN, Given, split_settings, with_settings
 from islands.distribution import describe_missing_extra, list_missing_packages
 from islands.errors import SettingsError
 from islands_api.cli.service.page_opening import open_when_ready
@@ -31,10 +31,11 @@ _RAY_HEARTBEAT_TIMEOUT = 20.0
 _MIN_COORDINATOR_TIMEOUT = 5.0
 
 
-@with_settings(given=ServiceSettings)
+@with_settings
 def serve(
+    *,
     context: typer.Context,
-    given: Given = NONE,
+    given: Annotated[Given, ServiceSettings],
     show: Annotated[
         bool, typer.Option("--open", help="Open the page in the browser when the service is ready.")
     ] = False,

@@ -5,12 +5,11 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
 
-import typer
 from rich.table import Table
 
 import islands
+from islands.cli import options
 from islands.cli.console import output, print_message
 from islands.cli.engines import start_engine
 from islands.cli.output_folder import RESULT_FILES, check_folder, keep_models, print_failures
@@ -60,7 +59,7 @@ SELECTING = ("estimation", "validation")
 
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")] = Path("demo-out"),
+    out: options.Out = Path("demo-out"),
 ) -> None:
     """Identify the record of the paper's case 1 and compare the models with those of the paper."""
     check_folder(out, force=True)

@@ -24,7 +24,7 @@ from islands.cli.runs.plan import (
     show_plan,
     write_plan,
 )
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import with_settings
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.diagnosis.calibration.fit_journal import FitJournal
 from islands.diagnosis.detectability import SelfTest
@@ -67,25 +67,24 @@ SELF_TEST = "self-test"
 SELF_TEST_MODULE = "lab.diagnosis.self_test"
 
 
-@with_settings(changes=DiagnosisSettings, reading=ReadingOptions, plan=PlanOptions)
+@with_settings
 def diagnose(
+    *,
     inputs: options.Inputs,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
+    out: options.Out,
     simulated: simulation_options.Simulated,
     records: Annotated[
         list[Path] | None,
         typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; one for --plan."),
     ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; not needed for --plan.")
-    ] = None,
+    output_column: options.OutputOrNone = None,
     channels: simulation_options.Channels = None,
-    changes: Given = NONE,
+    settings: DiagnosisSettings,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     validation: options.HeldOut = None,
-    reading: Given = NONE,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
+    reading: ReadingOptions,
+    seed: options.Seed = 0,
     tested: Annotated[
         bool,
         typer.Option(
@@ -93,24 +92,19 @@ def diagnose(
             help="Estimate which effects this record can reveal; in a checkout, and takes minutes.",
         ),
     ] = False,
-    plan: Given = NONE,
+    planning: PlanOptions,
     workers: Annotated[
         int | None,
         typer.Option("--workers", min=1, help="Largest number of processes; by default one for each core."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    force: options.Force = False,
 ) -> None:
     """Find the errors of a simulation on recordings, name their causes, measure the gain of correction."""
-    planning, file_options, settings = (
-        PlanOptions(**plan),
-        ReadingOptions(**reading),
-        DiagnosisSettings(**changes),
-    )
     if planning.plan:
         _check_unused_by_plan(validation, settings.noise_level)
         check_folder(out, force, PLAN)
         columns_of_input = [simulation_options.single_input(options.columns(inputs)), *(channels or [])]
-        data = read_input(records or [], columns_of_input, output_column, dt, rows, file_options, planning)
+        data = read_input(records or [], columns_of_input, output_column, dt, rows, reading, planning)
         compile_kernels()
         _plan(data, simulated, settings.tolerance, planning, out, seed, workers)
         return
@@ -126,7 +120,7 @@ def diagnose(
         column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read_record(
             *(records, validation, options.columns(inputs), channels or [], column),
-            *(output_column, dt, rows, file_options),
+            *(output_column, dt, rows, reading),
         )
         if isinstance(inner, FmuSpec):
             inner.make_model()

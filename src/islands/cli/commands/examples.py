@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from islands.cli.console import output
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.errors import SettingsError
 from islands.records.dataset import Dataset
 from islands.records.writer import write_record
@@ -24,8 +24,9 @@ class SystemSettings:
     seed: Integer = setting(0, "Seed of the random generator.", ge=0)
 
 
-@with_settings(changes=SystemSettings)
+@with_settings
 def examples(
+    *,
     path: Annotated[
         Path | None,
         typer.Argument(
@@ -35,7 +36,7 @@ def examples(
     system: Annotated[
         str | None, typer.Option("--system", help="Simulated system whose record is written, unrounded.")
     ] = None,
-    changes: Given = NONE,
+    changes: Annotated[Given, SystemSettings],
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
 ) -> None:
     """List records to try the commands on and simulated systems, or write their records as CSV."""

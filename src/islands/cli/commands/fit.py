@@ -1,11 +1,8 @@
 """``islands fit``: forward selection from a library with (constrained) least squares."""
 
 from functools import partial
-from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
-
-import typer
 
 import islands
 from islands.cli import options
@@ -13,7 +10,7 @@ from islands.cli.output_folder import check_folder, keep_models, show_result
 from islands.cli.progress_display import compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.cli.stop_requests import REPEAT, stop_requests
 from islands.errors import SettingsError
 from islands.evolution.settings import NARX
@@ -27,37 +24,32 @@ from islands.records.reading.options import ReadingOptions
 from islands.report.figures.names import FREE_RUN, parse_figures
 
 
-@with_settings(reading=ReadingOptions, preprocessing=PreprocessingSteps, changes=FitSettings)
+@with_settings
 def fit(
+    *,
     records: options.Records,
     inputs: options.Inputs,
     output_columns: options.Outputs,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
+    out: options.Out,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
-    preprocessing: Given = NONE,
-    validation: Annotated[
-        str | None,
-        typer.Option(
-            "--validation", help="FILE, FRACTION of the record's end (default 0.25), or START:STOP."
-        ),
-    ] = None,
-    changes: Given = NONE,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    reading: ReadingOptions,
+    steps: PreprocessingSteps,
+    validation: options.Validation = None,
+    changes: Annotated[Given, FitSettings],
+    seed: options.Seed = 0,
+    force: options.Force = False,
     figures: options.Figures = FREE_RUN,
 ) -> None:
     """Fit small models to recordings of a system by subset selection and least squares, and assess them."""
     check_folder(out, force)
     drawn, settings = parse_figures(figures), FitSettings(**changes)
-    file_options, steps = ReadingOptions(**reading), PreprocessingSteps(**preprocessing)
     outputs = options.columns(output_columns)
     names, output_column = join_columns(options.columns(inputs), outputs)
     if len(outputs) == 1:
-        recordings = Recordings(records, names, output_column, dt, file_options, steps)
+        recordings = Recordings(records, names, output_column, dt, reading, steps)
     else:
-        recordings = Recordings(records, measured_names(names, steps), output_column, dt, file_options)
+        recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
     # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
     with progress("fit") as show:
         show("reading", 0.0)

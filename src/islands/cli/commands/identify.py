@@ -9,7 +9,7 @@ import typer
 from islands.cli import options
 from islands.cli.output_folder import check_folder
 from islands.cli.runs.identify import RunOptions, RunSettings, load_run, run
-from islands.cli.settings_options import GIVEN, NONE, Given, split_settings, with_settings
+from islands.cli.settings_options import GIVEN, Given, split_settings, with_settings
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
 from islands.evolution.settings import Settings
@@ -23,13 +23,12 @@ from islands.report.figures.names import FREE_RUN, parse_figures
 RUN_OPTIONS = ("resume", "figures", GIVEN, *(field.name for field in fields(RunSettings)))
 
 
-@with_settings(
-    reading=ReadingOptions, preprocessing=PreprocessingSteps, changes=Settings, run_settings=RunSettings
-)
+@with_settings
 def identify(
+    *,
     context: typer.Context,
     records: options.RecordsOrNone = None,
-    inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeatable.")] = None,
+    inputs: options.InputsOrNone = None,
     output_columns: Annotated[
         list[str] | None,
         typer.Option("--output", help="Output column; several, as inputs, for a model that couples them."),
@@ -37,12 +36,9 @@ def identify(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
-    preprocessing: Given = NONE,
-    validation: Annotated[
-        str | None,
-        typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
-    ] = None,
+    reading: ReadingOptions,
+    preprocessing: PreprocessingSteps,
+    validation: options.Validation = None,
     test: Annotated[
         str | None,
         typer.Option(
@@ -50,15 +46,15 @@ def identify(
         ),
     ] = None,
     preset: options.Preset = AUTO,
-    changes: Given = NONE,
+    changes: Annotated[Given, Settings],
     seed: options.Seed = 0,
-    run_settings: Given = NONE,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+    run_settings: RunSettings,
+    force: options.Force = False,
     resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to continue.")] = None,
     figures: options.Figures = FREE_RUN,
 ) -> None:
     """Identify recordings of a system by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
-    run_options = RunOptions(RunSettings(**run_settings), parse_figures(figures))
+    run_options = RunOptions(run_settings, parse_figures(figures))
     if resume is not None:
         _check_resume(context)
         run(run_options, resume, *load_run(resume))
@@ -84,8 +80,8 @@ def identify(
             **({"outputs": len(outputs)} if several else {}),
             "dt": dt,
             "rows": rows,
-            "reading": ReadingOptions(**reading).changes(),
-            "preprocessing": asdict(PreprocessingSteps(**preprocessing)),
+            "reading": reading.changes(),
+            "preprocessing": asdict(preprocessing),
             "preset": preset,
             "seed": seed,
             "changes": changes,

@@ -8,26 +8,22 @@ import typer
 
 from islands.cli import options
 from islands.cli.console import errors
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import with_settings
 from islands.facade.inspect_record import inspect_record
 from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
 from islands.report.text.inspection import format_inspection
 
 
-@with_settings(reading=ReadingOptions)
+@with_settings
 def inspect(
+    *,
     record: options.Record,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option("--input", help="Input column; by default chosen by name and prediction."),
-    ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; by default chosen likewise.")
-    ] = None,
+    inputs: options.InputsOrNone = None,
+    output_column: options.OutputOrNone = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON document (schema islands.records.inspection/1).")
     ] = False,
@@ -39,7 +35,7 @@ def inspect(
     """Describe a record: columns, sampling, dead time, noise, excitation, and the next command."""
     found = inspect_record(
         *(record, options.columns(inputs or []), output_column, dt, parse_rows(rows)),
-        ReadingOptions(**reading),
+        reading,
     )
     document = json.dumps(found.as_document(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     text = format_inspection(found)

@@ -14,7 +14,7 @@ from islands.cli.console import errors, output
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import compile_kernels
 from islands.cli.recordings import Recordings
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.cli.watched_folder import WatchedFolder, find_time, hash_file
 from islands.diagnosis.settings import MonitoringSettings
 from islands.errors import IslandsError, SettingsError
@@ -63,8 +63,9 @@ class FolderSettings:
     settle: float = setting(2.0, "Time without a change after which a file is complete.", ge=0, unit="s")
 
 
-@with_settings(changes=MonitoringSettings, folder_settings=FolderSettings, reading=ReadingOptions)
+@with_settings
 def monitor(
+    *,
     folder: Annotated[Path, typer.Argument(help="Folder into which records are written, one file each.")],
     out: Annotated[Path, typer.Option("--out", help="Folder for states, alarms and figure.")],
     simulated: Annotated[
@@ -75,19 +76,14 @@ def monitor(
             "continue.",
         ),
     ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option("--input", help="Input column; by default that of the extended simulation."),
-    ] = None,
-    output_column: Annotated[
-        str | None, typer.Option("--output", help="Output column; by default that of the simulation.")
-    ] = None,
+    inputs: options.InputsOrNone = None,
+    output_column: options.OutputOrNone = None,
     channels: simulation_options.Channels = None,
-    changes: Given = NONE,
+    changes: Annotated[Given, MonitoringSettings],
     follow: Annotated[bool, typer.Option("--follow", help="Wait for further records, until Ctrl-C.")] = False,
-    folder_settings: Given = NONE,
+    folder_settings: FolderSettings,
     dt: options.SamplingTime = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
     force: Annotated[bool, typer.Option("--force", help="Start again, without the states in --out.")] = False,
 ) -> None:
     """Follow a simulation over the records of a folder, and raise an alarm when an effect has changed.
@@ -95,7 +91,7 @@ def monitor(
     Exit code 3 if this run has raised an alarm. Run it again to continue with further records.
     """
     check_folder(out, force=True)
-    watched = WatchedFolder(folder, FolderSettings(**folder_settings).settle)
+    watched = WatchedFolder(folder, folder_settings.settle)
     known = read_monitor(out / STATE) if (out / STATE).exists() and not force else None
     if simulated is not None:
         spec = parse_monitored(simulated)
@@ -105,7 +101,7 @@ def monitor(
         raise SettingsError("a new monitor needs --simulation: extended.json or the folder of a diagnosis")
     driving = [*options.columns(inputs or []), *(channels or [])]
     columns = _find_columns(spec, known, driving, output_column)
-    reader = _Reader(*columns, spec, dt, ReadingOptions(**reading))
+    reader = _Reader(*columns, spec, dt, reading)
     MonitoringSettings(**changes)  # An error is shown before the first record arrives.
     settings = {"interval": watched.interval, **changes}
     out.mkdir(parents=True, exist_ok=True)

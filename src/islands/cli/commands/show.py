@@ -8,7 +8,7 @@ import typer
 import islands
 from islands.cli import options
 from islands.cli.console import output
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import with_settings
 from islands.errors import SettingsError, lookup
 from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
 from islands.export.linear_system import find_notation, write_linear_system
@@ -27,8 +27,9 @@ from islands.report.text.layout import term_table, wrap
 REPORT = "report"
 
 
-@with_settings(reading=ReadingOptions)
+@with_settings
 def show(
+    *,
     model: options.ModelFile,
     kind: Annotated[
         str | None,
@@ -65,7 +66,7 @@ def show(
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
+    reading: ReadingOptions,
 ) -> None:
     """Show or write a model as an equation, a program, a block for a simulator, or JSON.
 
@@ -84,7 +85,7 @@ def show(
     if at:
         raise SettingsError(f"--at is for the formats {', '.join(FORMS)} and for figures of linear systems")
     if figure is not None:
-        _draw(model, figure, record, out, dt, parse_rows(rows), ReadingOptions(**reading))
+        _draw(model, figure, record, out, dt, parse_rows(rows), reading)
         return
     if record is not None:
         raise SettingsError("--record is for --figure: name one")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.cli import options
 from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import with_settings
 from islands.errors import ExtrapolationWarning, ModelError, SettingsError
 from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import Loaded, load
@@ -125,8 +125,9 @@ class _Request:
             raise SettingsError(f"{model} reads the record as measured: leave out --set detrend")
 
 
-@with_settings(reading=ReadingOptions, settings=SimulationSettings)
+@with_settings
 def simulate(
+    *,
     model: options.ModelFile,
     records: Annotated[
         list[Path],
@@ -152,17 +153,14 @@ def simulate(
             "by default the measured output, and rest at the first inputs without one.",
         ),
     ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option("--input", help="Input column; by default that of the model."),
-    ] = None,
+    inputs: options.InputsOrNone = None,
     output_columns: Annotated[
         list[str] | None, typer.Option("--output", help="Output column; by default that of the model.")
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    reading: Given = NONE,
-    settings: Given = NONE,
+    reading: ReadingOptions,
+    settings: SimulationSettings,
     bands: Annotated[
         float | None,
         typer.Option(
@@ -185,7 +183,7 @@ def simulate(
         file = out if out is None or len(records) == 1 else out / f"{record.stem}.csv"
         request = _Request(
             *(record, mode, file, options.columns(inputs or []), options.columns(output_columns or []), dt),
-            *(parse_rows(rows), ReadingOptions(**reading), SimulationSettings(**settings), bands),
+            *(parse_rows(rows), reading, settings, bands),
             start=options.values(start or [], "--start"),
         )
         _simulate_loaded(loaded, request)

@@ -1,24 +1,25 @@
 """Settings on the command line: options of daily work, ``--set``, and their precedence."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from islands.cli.settings_options import NONE, Given, with_settings
+from islands.cli.settings_options import Given, with_settings
 from islands.errors import SettingsError
 from islands.evolution.settings import Settings
 from islands.records.preprocessing_steps import PreprocessingSteps
+from islands.settings_schema import list_changes
 
 
 def run(*words: str, file: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run a command that has nothing but settings; return those that it receives, by class."""
     found: dict[str, Any] = {}
 
-    @with_settings(search=Settings, steps=PreprocessingSteps)
-    def command(search: Given = NONE, steps: Given = NONE) -> None:
-        found.update(search=dict(search), steps=dict(steps))
+    @with_settings
+    def command(search: Annotated[Given, Settings], steps: PreprocessingSteps) -> None:
+        found.update(search=dict(search), steps=list_changes(steps))
 
     app = typer.Typer(add_completion=False)
     app.command()(command)

@@ -110,7 +110,15 @@ def test_invalid_change_of_an_owner_is_refused(
     assert read(run) == before
 
 
-@pytest.mark.parametrize("command", [("admin", "keys"), ("admin", "audit"), ("serve",)])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("admin", "keys", "--database={}"),
+        ("admin", "audit", "--database={}"),
+        ("serve", "--database={}"),
+        ("serve", "--set", "database={}"),
+    ],
+)
 @pytest.mark.parametrize(
     "url", ["postgresql+psycopg://me:hidden@h/db", "postgresql+psycopg://h/db?password=hidden"]
 )
@@ -118,7 +126,7 @@ def test_password_on_the_command_line_is_refused(
     command_line: Run, command: tuple[str, ...], url: str, folder: Path
 ) -> None:
     """The arguments of a process are visible to every user of the machine."""
-    code, out, err = command_line(*command, "--database", url)
+    code, out, err = command_line(*(word.format(url) for word in command))
     assert code == 2
     assert "ISLANDS_DATABASE_FILE" in err
     assert "hidden" not in out + err
