@@ -59,7 +59,7 @@ COMMANDS = make_commands(
         "correction.",
         "monitor": "Follow a simulation over the records of a folder, and raise an alarm when an effect has "
         "changed.",
-        "simulate": "Simulate a model on a record. A free run needs only the first samples of the output.",
+        "simulate": "Simulate a model on records. A free run needs only the inputs.",
         "show": "Show or write a model as an equation, a program, a block for a simulator, JSON, or a "
         "report.",
         "settings": "List the settings that --set changes: name, default, values, meaning.",
