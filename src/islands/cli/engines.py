@@ -1,14 +1,17 @@
-"""Engines of a search on the command line: serial, or Ray."""
+"""Engines of a search on the command line: serial or Ray, with a limit of wall time."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from importlib.util import find_spec
+from time import monotonic
 
 from islands.distribution import describe_missing_extra
 from islands.errors import EngineError, SettingsError
-from islands.evolution.engine import Engine, SerialEngine
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import ArchipelagoEpoch, Engine, SerialEngine
+from islands.evolution.problem import Problem
 from islands.facade.engine_choice import Ray, open_engine
-from islands.progress import ProgressCallback
+from islands.progress import ProgressCallback, Stop, TimeLimit
 
 #: Names of the engines.
 ENGINES = ("serial", "ray")
@@ -69,3 +72,32 @@ def check_engine(name: str | None, address: str | None) -> None:
     """
     if (name == "ray" or address is not None) and not has_ray():
         raise SettingsError(describe_missing_extra("the engine ray", "ray"))
+
+
+class TimedEngine:
+    """Engine whose searches end at a time, but not before their first epoch.
+
+    The steps after a search are not left out.
+
+    Parameters
+    ----------
+    engine : Engine
+    until : float
+        Monotonic time at which the last search ends.
+    searches : int
+        Number of searches, one after the other. Each has an equal part of the time that is left.
+    """
+
+    def __init__(self, engine: Engine, until: float, searches: int = 1) -> None:
+        self._engine, self._until, self._left = engine, until, searches
+
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+        """Run the next search."""
+        limit = TimeLimit(self._until, monotonic, stop).share(self._left)
+        self._left = max(1, self._left - 1)
+        begun = False
+        epochs = self._engine.run(problem, start, lambda: limit() if begun else stop())
+        with closing(epochs):
+            for epoch in epochs:
+                begun = True
+                yield epoch

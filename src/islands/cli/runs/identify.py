@@ -10,13 +10,12 @@ from typing import Any, NamedTuple
 
 import islands
 from islands.cli.console import errors, output, print_message
-from islands.cli.engines import ENGINES, check_engine, start_engine
+from islands.cli.engines import ENGINES, TimedEngine, check_engine, start_engine
 from islands.cli.output_folder import keep_models, print_failures, show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
 from islands.cli.recordings import Recordings, measured_names, state_extrapolation
 from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
 from islands.cli.runs.held_out_test import TEST, evaluate_test
-from islands.cli.runs.timed_engine import TimedEngine
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
 from islands.errors import ModelError, RecordError, SettingsError

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 
 import pytest
 
+from islands.cli import engines
 from islands.cli.runs import identify as command
-from islands.cli.runs import timed_engine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.persistence.checkpoints import read_checkpoint, write_checkpoint
@@ -98,7 +98,7 @@ def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
 
 def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
-    for module in (command, timed_engine):
+    for module in (command, engines):
         monkeypatch.setattr(module, "monotonic", lambda: clock[0])
 
     def watch(state):
