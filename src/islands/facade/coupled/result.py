@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import ModelError
+from islands.errors import ModelError, SettingsError
 from islands.export import export_or_write
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.facade.results.identification import Result
+from islands.facade.results.identification import Result, list_errors
 from islands.facade.results.model_analysis import linearise
-from islands.facade.results.model_simulation import coupled_record_of_model
+from islands.facade.results.model_simulation import coupled_record_of_model, hold_predictions
+from islands.facade.results.notebook_html import render_sentences
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel, coupled_signals
 from islands.models.state_space import StateSpace
@@ -58,6 +59,7 @@ from islands.validation.predictable_residual import (
 from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
@@ -119,6 +121,18 @@ class FittedCoupledModel:
             return free_run(self.model, data, self.warm_up if warm_up is None else warm_up)
         return simulate_inputs(self.model, data.map(lambda each: match_rate(self.model, each)), y, states)
 
+    def predict(self, record: "RecordLike | CoupledRecord") -> NDArray[np.float64]:
+        """Return the free run of all outputs, one row for every row of the data, shape (samples, outputs).
+
+        It starts from the first samples of the outputs, as many as the largest lag of the model, or from rest
+        without any output. NaN before the first prediction and after a divergence.
+        """
+        measured = coupled_record_of_model(self.model, record)
+        data = measured.map(lambda each: match_rate(self.model, each))
+        found = self.simulate(data, self.model.maximum_lag).y
+        is_same = all(one is other for one, other in zip(measured.records, data.records, strict=True))
+        return found if is_same else hold_predictions(measured, data, found)
+
     def stepper(
         self,
         u: "OperatingPoint | None" = None,
@@ -129,7 +143,7 @@ class FittedCoupledModel:
         return Stepper(self.model, u, y, states)
 
     def bands(
-        self, record: CoupledRecord, level: float = LEVEL, warm_up: int | None = None
+        self, record: "RecordLike | CoupledRecord", level: float = LEVEL, warm_up: int | None = None
     ) -> tuple[PredictionBand, ...]:
         """Simulate all outputs of a record, each with a band that contains its measured samples.
 
@@ -158,7 +172,8 @@ class FittedCoupledModel:
                 "the search was stopped before them"
             )
         first = self.warm_up if warm_up is None else warm_up
-        data = match_coupled(self.model, record.map(lambda each: match_rate(self.model, each)))
+        measured = coupled_record_of_model(self.model, record)
+        data = match_coupled(self.model, measured.map(lambda each: match_rate(self.model, each)))
         run = free_run(self.model, data, first).y
         runs = self._simulate_ensembles(data, first)
         return tuple(
@@ -309,6 +324,29 @@ class CoupledResult(FittedCoupledModel):
                     for mode, run in runs.items()
                 }
         return found
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a table with one row per output: errors as of `Result.to_pandas`, and the equation.
+
+        Raises
+        ------
+        SettingsError
+            pandas is not installed.
+        """
+        try:
+            import pandas  # noqa: PLC0415
+        except ImportError as error:
+            raise SettingsError("install pandas to get a table of the outputs") from error
+        pairs = zip(self.metrics.items(), self.model.models, strict=True)
+        rows = [
+            {"output": name, "terms": single.size, **list_errors(errors), "equation": single.equation().named}
+            for (name, errors), single in pairs
+        ]
+        return pandas.DataFrame(rows).set_index("output")
+
+    def _repr_html_(self) -> str:
+        sentences = [line for line in self.sentences() if not line.startswith(" ")]
+        return render_sentences(sentences, None, "", self.model.equation().mathml)
 
     def plot(self, output: str) -> "Figure":
         """Draw the free run of one output on the validation data, with its 90 % band."""

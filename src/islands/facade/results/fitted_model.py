@@ -144,8 +144,8 @@ class FittedModel:
 
     @property
     def equation(self) -> str:
-        """Equation as plain text."""
-        return self.model.equation().line
+        """Equation as plain text, with the column names of the record."""
+        return self.model.equation().named
 
     @property
     def latex(self) -> str:

@@ -24,6 +24,7 @@ from islands.report.text.statements import describe
 from islands.report.text.summary import summary
 from islands.simulation.predictors import Simulation
 from islands.simulation.stepper import Stepper
+from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Recommendation
 
 if TYPE_CHECKING:
@@ -297,18 +298,21 @@ class Result:
 
 
 def _row(entry: FittedModel, recommended: bool) -> dict[str, object]:
-    parts = {"est": "estimation", "val": "validation"}
-    errors = {
-        f"{name}_{short}": getattr(entry.metrics[part]["free_run"], name)
-        for short, part in parts.items()
-        for name in ("rmse", "mape", "r2")
-    }
-    one_step = entry.metrics["validation"]["one_step_ahead"].rmse
     return {
         "rank": entry.rank,
         "recommended": recommended,
         "terms": entry.model.size,
-        **errors,
-        "one_step_rmse_val": one_step,
+        **list_errors(entry.metrics),
         "equation": entry.equation,
     }
+
+
+def list_errors(metrics: Mapping[str, Mapping[str, Metrics]]) -> dict[str, float]:
+    """Return the errors of a table by column: in free run on both parts of the data, and one step ahead."""
+    parts = {"est": "estimation", "val": "validation"}
+    errors = {
+        f"{name}_{short}": float(getattr(metrics[part]["free_run"], name))
+        for short, part in parts.items()
+        for name in ("rmse", "mape", "r2")
+    }
+    return {**errors, "one_step_rmse_val": metrics["validation"]["one_step_ahead"].rmse}

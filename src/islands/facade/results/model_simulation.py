@@ -195,12 +195,18 @@ def predict(model: DynamicModel, record: Dataset, warm_up: int | None = None) ->
         The record does not match the model, is too short, or its output is missing in the warm-up.
     """
     data = match_rate(model, record)
-    simulated = run_freely(model, data, warm_up).y
+    return hold_predictions(record, data, run_freely(model, data, warm_up).y)
+
+
+def hold_predictions(
+    record: AnyRecord, data: AnyRecord, simulated: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return a simulation at the rate of a model with one value for every sample as measured."""
     if data is record:
         return simulated
-    predicted = np.full(record.samples, np.nan)
+    predicted = np.full((record.samples, *simulated.shape[1:]), np.nan)
     every = round(data.dt / record.dt)
     for (begin, end), (first, last) in zip(record.bounds, data.bounds, strict=True):
-        held = np.repeat(simulated[first:last], every)[: end - begin]
+        held = np.repeat(simulated[first:last], every, axis=0)[: end - begin]
         predicted[begin : begin + len(held)] = held
     return predicted

@@ -150,7 +150,7 @@ def drawing(request):
 def test_constant_output_gives_a_model_of_one_term(tmp_path, drawing):
     still = with_output(piezo(), np.full(600, 3.0))
     made = islands.fit(still)
-    assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
+    assert [model.equation for model in made.models] == ["y_um(k) = y_um(k-1)"]
     assert made.best.metrics["validation"]["free_run"].rmse == 0.0
     assert made.best.physics.hold_drift_percent == 0.0
     (row,) = (line for line in str(made).splitlines() if line.strip().startswith("1*"))

@@ -55,6 +55,23 @@ def test_without_noise_the_true_equations_are_found() -> None:
         np.testing.assert_allclose(chosen.parameters, true.parameters, rtol=1e-6)
 
 
+def test_a_result_of_several_outputs_takes_frames_and_inputs_alone(found) -> None:
+    data = found.split.validation
+    frame = {"u": data.u[:, 0], **{each.output_name: each.y for each in data.records}}
+    assert found.simulate(frame).y.tobytes() == found.simulate(data).y.tobytes()
+    lag = found.model.maximum_lag
+    assert np.array_equal(found.predict(frame), found.simulate(data, lag).y, equal_nan=True)
+    from_rest = found.simulate({"u": data.u[:, 0]}, y=[0.1, 0.2]).y
+    stepper = found.stepper(data.u[0], [0.1, 0.2])
+    assert np.array([stepper.step(each) for each in data.u]).tobytes() == from_rest.tobytes()
+    table = found.to_pandas()
+    assert table.index.tolist() == ["y1", "y2"]
+    assert table.rmse_val.tolist() == [
+        found.metrics[name]["validation"]["free_run"].rmse for name in ("y1", "y2")
+    ]
+    assert "<math" in found._repr_html_()
+
+
 @pytest.mark.ci
 def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> None:
     with undrawn_figures():

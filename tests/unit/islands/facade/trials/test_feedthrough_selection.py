@@ -93,7 +93,7 @@ def test_the_defaults_find_the_static_map_of_two_inputs():
     force = 2.0 * i**2 + 0.5 * i * x + rng.normal(0.0, 0.02, 2000)
     found = islands.fit(Dataset(np.column_stack([i, x]), force, 0.01, ("i_A", "x_mm"), "F_N"))
     assert found.search_result.direct_inputs == ("i_A", "x_mm")
-    assert re.sub(r"[\d.]+\*", "", found.best.equation) == "y(k) = u1(k)^2 + u1(k)*u2(k)"
+    assert re.sub(r"[\d.]+\*", "", found.best.equation) == "F_N(k) = i_A(k)^2 + i_A(k)*x_mm(k)"
     assert found.best.model.parameters == pytest.approx((2.0, 0.5), abs=0.002)
     assert found.best.metrics["validation"]["free_run"].rmse < 0.021
 
@@ -117,4 +117,4 @@ def test_identify_finds_it_likewise():
     changes = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 1, "max_height": 1}
     found = islands.identify(lag(white(0), 0), preset="narx", shifts=(1,), average=1, **changes)
     assert found.search_result.direct_inputs == ("u_V",)
-    assert "u(k)" in found.best.equation
+    assert "u_V(k)" in found.best.equation
