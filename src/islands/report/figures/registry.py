@@ -18,14 +18,13 @@ from islands.records.split import Split
 from islands.report.figures.availability import list_model_figures
 from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.report.figures.free_run import draw_free_run, draw_free_run_panel
-from islands.report.figures.hold import draw_holds
-from islands.report.figures.hysteresis_loop import draw_loop, draw_loop_panel
-from islands.report.figures.latent_structure import draw_structure
+from islands.report.figures.hysteresis import draw_holds, draw_loop, draw_loop_panel
+from islands.report.figures.latent import draw_structure, draw_unit_curves
 from islands.report.figures.linear_system import draw_bode
+from islands.report.figures.lines import break_line, downsample
 from islands.report.figures.names import LEAST_ISLANDS
-from islands.report.figures.record import draw_record
 from islands.report.figures.residuals import draw_residual_correlations
-from islands.report.figures.unit_curves import draw_unit_curves
+from islands.report.figures.style import FRAME, MEASURED, RESIDUAL, blank, finish, house_style, label
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment, assess_residual
 from islands.validation.predictable_residual import ResidualStructure
@@ -224,3 +223,21 @@ def search_figures(result: SearchResult) -> tuple[str, ...]:
     history = result.search.history
     islands = len(history[-1].islands) if history else 0
     return tuple(name for name in SEARCH_FIGURES if islands >= LEAST_ISLANDS.get(name, 0))
+
+
+@house_style()
+def draw_record(record: Dataset, title: str = "") -> Figure:
+    """Draw every input and, below them, the output; segments are separated by gaps and lines."""
+    names = [*record.input_names, record.output_name]
+    units = [*record.input_units, record.output_unit]
+    figure = blank(1.0 + 1.3 * len(names), title)
+    panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+    for axes, name, unit, values in zip(panels, names, units, [*record.u.T, record.y], strict=True):
+        colour = MEASURED if axes is panels[-1] else RESIDUAL
+        line = downsample(break_line(record, record.time), break_line(record, values))
+        axes.plot(*line, color=colour, linewidth=0.7)
+        axes.set_ylabel(label(name, unit))
+        for begin, _ in record.bounds[1:]:
+            axes.axvline(record.time[begin], color=FRAME, linewidth=0.6)
+    panels[-1].set_xlabel("time (s)")
+    return finish(figure)
