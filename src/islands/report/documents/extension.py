@@ -546,16 +546,10 @@ def list_contradictions(fit: CalibrationResult) -> tuple[str, ...]:
     An offset in the balance of a state with a lower limit, such as a level, may take something away where
     nothing is left. An effect of the output may show values beyond the limits of the state that is measured.
     """
-    simulator = _find_equations(fit.simulation.simulator)
-    if simulator is None:
+    simulator = _unwrap(fit.simulation.simulator)
+    if not isinstance(simulator, OdeSimulator):
         return ()
     return (*_check_offsets(fit, simulator.system), *_check_output(fit, simulator.system))
-
-
-def _find_equations(simulator: Simulator) -> OdeSimulator | None:
-    if isinstance(simulator, ResampledSimulator):
-        return _find_equations(simulator.simulator)
-    return simulator if isinstance(simulator, OdeSimulator) else None
 
 
 def _check_offsets(fit: CalibrationResult, system: OdeSystem) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Facts about results: the quantities and decisions that sentences state, from ``result.json`` alone.
 
-A facts object is made once for a document and decides everything once; it is what the templates of
-`islands.sentences` read. The limits of all sentences about results are here; the templates have none.
+A facts object is made once for each document, and the templates of `islands.sentences` read it. The limits of
+all sentences about results are here; the templates have none.
 """
 
 import re

@@ -119,7 +119,9 @@ def _describe_linear_part(document: Document, model: DynamicModel) -> list[str]:
     with suppress(ModelError):
         y = find_rest(measured_block(model), point, tuple(bands["range"]["output"]))
         system = model.linearise(point, y)
-        return wrap(f"Linear part about {system.describe_point()}: {'; '.join(system.describe())}.")
+        return wrap(
+            write_one("result", "linear_part", point=system.describe_point(), parts=system.describe())
+        )
     return []
 
 

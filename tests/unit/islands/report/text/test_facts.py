@@ -90,6 +90,7 @@ RESULTS = {
     ],
     "finding_met_constraints": [{"models.0.constraints": [CHECK | {"met": True}, CHECK | {"met": True}]}],
     "finding_preset": [{"settings.choice": {"reasons": ["A loop is closed.", "Preset hysteresis."]}}],
+    "linear_part": [{}],
     "finding_details": [{}],
     "finding_uses": [{}, LOST],
     "finding_not_computed": [{"not_computed": [{"step": "bands", "reason": "the disk is full"}]}],
@@ -248,7 +249,7 @@ def list_facts(cases, make):
 
 
 def make_result_facts(changes):
-    return {"f": ResultFacts(change(result(), changes))}
+    return {"f": ResultFacts(change(result(), changes)), "point": "u_V = 1 V", "parts": ["a gain of 2 um/V"]}
 
 
 def make_coupled_facts(changes):
