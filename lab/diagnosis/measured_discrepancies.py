@@ -26,7 +26,7 @@ import numpy as np  # noqa: E402 - after the environment is set
 
 import islands  # noqa: E402
 from islands.diagnosis.result import Diagnosis  # noqa: E402
-from islands.report.documents.extension_json import extended_document  # noqa: E402
+from islands.report.documents.extension import extended_document  # noqa: E402
 from islands.simulators.specification.factory import make_simulator  # noqa: E402
 from lab.diagnosis.self_test import diagnose_surrogate  # noqa: E402
 from lab.diagnosis.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402

@@ -24,7 +24,7 @@ from islands.diagnosis.calibration.record_simulation import simulate_spec
 from islands.diagnosis.inference.verdict import Verdict
 from islands.diagnosis.result import Diagnosis
 from islands.errors import RecordError
-from islands.report.documents.extension_json import extended_json
+from islands.report.documents.extension import extended_json
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.factory import make_simulator
 

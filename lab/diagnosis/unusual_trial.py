@@ -12,7 +12,7 @@ from islands.effects import catalogue
 from islands.errors import IslandsError
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LocalExtendedSpec
 from lab.diagnosis.injection.excitation import Signal

@@ -10,9 +10,17 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from islands.records.dataset import Dataset
-from islands.report.figures.downsampling import downsample
-from islands.report.figures.style import MEASURED_WIDTH, SIMULATED_WIDTH, STEPS, blank, finish, label
-from islands.report.figures.themes import Theme, themed_style
+from islands.report.figures.lines import downsample
+from islands.report.figures.style import (
+    MEASURED_WIDTH,
+    SIMULATED_WIDTH,
+    STEPS,
+    Theme,
+    blank,
+    finish,
+    label,
+    themed_style,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +48,7 @@ def draw_training_data(record: Dataset, theme: str = "light") -> Figure:
     ----------
     record : Dataset
     theme : str
-        An entry of `islands.report.figures.themes.THEMES`.
+        An entry of `islands.report.figures.style.THEMES`.
     """
     with themed_style(theme) as colours:
         figure = blank(3.2)
@@ -67,7 +75,7 @@ def draw_validation(
     validation, loading, unloading : Reproduced
         The record of (a) and (b), of (c), and of (d).
     theme : str
-        An entry of `islands.report.figures.themes.THEMES`.
+        An entry of `islands.report.figures.style.THEMES`.
 
     Returns
     -------
@@ -128,7 +136,7 @@ def draw_shares(
         Generations and shares in per cent of each search, by the name of the kind of search; two kinds at
         most.
     theme : str
-        An entry of `islands.report.figures.themes.THEMES`.
+        An entry of `islands.report.figures.style.THEMES`.
     """
     with themed_style(theme) as colours:
         figure = blank(2.8)
@@ -157,7 +165,7 @@ def draw_errors_by_switch(
     published : float
         Error of the paper, drawn as a vertical line.
     theme : str
-        An entry of `islands.report.figures.themes.THEMES`.
+        An entry of `islands.report.figures.style.THEMES`.
     """
     with themed_style(theme) as colours:
         figure = blank(1.0 + 0.32 * len(errors))

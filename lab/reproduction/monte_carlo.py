@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from islands.report.figures.style import blank, finish, set_log_scale
-from islands.report.figures.themes import Theme, themed_style
+from islands.report.figures.style import Theme, blank, finish, set_log_scale, themed_style
 
 #: Width of a box; the factors are at 0, 1, 2, ...
 _BOX = 0.3

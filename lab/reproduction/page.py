@@ -8,8 +8,7 @@ from io import BytesIO
 from pathlib import Path
 
 from islands.persistence.checkpoints import replace_file
-from islands.report.figures.style import save
-from islands.report.figures.themes import THEMES
+from islands.report.figures.style import THEMES, save
 from lab.reproduction.section import ComparisonTable, Section, SectionFigure
 
 #: Files of a reproduction in its folder.

@@ -55,7 +55,7 @@ class SectionFigure:
         Unique name, which its files have: ``figure-5a``.
     caption : str
     draw : callable
-        Draws the figure in a theme, an entry of `islands.report.figures.themes.THEMES`.
+        Draws the figure in a theme, an entry of `islands.report.figures.style.THEMES`.
     """
 
     name: str

@@ -38,8 +38,7 @@ from islands.report.figures.free_run import draw_free_run
 from islands.report.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.report.figures.style import save, write_text_figure
 from islands.report.pages.comparison import ComparedModel, comparison_report
-from islands.report.pages.coupled import coupled_report
-from islands.report.pages.identification import identification_report
+from islands.report.pages.identification import coupled_report, identification_report
 from islands.report.pages.origin import Origin
 from islands.validation.assessment import Assessment, assess, with_refit
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs

@@ -9,3 +9,6 @@ RESOLUTION = 1e-6
 
 #: Median of the absolute values of a normal variable of standard deviation 1.
 NORMAL_MEDIAN = 0.6745
+
+#: Standard errors from an estimate to the ends of its 95 % interval (normal distribution).
+NORMAL_95 = 1.96

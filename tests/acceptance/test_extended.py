@@ -15,7 +15,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.effects.catalogue import CATALOGUE
 from islands.export.fmu import find_compiler
 from islands.records.writer import write_record
-from islands.report.documents.extension_json import extended_json
+from islands.report.documents.extension import extended_json
 from islands.simulators.extended import ExtendedSimulator, make_context
 from support.command_line import fail, succeed
 from support.simulated_records import EQUATIONS, made, write_fmu

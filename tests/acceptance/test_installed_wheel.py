@@ -16,7 +16,7 @@ pytestmark = pytest.mark.ci
 
 #: Data files by package, which reports, the dashboard and type checkers need.
 DATA = {
-    "islands": ("py.typed", "report/pages/templates/report.html", "report/text/templates/result.txt"),
+    "islands": ("py.typed", "report/pages/templates/report.html", "templates/result.txt"),
     "islands_api": ("py.typed", "dashboard/index.html", "dashboard/islands.css", "dashboard/islands.js"),
     "islands_service": ("py.typed",),
 }

@@ -9,7 +9,7 @@ import pytest
 
 import islands
 from islands.report.figures.names import ALL_FIGURES
-from islands.report.pages.saved_result import report_saved_result
+from islands.report.pages.identification import report_saved_result
 from support.identifications import record
 from support.screen import Screen
 

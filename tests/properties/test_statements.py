@@ -12,15 +12,12 @@ import islands
 from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.report.documents.result_folder import finite, residual_structure_document, result_document
-from islands.report.pages.coupled import coupled_report
-from islands.report.pages.identification import identification_report
+from islands.report.pages.identification import coupled_report, identification_report
 from islands.report.pages.origin import Origin
-from islands.report.text.coupled_statements import describe_coupled
 from islands.report.text.diagnosis_facts import DiagnosisFacts
-from islands.report.text.diagnosis_statements import describe_diagnosis
-from islands.report.text.statements import describe
+from islands.report.text.statements import describe, describe_coupled, describe_diagnosis
 from islands.report.text.summary import summary
-from islands.report.text.templates import write
+from islands.sentences import write
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
@@ -275,7 +272,7 @@ def test_an_error_that_is_written_as_far_from_the_noise_is_not_explained(ratio):
 def test_no_two_sentences_about_a_diagnosis_contradict_each_other(choices):
     document = make_chosen_document(choices)
     assert not find_contradictions(" ".join(describe_diagnosis(document)))
-    assert len(write("diagnosis.txt", "verdict", f=DiagnosisFacts(document))) == 1
+    assert len(write("diagnosis", "verdict", f=DiagnosisFacts(document))) == 1
 
 
 CASES = make_cases()

@@ -18,7 +18,7 @@ from islands.effects.interface.effect import Effect, Site
 from islands.export.equations.collection import collect_equations
 from islands.export.extension import export_extended
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import InterSample, ResampledSimulator

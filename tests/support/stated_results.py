@@ -14,8 +14,7 @@ from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.results.notebook_html import render_sentences
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
-from islands.report.pages.coupled import coupled_report
-from islands.report.pages.identification import identification_report
+from islands.report.pages.identification import coupled_report, identification_report
 from islands.report.pages.origin import Origin
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.diagnosed_records import MEASURED_OUTPUTS, OTHERS, diagnose_difference

@@ -1,6 +1,11 @@
 """Checker of the sentences about a result: pairs of statements that exclude each other."""
 
 import re
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from typing import Any
+
+from islands.sentences import write_named
 
 #: Traces of a value that is missing or was not written for a reader.
 EMPTY = re.compile(
@@ -10,7 +15,7 @@ EMPTY = re.compile(
 #: Pairs of patterns that one text does not contain together.
 EXCLUSIVE = (
     (r"As a simulation: good", r"Fails at: (?!none of the checks)"),
-    (r"As a simulation: good", r"within the limits below"),
+    (r"As a simulation: good", r"within the limits above"),
     (r"As a simulation: good", r"Good for: no use"),
     (r"As a simulation: (usable|unsuitable)", r"Fails at: none of the checks"),
     (r"As a simulation: unsuitable", r"Good for: [^.]*simulation from the inputs alone"),
@@ -151,3 +156,15 @@ def find_contradictions(text: str) -> list[str]:
     return found + [
         f"{pattern}: {values}" for pattern in REPEATED if len(values := set(re.findall(pattern, joined))) > 1
     ]
+
+
+def check_template(template: str, cases: Mapping[str, Iterable[Mapping[str, Any]]]) -> None:
+    """Assert that each statement of a template is written and complete in each of its cases."""
+    source = (files("islands") / "templates" / f"{template}.txt").read_text(encoding="utf-8")
+    assert set(re.findall(r"block (\w+)", source)) == set(cases)
+    for name, variants in cases.items():
+        for facts in variants:
+            written = dict(write_named(template, name, **facts))
+            assert name in written, name
+            empty = {key: text for key, text in written.items() if EMPTY.search(text)}
+            assert not empty, empty

@@ -23,7 +23,7 @@ from islands.models.narx import Model
 from islands.parallel import ParallelMap
 from islands.progress import Steps, TimeLeft, report_part
 from islands.report.pages.origin import Origin
-from islands.report.text.diagnosis_statements import describe_headline
+from islands.report.text.statements import describe_headline
 from islands.simulators.fmu.instance import LOCAL_FMUS, FmuSource
 from islands.simulators.specification.factory import make_simulator
 from islands_service.coordinator.checkpoints import CHECKPOINT_SHARE, DiagnosisCheckpoints, DiagnosisState

@@ -11,8 +11,7 @@ from islands.persistence.models import model_json
 from islands.progress import explain_failure
 from islands.records.coupled import match_coupled
 from islands.report.documents.result_folder import result_document
-from islands.report.text.coupled_statements import describe_coupled
-from islands.report.text.statements import describe
+from islands.report.text.statements import describe, describe_coupled
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import JobOutcome, JobState

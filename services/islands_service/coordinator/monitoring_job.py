@@ -11,6 +11,8 @@ from islands.facade.record_monitor import create_monitor, monitor_record
 from islands.records.dataset import Dataset
 from islands.report.documents.monitor_json import (
     describe_alarm,
+    describe_alarm_text,
+    describe_last_record,
     describe_monitor,
     describe_record,
     describe_status,
@@ -22,7 +24,6 @@ from islands.report.documents.monitor_state import (
     monitor_from_head,
     record_to_json,
 )
-from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from islands_service.coordinator.job_failures import check_readable, make_problem_document
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import JobOutcome, JobState, ProgressReport

@@ -152,7 +152,7 @@ def _inspect_dataset(record: Dataset) -> RecordInspection:
         for channel in channels(record)
     )
     sampling = InspectedSampling(None, record.samples, record.dt, None, (), (), (), NO_BREAKS, "")
-    choice = ColumnChoice(record.input_names, record.output_name, None, "Inputs and output are as given.")
+    choice = ColumnChoice(record.input_names, record.output_name, None, "choice_given")
     return RecordInspection("", columns, sampling, choice, measure_facts(record), (), "", record=record)
 
 

@@ -6,11 +6,10 @@ The import takes a second, since it loads the analysis and the figures.
 from collections.abc import Iterator
 from pathlib import Path
 
-from islands.report.documents.monitor_json import monitor_json
+from islands.report.documents.monitor_json import describe_alarm_text, describe_last_record, monitor_json
 from islands.report.documents.monitor_state import monitor_from_json
 from islands.report.figures.monitored_states import draw_monitored_states
 from islands.report.figures.style import save
-from islands.report.text.monitor import describe_alarm_text, describe_last_record
 
 #: Files, as ``islands monitor`` writes them.
 STATE, RESULT, FIGURE = "state.json", "monitor.json", "monitor.svg"

@@ -44,8 +44,7 @@ def inspect(
         if found.record is not None:
             # Imported here, because it loads matplotlib.
             from islands.report.figures.overview import draw_overview  # noqa: PLC0415
-            from islands.report.figures.style import save  # noqa: PLC0415
-            from islands.report.figures.themes import THEMES  # noqa: PLC0415
+            from islands.report.figures.style import THEMES, save  # noqa: PLC0415
 
             for theme in THEMES:
                 suffix = "" if theme == "light" else f"-{theme}"

@@ -26,7 +26,7 @@ from islands.facade.record_monitor import (
 )
 from islands.records.dataset import Dataset
 from islands.records.reading.options import ReadingOptions
-from islands.report.documents.monitor_json import monitor_json
+from islands.report.documents.monitor_json import describe_alarm_text, describe_last_record, monitor_json
 from islands.report.documents.monitor_state import (
     RejectedRecord,
     SavedMonitor,
@@ -35,7 +35,6 @@ from islands.report.documents.monitor_state import (
 )
 from islands.report.figures.monitored_states import draw_monitored_states
 from islands.report.figures.style import save
-from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from islands.settings_schema import setting, settings_class
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.table import ColumnSpec, ExtendedSpec, LocalSpec, innermost

@@ -109,7 +109,7 @@ def show(
 
 def _write_report(folder: Path, out: Path | None) -> None:
     # The models take a second to import.
-    from islands.report.pages.saved_result import report_saved_result  # noqa: PLC0415
+    from islands.report.pages.identification import report_saved_result  # noqa: PLC0415
 
     if not folder.exists():
         raise SettingsError(f"there is no folder {folder}: a report is of the folder of a result")

@@ -44,8 +44,8 @@ from islands.report.documents.result_folder import (
 )
 from islands.report.figures.names import FREE_RUN, OVERVIEW
 from islands.report.pages.origin import REPORT_FILE
-from islands.report.text.coupled_statements import describe_coupled
 from islands.report.text.layout import term_table, wrap
+from islands.report.text.statements import describe_coupled
 from islands.simulation.input_response import simulate_inputs
 from islands.simulation.predictors import Simulation, free_run, one_step_ahead
 from islands.simulation.stepper import Stepper

@@ -20,10 +20,10 @@ from islands.persistence.checkpoints import replace_file
 from islands.progress import Steps
 from islands.records.writer import input_csv
 from islands.report.documents.diagnosis_json import as_json, diagnosis_document
-from islands.report.documents.experiment_json import NEXT_EXPERIMENT_FILE, get_suggested_input
-from islands.report.documents.extension_json import extended_document, extended_json
+from islands.report.documents.extension import extended_document, extended_json
+from islands.report.documents.plan_json import NEXT_EXPERIMENT_FILE, get_suggested_input
 from islands.report.pages.origin import REPORT_FILE, Origin
-from islands.report.text.diagnosis_statements import describe_diagnosis
+from islands.report.text.statements import describe_diagnosis
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedSpec
 

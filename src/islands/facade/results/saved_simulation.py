@@ -14,7 +14,7 @@ from islands.facade.results.model_simulation import simulate
 from islands.facade.results.notebook_html import render_sentences
 from islands.records.dataset import Dataset
 from islands.records.reading.data_frames import as_record
-from islands.report.text.diagnosis_statements import describe_diagnosis
+from islands.report.text.statements import describe_diagnosis
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec

@@ -40,8 +40,3 @@ def channels(record: Dataset) -> tuple[Channel, ...]:
         for name, unit, signal in zip(record.input_names, record.input_units, record.u.T, strict=True)
     )
     return (*inputs, Channel(record.output_name, record.output_unit, record.y, is_output=True))
-
-
-def describe_amount(value: float, unit: str) -> str:
-    """Return a number with four digits and its unit as text."""
-    return f"{value:.4g} {unit}".rstrip()

@@ -2,8 +2,10 @@
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from islands.records.inspection.column_influence import (
 )
 from islands.records.inspection.column_shape import describe_copy, is_label, is_product, is_total
 from islands.records.inspection.gross_errors import find_gross_errors
+from islands.sentences import write, write_one
 
 #: Names that say that a column is an input or an output, by the first word of the name.
 _SURE = {
@@ -87,14 +90,34 @@ class ColumnChoice:
         Empty, like the inputs, if no column visibly responds to another one.
     confidence : float or None
         Probability that the choice is right; None if the user made it.
-    reason : str
-        One sentence.
+    finding : str
+        Why the choice was made: a statement of the template ``record``.
+    details : mapping
+        Quantities and decisions that the reason states.
     """
 
     inputs: tuple[str, ...]
     output: str
     confidence: float | None
-    reason: str
+    finding: str
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def reason(self) -> str:
+        """The reason in one sentence, with remarks on other columns."""
+        parts = [write_one("record", self.finding, choice=self, **self.details)]
+        parts += write("record", "remark", **{**_NO_REMARKS, **self.details})
+        return "; ".join(parts) + "."
+
+    def as_document(self) -> dict[str, Any]:
+        """Return the choice as a JSON document."""
+        return {name: getattr(self, name) for name in ("inputs", "output", "confidence", "reason")}
+
+
+#: Remarks on columns, which a choice without further columns does not have.
+_NO_REMARKS: Mapping[str, Any] = MappingProxyType(
+    {"labels": (), "copies": (), "products": (), "compared": None}
+)
 
 
 def choose_columns(
@@ -112,7 +135,7 @@ def choose_columns(
         Choice of the user, completed if one of them is missing.
     """
     if inputs and output is not None:
-        return ColumnChoice(tuple(inputs), output, None, "Inputs and output are as given.")
+        return ColumnChoice(tuple(inputs), output, None, "choice_given")
     given = {*inputs, *([] if output is None else [output])}
     # Differences of very large numbers overflow.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -136,7 +159,7 @@ def choose_columns(
         labels = _find_labels(signals, given)
         signals = {name: values for name, values in signals.items() if name not in labels}
         if len(signals) < 2:
-            return ColumnChoice((), "", None, _describe_too_few(tuple(signals)))
+            return ColumnChoice((), "", None, "choice_too_few", {"signal": next(iter(signals), "")})
         copies = _find_copies(signals, given)
         kept = {name: values for name, values in signals.items() if name not in copies}
         products = _find_products(kept, given)
@@ -146,12 +169,13 @@ def choose_columns(
             # The product of independent columns, or a multiple of the only one, may be a response.
             kept, products, copies = signals, {}, {}
             choice = _choose(kept, given, tuple(inputs), output)
-    remarks = [f"{label} only numbers groups of values of {name}" for label, name in labels.items()]
-    remarks += [f"{name} is {kind} of {source}" for name, (kind, source) in copies.items()]
-    remarks += [f"{name} is the product of {one} and {other}" for name, (one, other) in products.items()]
-    if len(kept) > _MOST_COLUMNS:
-        remarks.append(f"of {len(kept)} columns {_MOST_COLUMNS} are compared")
-    return replace(choice, reason="; ".join([choice.reason.removesuffix("."), *remarks]) + ".")
+    remarks = {
+        "labels": tuple(labels.items()),
+        "copies": tuple((name, *found) for name, found in copies.items()),
+        "products": tuple((name, *found) for name, found in products.items()),
+        "compared": (len(kept), _MOST_COLUMNS) if len(kept) > _MOST_COLUMNS else None,
+    }
+    return replace(choice, details={**choice.details, **remarks})
 
 
 def _choose(
@@ -229,15 +253,6 @@ def _both_known(values: NDArray[np.float64], other: NDArray[np.float64]) -> NDAr
     )
 
 
-def _describe_too_few(signals: Sequence[str]) -> str:
-    """Return why no columns can be chosen among less than two signals."""
-    found = f"Only {signals[0]} is a signal" if signals else "No column is a signal"
-    return (
-        f"{found}, which is a column of numbers that vary and do not only count: a record has an input and "
-        "an output, each in its column."
-    )
-
-
 def _first_word(name: str) -> str:
     stem = parse_channel_name(name).stem.rpartition(".")[2]
     return re.split(r"[_\s\-.]", stem.strip().lower(), maxsplit=1)[0]
@@ -310,23 +325,24 @@ class _Comparison:
             allowed &= np.isin(np.arange(len(self.names)), known)[:, None]
             allowed[:, known] = False
         if not allowed.any():
-            return ColumnChoice((), "", None, self._deny(inputs, output))
+            return self._deny(inputs, output)
         best = np.argmax(np.where(allowed, self.odds + _TIE * self.unlimited, -np.inf))
         source, target = (int(place) for place in np.unravel_index(best, self.odds.shape))
         chosen = known or self._add_inputs(source, target)
         return self._explain(inputs or tuple(self.names[place] for place in chosen), chosen, target)
 
-    def _deny(self, inputs: tuple[str, ...], output: str | None) -> str:
+    def _deny(self, inputs: tuple[str, ...], output: str | None) -> ColumnChoice:
+        """Return the choice of no column, with what the user has to name."""
+        finding = "choice_no_response"
         if self.influence is None:
-            return (
-                f"Fewer than {LEAST_SAMPLES} samples have values in all columns, too few to show which "
-                "column responds to which: name inputs and output."
-            )
-        if output is not None:
-            return f"No response of {output} to another column is visible: name the inputs."
-        if inputs:
-            return f"No response of a column to {', '.join(inputs)} is visible: name the output."
-        return "No response of a column to another one is visible: name inputs and output."
+            finding = "choice_too_short"
+        elif output is not None:
+            finding = "choice_no_input"
+        elif inputs:
+            finding = "choice_no_output"
+        # The names that the reason states are those that were given.
+        details = {"inputs": inputs, "output": output, "least": LEAST_SAMPLES}
+        return ColumnChoice((), "", None, finding, details)
 
     def _add_inputs(self, source: int, target: int) -> list[int]:
         """Return the best input and all others that improve the prediction of the output."""
@@ -391,24 +407,19 @@ class _Comparison:
         return gain or self.influence.measure_modulation(self.places[target], at, source)
 
     def _explain(self, inputs: tuple[str, ...], chosen: Sequence[int], target: int) -> ColumnChoice:
-        output, listed = self.names[target], ", ".join(inputs)
+        output = self.names[target]
         rated = [self._rate_input(place, target) for place in chosen]
         confidence = float(np.prod(1.0 / (1.0 + np.exp(-np.array(rated)))))
         confidence = min(max(confidence, _LEAST_PROBABILITY), _MOST_PROBABILITY)
         named = _is_named(output, "output") and all(_is_named(name, "input") for name in inputs)
-        reason = f"{listed} and {output} are chosen by their {'names' if named else 'signals'}"
+        share, is_invisible = None, False
         seen = [place for place in chosen if self.gains[place, target] > 0.0]
         if seen and self.influence is not None:
             known = [self.places[each] for each in chosen if each in self.places]
             gain = self.influence.measure_gain(self.places[target], [], known)
-            part = 1.0 - np.exp(-2.0 * max(gain, *self.gains[seen, target]))
-            predicts = "predict" if len(inputs) > 1 else "predicts"
-            reason += (
-                f"; {listed} {predicts} {100 * part:.0f} % of the changes of {output} that its past leaves"
-            )
+            share = 1.0 - float(np.exp(-2.0 * max(gain, *self.gains[seen, target])))
         elif self.influence is not None:
-            confidence = min(confidence, _BY_NAME_ALONE)
-            reason += f"; no response of {output} to {listed} is visible"
+            confidence, is_invisible = min(confidence, _BY_NAME_ALONE), True
         # A column that responds to the same inputs is another output.
         also = [
             name
@@ -416,8 +427,6 @@ class _Comparison:
             if place not in (*chosen, target)
             and any(self.gains[each, place] > 0.0 and self.odds[each, place] > 0.0 for each in chosen)
         ]
-        if also:
-            reason += f"; {', '.join(also)} {'respond' if len(also) > 1 else 'responds'} to {listed} too"
         # The direction is open if both columns predict each other, as with a response within the sample.
         together = [
             name
@@ -426,10 +435,14 @@ class _Comparison:
             and name not in also
             and any(min(self.gains[each, place], self.gains[place, each]) > 0.0 for each in chosen)
         ]
-        if together:
-            change = "change" if len(together) > 1 else "changes"
-            reason += f"; {', '.join(together)} {change} together with {listed}: the output may be there"
-        return ColumnChoice(inputs, output, confidence, reason + ".")
+        details = {
+            "is_named": named,
+            "share": share,
+            "is_invisible": is_invisible,
+            "also": also,
+            "together": together,
+        }
+        return ColumnChoice(inputs, output, confidence, "choice_found", details)
 
 
 def _is_named(name: str, role: str) -> bool:

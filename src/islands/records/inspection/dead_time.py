@@ -20,6 +20,9 @@ _COARSE = (4, 16)
 #: Probability from which on a lag is stated as one value.
 _LEAST_PROBABILITY = 0.5
 
+#: Probability that is not stated as a number, since none is certain.
+_ALMOST_CERTAIN = 0.99
+
 
 def estimate_dead_times(record: Dataset, places: Sequence[int]) -> list[Fact]:
     """Estimate how many samples after its inputs the output begins to respond.
@@ -48,7 +51,7 @@ def estimate_dead_times(record: Dataset, places: Sequence[int]) -> list[Fact]:
     for group in _group(record, varying):
         weighed |= dict(zip(group, _weigh(record, group), strict=True))
     return [
-        _describe(record, place, weighed[place]) if place in weighed else _describe_silence(record, place)
+        _describe(record, place, weighed[place]) if place in weighed else _make_fact(record, place, "silent")
         for place in places
     ]
 
@@ -86,47 +89,34 @@ def _weigh(record: Dataset, group: Sequence[int]) -> Sequence[LagProbabilities |
     return found
 
 
-def _describe_silence(record: Dataset, place: int) -> Fact:
-    name, output = record.input_names[place], record.output_name
-    return _make_fact(
-        name, None, None, None, f"No lag of {name} is visible at which {output} begins to respond."
-    )
-
-
 def _make_fact(
-    name: str, value: float | None, interval: tuple[float, float] | None, right: float | None, sentence: str
+    record: Dataset,
+    place: int,
+    finding: str,
+    value: float | None = None,
+    found: LagProbabilities | None = None,
+    right: float | None = None,
 ) -> Fact:
-    return Fact("dead-time", name, value, "samples", interval, right, sentence)
+    interval = None if found is None else (float(found.interval[0]), float(found.interval[1]))
+    details = {
+        "output": record.output_name,
+        "dt": record.dt,
+        "is_interval": interval is not None and interval[0] < interval[1],
+        "is_certain": right is not None and right > _ALMOST_CERTAIN,
+    }
+    name = record.input_names[place]
+    return Fact("dead-time", name, f"dead_time_{finding}", value, "samples", interval, right, details)
 
 
 def _describe(record: Dataset, place: int, found: LagProbabilities | None) -> Fact:
-    name = record.input_names[place]
     if found is None:
-        text = f"The record is too short to tell the dead time of {name}."
-        return _make_fact(name, None, None, None, text)
+        return _make_fact(record, place, "short")
     if not found.is_visible:
-        return _describe_silence(record, place)
-    low, high = found.interval
-    interval = (float(low), float(high))
+        return _make_fact(record, place, "silent")
     within = np.convolve(found.values, np.ones(3), "same")
     # Of lags that are equally probable within one sample, the most probable one.
     place_of_value = int(np.argmax(within + 1e-3 * found.values))
     value, right = found.first + place_of_value, min(float(within[place_of_value]), 1.0)
-    response = f"{record.output_name} responds to {name}"
-    between = f"between {low} and {_count(high)}" if low < high else ""
     if right < _LEAST_PROBABILITY:
-        text = f"It is uncertain when {response}: {between} with a probability of 95 %."
-        return _make_fact(name, None, interval, None, text)
-    after = f"after {_count(value)} ({value * record.dt:.4g} s)" if value else "within the sample"
-    range_ = f", {between} with a probability of 95 %" if between else ""
-    chance = f"right within one sample with a probability of {_state_percentage(right)}."
-    return _make_fact(name, float(value), interval, right, f"{response} {after}{range_}; {chance}")
-
-
-def _state_percentage(share: float) -> str:
-    """Return a probability; one that is nearly certain is not stated as certain."""
-    return "more than 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
-
-
-def _count(samples: int) -> str:
-    return f"{samples} sample" if samples == 1 else f"{samples} samples"
+        return _make_fact(record, place, "uncertain", None, found)
+    return _make_fact(record, place, "known", float(value), found, right)

@@ -30,13 +30,11 @@ def measure_drift(record: Dataset) -> Fact:
     name, unit = record.output_name, record.output_unit
     intervals = min(_INTERVALS, record.samples // 8)
     if intervals < _LEAST_INTERVALS:
-        return Fact(
-            "drift", name, None, unit, None, None, f"The record is too short to show a drift of {name}."
-        )
+        return Fact("drift", name, "drift_short", unit=unit)
     cuts = np.linspace(0, record.samples, intervals + 1).astype(int)
     known = [slice(a, b) for a, b in pairwise(cuts.tolist()) if np.isfinite(record.y[a:b]).all()]
     if len(known) < _LEAST_INTERVALS:
-        return Fact("drift", name, None, unit, None, None, f"Too much of {name} is missing to show a drift.")
+        return Fact("drift", name, "drift_missing", unit=unit)
     y = np.array([record.y[part].mean() for part in known])
     time = np.array([0.5 * (part.start + part.stop) / record.samples - 0.5 for part in known])
     columns = [np.ones(len(y)), time]
@@ -58,11 +56,7 @@ def measure_drift(record: Dataset) -> Fact:
     change, extent = float(weights[1]), record.output_range
     significant = abs(change) >= max(_STANDARD_ERRORS * error, _LEAST_DRIFT * extent)
     part = 100.0 * change / extent if extent > 0.0 else 0.0
-    text = f"{name} has no visible drift."
-    if significant:
-        text = (
-            f"{name} drifts by {change:+.3g} {unit}".rstrip()
-            + f" over the record ({part:+.1f} % of its range)."
-        )
+    finding = "drift_visible" if significant else "drift_none"
     right = 0.5 * (1.0 + erf(abs(change) / error / sqrt(2.0))) if error > 0.0 else 1.0
-    return Fact("drift", name, change, unit, (change - 2 * error, change + 2 * error), right, text)
+    interval = (change - 2 * error, change + 2 * error)
+    return Fact("drift", name, finding, change, unit, interval, right, {"percent": part})

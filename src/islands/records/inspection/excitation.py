@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.records.dataset import Dataset
-from islands.records.flat_extremes import count_levels
+from islands.records.flat_extremes import TWO, count_levels
 from islands.records.inspection.channel import Channel
 from islands.records.inspection.fact import Fact
 
@@ -84,29 +84,23 @@ def _measure_band(channel: Channel, record: Dataset) -> Fact:
     frequency, power = estimate_spectrum(channel.values[begin:end], record.dt)
     part = np.cumsum(power) / power.sum()
     low, high = (float(np.interp(edge, part, frequency)) for edge in (0.5 * _OUTSIDE, 1.0 - 0.5 * _OUTSIDE))
-    nyquist = 0.5 / record.dt
-    text = (
-        f"95 % of the power of {channel.name} is between {low:.3g} and {high:.3g} Hz; half the sampling "
-        f"rate is {nyquist:.3g} Hz."
-    )
-    return Fact("band", channel.name, high, "Hz", (low, high), None, text)
+    details = {"nyquist": 0.5 / record.dt}
+    return Fact("band", channel.name, "band", high, "Hz", (low, high), details=details)
 
 
 def _count_levels(channel: Channel) -> Fact:
     levels = count_levels(channel.known)
     if levels > _MOST_LEVELS:
-        return Fact("levels", channel.name, None, "", None, None, f"{channel.name} has many amplitudes.")
-    text = f"{channel.name} has {levels} levels"
-    text += ": they show no nonlinearity of the input." if levels == 2 else "."
-    return Fact("levels", channel.name, float(levels), "", None, None, text)
+        return Fact("levels", channel.name, "levels_many")
+    details = {"levels": levels, "is_binary": levels == TWO}
+    return Fact("levels", channel.name, "levels_few", float(levels), details=details)
 
 
 def _measure_coverage(channel: Channel) -> Fact:
     known = channel.known
     counts = np.histogram(known, _PARTS)[0]
     share = float(np.mean(counts >= _COVERED * known.size / _PARTS))
-    text = f"{channel.name} covers {100 * share:.0f} % of its range with enough samples."
-    return Fact("coverage", channel.name, share, "", None, None, text)
+    return Fact("coverage", channel.name, "coverage", share)
 
 
 def _find_order(channel: Channel, record: Dataset) -> Fact:
@@ -114,8 +108,7 @@ def _find_order(channel: Channel, record: Dataset) -> Fact:
     centred = channel.values - channel.values.mean()
     most = min(_MOST_ORDER, max(record.segments) // 4)
     if most < 1 or not np.ptp(centred) > 0.0:
-        text = f"The record is too short to show the persistence of {channel.name}."
-        return Fact("excitation-order", channel.name, None, "", None, None, text)
+        return Fact("excitation-order", channel.name, "excitation_short")
     centred /= np.abs(centred).max()
     rows = np.concatenate([np.arange(begin + most, end) for begin, end in record.bounds])
     rows = rows[np.arange(min(_ROWS, rows.size)) * rows.size // min(_ROWS, rows.size)]
@@ -126,7 +119,5 @@ def _find_order(channel: Channel, record: Dataset) -> Fact:
         if np.linalg.eigvalsh(covariance[:size, :size])[0] < _LEAST_POWER:
             break
         order = size
-    more = " or more" if order == most else ""
-    parameters = "parameter" if order == 1 else "parameters"
-    text = f"{channel.name} excites {order}{more} linear {parameters} (order of persistent excitation)."
-    return Fact("excitation-order", channel.name, float(order), "", None, None, text)
+    details = {"order": order, "is_bound": order == most}
+    return Fact("excitation-order", channel.name, "excitation_order", float(order), details=details)

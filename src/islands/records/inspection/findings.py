@@ -136,7 +136,7 @@ class RecordInspection:
             "file": self.file,
             "columns": [asdict(column) for column in self.columns],
             "sampling": asdict(self.sampling),
-            "choice": asdict(self.choice),
+            "choice": self.choice.as_document(),
             "facts": [fact.as_document() for fact in self.facts.facts],
             "warnings": list(self.warnings),
             "notes": [note.as_document() for note in self.notes],

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset
+from islands.records.flat_extremes import TWO
 from islands.records.inspection.blocks import assign_blocks, resample, sum_blocks
 from islands.records.inspection.fact import Fact
 from islands.records.loops import has_loops, loop_starts, measure_area
@@ -35,9 +36,6 @@ _FOLDS, _ACCURACY = 4, 1e-4
 
 #: Part of the squared error that the play operators, or the integral, remove, at least.
 _LEAST_GAIN = 0.4
-
-#: Levels of an input with which a hysteresis does not differ from a time constant.
-_LEVELS = 2
 
 #: Squared error, relative to the variance of the output, below which delays and time constants explain it.
 _EXPLAINED = 5e-3
@@ -73,33 +71,21 @@ def check_loop(record: Dataset, place: int) -> Fact:
         which a hysteresis does not differ from a time constant. The confidence is the share of resampled
         records with the same answer.
     """
-    name, output = record.input_names[place], record.output_name
-    single = _take_input(record, place)
+    name, single = record.input_names[place], _take_input(record, place)
+    finding, loop, share, longest = "loop_none", None, None, None
     if single is None or np.ptp(single.u) == 0.0 or not np.isfinite(single.y).all():
-        return Fact("loop", name, None, "", None, None, f"{output} over {name} cannot be judged as a loop.")
-    if np.unique(single.u).size == _LEVELS:
-        shown = f"{output} over {name} does not show whether a hysteresis makes a loop"
-        text = f"{name} has {_LEVELS} levels: {shown}."
-        return Fact("loop", name, None, "", None, None, text)
-    slow = average_samples(single, _choose_count(single))
-    if len(loop_starts(slow)) < 2:
-        longest = f" in the longest part of the record, {single.samples} samples"
-        where = "" if len(record.bounds) == 1 else longest
-        text = f"{name} does not rise through its mean twice{where}, so {output} over {name} is no loop."
-        return Fact("loop", name, None, "", None, None, text)
-    if not has_loops(slow):
-        text = f"{output} over {name} encloses no loop that {name} runs through slowly."
-        return Fact("loop", name, False, "", None, None, text)
-    loop, share = _judge(slow)
-    if loop is None:
-        text = (
-            f"{output} over {name} is a loop, of a hysteresis or of a delay: the record does not show which."
-        )
-    elif loop:
-        text = f"{output} over {name} is a loop that remains at low frequency, as that of a hysteresis."
+        finding = "loop_not_judged"
+    elif np.unique(single.u).size == TWO:
+        finding = "loop_two_levels"
+    elif len(loop_starts(slow := average_samples(single, _choose_count(single)))) < 2:
+        finding, longest = "loop_no_cycles", None if len(record.bounds) == 1 else single.samples
+    elif not has_loops(slow):
+        loop = False
     else:
-        text = f"{output} over {name} is a loop that a delay, time constants or an integrator explain."
-    return Fact("loop", name, loop, "", None, share, text)
+        loop, share = _judge(slow)
+        finding = {None: "loop_undecided", True: "loop_hysteresis", False: "loop_dynamics"}[loop]
+    details = {"output": record.output_name, "longest": longest}
+    return Fact("loop", name, finding, loop, confidence=share, details=details)
 
 
 def _judge(record: Dataset) -> tuple[bool | None, float | None]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.records.dataset import Dataset
-from islands.records.inspection.channel import Channel, channels, describe_amount
+from islands.records.inspection.channel import Channel, channels
 from islands.records.inspection.fact import Fact
 from islands.records.inspection.quantisation import find_quantisation
 from islands.rounding import NORMAL_MEDIAN
@@ -54,15 +54,13 @@ def measure_noise(channel: Channel, record: Dataset, quantisation: Fact) -> Fact
     levels = [estimate_noise(channel.values, record, order) for order in _ORDERS]
     step = float(quantisation.value or 0.0)
     if step and min(levels) <= step:
-        text = f"The noise of {name} is below its quantisation step of {describe_amount(step, unit)}."
-        return Fact("noise", name, None, unit, None, None, text)
+        return Fact("noise", name, "noise_below_step", unit=unit, details={"step": step})
     extent = float(np.ptp(channel.known))
     if min(levels) <= _INVISIBLE * extent:
-        return Fact("noise", name, None, unit, None, None, f"{name} has no visible noise.")
-    part = f"{100 * min(levels) / extent:.2g} % of its range"
+        return Fact("noise", name, "noise_invisible", unit=unit)
+    details = {"level": min(levels), "percent": 100 * min(levels) / extent}
     if max(levels) > _AGREEMENT * min(levels) or _may_be_signal(channel, record, min(levels)):
-        text = f"The noise of {name} is at most {describe_amount(min(levels), unit)} ({part})."
-        return Fact("noise", name, None, unit, None, None, text)
+        return Fact("noise", name, "noise_bound", unit=unit, details=details)
     value = levels[0]
     cuts = np.linspace(0, record.samples, _BLOCKS + 1).astype(int)
     parts = [
@@ -71,8 +69,8 @@ def measure_noise(channel: Channel, record: Dataset, quantisation: Fact) -> Fact
         if last - first > 4 * _ORDER
     ]
     error = 2.0 * float(np.std(parts)) / len(parts) ** 0.5 if len(parts) > 1 else value
-    text = f"{name} has white noise of {describe_amount(value, unit)} rms ({part})."
-    return Fact("noise", name, value, unit, (max(0.0, value - error), value + error), None, text)
+    interval = (max(0.0, value - error), value + error)
+    return Fact("noise", name, "noise_white", value, unit, interval, details=details | {"level": value})
 
 
 def measure_output_noise(record: Dataset) -> float | None:

@@ -44,18 +44,15 @@ def recommend_rate(record: Dataset) -> Fact:
     dt = count * record.dt
     spread = float(np.std(record.y))
     if count > 1:
-        noisy = "and have less noise" if is_noisy(record) else "with fewer samples"
-        text = (
-            f"The record is oversampled: means of {count} samples ({dt:.4g} s) keep the bandwidth of all "
-            f"signals {noisy}."
-        )
+        finding = "rate_oversampled"
     elif max(record.segments) < 2:
-        text = f"No sample of {record.output_name} follows another: the record does not show a rate."
+        finding = "rate_unconnected"
     elif spread > 0.0 and measure_increments(record.y, record) > _FAR * spread:
-        text = f"{record.output_name} changes much between two samples: a higher sampling rate shows more."
+        finding = "rate_low"
     else:
-        text = f"The sampling time of {dt:.4g} s suits the signals."
-    return Fact("sampling-time", "", dt, "s", None, None, text)
+        finding = "rate_suitable"
+    details = {"samples": count, "is_noisy": is_noisy(record), "output": record.output_name}
+    return Fact("sampling-time", "", finding, dt, "s", details=details)
 
 
 def _has_means(record: Dataset, count: int) -> bool:

@@ -3,8 +3,9 @@
 import numpy as np
 
 from islands.records.flat_extremes import TWO, count_levels, find_step, is_held
-from islands.records.inspection.channel import Channel, describe_amount
+from islands.records.inspection.channel import Channel
 from islands.records.inspection.fact import Fact
+from islands.sentences import write_amount
 
 
 def find_quantisation(channel: Channel) -> Fact:
@@ -19,13 +20,12 @@ def find_quantisation(channel: Channel) -> Fact:
     """
     levels, name = np.unique(channel.known), channel.name
     step, count = find_step(levels), count_levels(levels)
-    ends = [describe_amount(level, channel.unit) for level in levels[[0, -1]]]
+    finding = "quantisation_steps"
     if count == TWO:
-        text, step = f"{name} has two levels, {ends[0]} and {ends[1]}.", None
+        finding, step = "quantisation_two_levels", None
     elif step is None:
-        text = f"{name} is not quantised."
+        finding = "quantisation_none"
     elif is_held(channel.values, step):
-        text, step = f"{name} is held at {count} levels from {ends[0]} to {ends[1]}.", None
-    else:
-        text = f"{name} has {count} levels in steps of {describe_amount(step, channel.unit)}."
-    return Fact("quantisation", name, step, channel.unit, None, None, text)
+        finding, step = "quantisation_held", None
+    details = {"levels": count, "ends": [write_amount(level, channel.unit) for level in levels[[0, -1]]]}
+    return Fact("quantisation", name, finding, step, channel.unit, details=details)

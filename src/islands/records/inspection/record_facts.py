@@ -94,19 +94,20 @@ def _measure(name: str, signal: str, measure: Callable[[], Iterable[Fact]]) -> l
     """Return the facts that a function measures; an unknown one of a name if it fails."""
     found = attempt(lambda: list(measure()))
     if isinstance(found, Failure):
-        return [Fact(name, signal, None, "", None, None, f"The {name} is not computed: {found.reason}.")]
+        return [Fact(name, signal, "not_computed", details={"reason": found.reason})]
     return found
 
 
 def _count_samples(record: Dataset, complete: Dataset, part: Dataset, first: int) -> Fact:
-    seconds = record.samples * record.dt
-    text = f"{record.samples} samples of {record.dt:.4g} s: {seconds:.4g} s."
-    if complete is not record:
-        text += f" {record.output_name} is missing in {record.samples - complete.samples} of them."
-    if part is not complete:
-        last = first + part.samples - 1
-        text += f" The facts are those of the samples {first} to {last}, except the drift."
-    return Fact("samples", "", float(record.samples), "", None, None, text)
+    details = {
+        "samples": record.samples,
+        "dt": record.dt,
+        "seconds": record.samples * record.dt,
+        "output": record.output_name,
+        "missing": record.samples - complete.samples,
+        "part": None if part is complete else (first, first + part.samples - 1),
+    }
+    return Fact("samples", "", "samples", float(record.samples), details=details)
 
 
 def _describe_channel(channel: Channel, record: Dataset) -> list[Fact]:

@@ -65,31 +65,16 @@ def check_rest(record: Dataset) -> Fact:
     excess = output - inputs
     rests = bool(np.median(excess) <= _RESTS)
     share = float(np.mean((excess <= _RESTS) == rests))
-    return _answer(record, rests, share, tuple(100.0 * float(np.median(part)) for part in (output, inputs)))
+    shares = tuple(float(np.median(part)) for part in (output, inputs))
+    details = {"inputs": record.input_names, "motion": shares}
+    finding = "rest_rests" if rests else "rest_moves"
+    return Fact("rest", record.output_name, finding, rests, confidence=share, details=details)
 
 
 def _leave_open(record: Dataset, samples: int) -> Fact:
     """Return a fact without a value: the inputs do not rest for the samples in which the output moves."""
-    inputs, never = _list_inputs(record), "never rest" if record.inputs > 1 else "never rests"
-    why = f"{inputs} {never} for {samples} samples"
-    sentence = f"The record does not show whether {record.output_name} rests: {why}."
-    return Fact("rest", record.output_name, None, "", None, None, sentence)
-
-
-def _list_inputs(record: Dataset) -> str:
-    return "the inputs" if record.inputs > 1 else record.input_names[0]
-
-
-def _answer(record: Dataset, rests: bool, confidence: float, percent: tuple[float, ...]) -> Fact:
-    output, inputs = record.output_name, _list_inputs(record)
-    plural = record.inputs > 1
-    verb = f"rests with {inputs}" if rests else f"moves on while {inputs} {'rest' if plural else 'rests'}"
-    have = "have" if plural else "has"
-    sentence = (
-        f"{output} {verb}: it has {percent[0]:.0f} % of its usual motion where {inputs} {have} "
-        f"{percent[1]:.0f} %."
-    )
-    return Fact("rest", output, rests, "", None, confidence, sentence)
+    details = {"inputs": record.input_names, "samples": samples}
+    return Fact("rest", record.output_name, "rest_unknown", details=details)
 
 
 def _choose_interval(record: Dataset) -> int:

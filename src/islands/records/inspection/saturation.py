@@ -3,7 +3,7 @@
 import numpy as np
 
 from islands.records.flat_extremes import TWO, count_flat, is_held
-from islands.records.inspection.channel import Channel, describe_amount
+from islands.records.inspection.channel import Channel
 from islands.records.inspection.fact import Fact
 
 
@@ -25,17 +25,13 @@ def find_saturation(channel: Channel, quantisation: Fact) -> Fact:
     step = float(quantisation.value or 0.0)
     has_two_levels = np.unique(channel.known).size == TWO
     if has_two_levels or is_held(values, step):
-        state = "switched between two levels" if has_two_levels else "held between steps"
-        text = f"{name} is {state}, so flat extremes are no sign of saturation."
-        return Fact("saturation", name, None, "", None, None, text)
-    found = {}
-    for title, sign in (("maximum", 1.0), ("minimum", -1.0)):
-        count = count_flat(sign * values, step)
-        if count:
-            found[f"its {title} {describe_amount(sign * np.nanmax(sign * values), channel.unit)}"] = count
-    share = sum(found.values()) / len(values)
-    text = f"{name} has no flat extremes."
-    if found:
-        places = " and ".join(found)
-        text = f"{name} is flat at {places} in {100 * share:.2g} % of the samples: it may be saturated."
-    return Fact("saturation", name, share, "", None, None, text)
+        return Fact("saturation", name, "saturation_switched" if has_two_levels else "saturation_held")
+    counts = {
+        (title, float(sign * np.nanmax(sign * values))): count
+        for title, sign in (("maximum", 1.0), ("minimum", -1.0))
+        if (count := count_flat(sign * values, step))
+    }
+    share = sum(counts.values()) / len(values)
+    finding = "saturation_flat" if counts else "saturation_none"
+    details = {"places": tuple(counts), "signal_unit": channel.unit}
+    return Fact("saturation", name, finding, share, details=details)

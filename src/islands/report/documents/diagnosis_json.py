@@ -17,9 +17,8 @@ from islands.diagnosis.inference.holdout import compute_rmse
 from islands.diagnosis.planning.next_experiment import NextExperiment
 from islands.diagnosis.result import CalibratedValue, Candidate, Diagnosis
 from islands.effects.catalogue import find_entry, get_title
-from islands.report.documents.contradictions import list_contradictions
-from islands.report.documents.experiment_json import describe_next_experiment, write_advice
-from islands.report.documents.extended_equations import write_extended_equations
+from islands.report.documents.extension import list_contradictions, write_extended_equations
+from islands.report.documents.plan_json import describe_next_experiment, write_advice
 from islands.report.documents.result_folder import list_failures, record_document
 
 #: Plain name of a missing term.

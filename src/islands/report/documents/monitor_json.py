@@ -1,16 +1,15 @@
-"""Result of a monitor as a JSON document: ``monitor.json``."""
+"""Result of a monitor: the JSON document ``monitor.json``, and lines of text about records and alarms."""
 
 import json
 from typing import Any
 
+from islands.diagnosis.monitoring.change_point import ChangeForm
 from islands.diagnosis.monitoring.record_follower import Alarm, MonitoredRecord, MonitorState
 from islands.report.documents.monitor_state import SavedMonitor
-from islands.report.text.monitor import describe_change
+from islands.rounding import NORMAL_95
+from islands.sentences import write_one
 
 SCHEMA = "islands.monitor/1"
-
-#: Quantile of the normal distribution for 95 % intervals.
-_NORMAL_95 = 1.96
 
 
 def monitor_document(monitor: SavedMonitor) -> dict[str, Any]:
@@ -68,7 +67,7 @@ def describe_record(state: MonitorState, record: MonitoredRecord) -> dict[str, A
         "time": record.time or None,
         "sha256": record.sha256,
         "values": {
-            each.name: {"value": value, "ci95": [value - _NORMAL_95 * error, value + _NORMAL_95 * error]}
+            each.name: {"value": value, "ci95": [value - NORMAL_95 * error, value + NORMAL_95 * error]}
             for each, value, error in parameters
         },
         "scores": {each.effect: score for each, score in scores},
@@ -99,3 +98,45 @@ def describe_alarm(state: MonitorState, alarm: Alarm) -> dict[str, Any]:
         "equivalents": list(alarm.equivalents),
         "strength": {name: {"value": value, "unit": unit} for name, value, unit in alarm.strength},
     }
+
+
+def describe_last_record(state: MonitorState) -> str:
+    """Return one line on the last record: its parameters with their intervals, and the largest statistic."""
+    record, reference = state.records[-1], state.reference
+    assert reference is not None
+    estimates = zip(reference.parameters, record.states.values, record.states.errors, strict=True)
+    return write_one(
+        "monitor",
+        "last_record",
+        record=record,
+        values=[(each.name, value, NORMAL_95 * error, each.unit) for each, value, error in estimates],
+        threshold=state.threshold,
+        seen=state.count - state.start,
+        training=state.settings.training,
+    )
+
+
+def describe_alarm_text(state: MonitorState, alarm: Alarm) -> str:
+    """Return one line on an alarm, as `describe_change`."""
+    return _write(state, alarm, "alarm")
+
+
+def describe_change(state: MonitorState, alarm: Alarm) -> str:
+    """Return an alarm in words: cause, since when, size, and causes that explain it as well."""
+    return _write(state, alarm, "change")
+
+
+def _write(state: MonitorState, alarm: Alarm, statement: str) -> str:
+    assert state.reference is not None
+    units = {each.name: each.unit for each in state.reference.parameters}
+    indices = {"since": alarm.since, "earliest": alarm.earliest, "latest": alarm.latest}
+    return write_one(
+        "monitor",
+        statement,
+        alarm=alarm,
+        kind=alarm.kind.name,
+        is_ramp=alarm.form == ChangeForm.RAMP,
+        is_growing=alarm.after > alarm.before,
+        unit=units.get(alarm.cause, ""),
+        **{name: state.get_record(index).name for name, index in indices.items()},
+    )

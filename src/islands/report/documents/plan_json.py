@@ -1,4 +1,4 @@
-"""Plan of an experiment as a JSON document: ``plan.json``."""
+"""Plans of experiments as ``plan.json``, and next experiments as a part of ``discrepancy.json``."""
 
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -12,10 +12,17 @@ from islands.diagnosis.planning.channel_noise import ChannelNoise
 from islands.diagnosis.planning.decisive_experiment import DecisiveExperiment
 from islands.diagnosis.planning.experiment_plan import ExperimentPlan
 from islands.diagnosis.planning.isolability import IsolabilityRow
+from islands.diagnosis.planning.next_experiment import DesignedInput, NextExperiment, SeparatedPair
 from islands.diagnosis.planning.pair_separation import PairSeparation
+from islands.diagnosis.planning.planned_input import InputLimits
+from islands.effects.catalogue import get_title
 from islands.report.documents.result_folder import record_document
+from islands.sentences import write_one
 
 SCHEMA = "islands.plan/1"
+
+#: File of the designed input in the folder of a diagnosis.
+NEXT_EXPERIMENT_FILE = "next-experiment.csv"
 
 
 def plan_document(plan: ExperimentPlan) -> dict[str, Any]:
@@ -108,3 +115,80 @@ def _describe_decisive(decisive: DecisiveExperiment) -> dict[str, Any]:
             for pair, before, after in zip(decisive.pairs, decisive.before, decisive.after, strict=True)
         ],
     }
+
+
+def describe_next_experiment(experiment: NextExperiment) -> dict[str, Any]:
+    """Return the next experiment as a JSON document, without the samples of its input."""
+    designed = get_suggested_input(experiment)
+    return {
+        "pairs": [_describe_pair(each) for each in experiment.pairs],
+        "input": None if designed is None else _describe_input(designed),
+    }
+
+
+def get_suggested_input(experiment: NextExperiment) -> DesignedInput | None:
+    """Return the designed input; None if there is none, or if the record separates all pairs already."""
+    return None if all(map(_is_separated, experiment.pairs)) else experiment.input
+
+
+def write_advice(experiment: NextExperiment) -> str:
+    """Describe the next experiment in words: its input, and the separation of each pair.
+
+    The text is empty if the record separates all pairs already: their causes have similar scores since both
+    imitate another one.
+    """
+    document = describe_next_experiment(experiment)
+    designed = document["input"] or {}
+    excesses = (("range", designed.get("range_excess", 0.0)), ("rate", designed.get("rate_excess", 0.0)))
+    pairs = [
+        {**pair, "labels": list(map(_label, pair["causes"])), "is_repeated": (pair["repeats"] or 0) > 1}
+        for pair in document["pairs"]
+        if pair["recorded"] is None or not pair["recorded"]["is_sufficient"]
+    ]
+    return write_one(
+        "plan",
+        "advice",
+        input=designed,
+        pairs=pairs,
+        excesses=[(name, factor) for name, factor in excesses if factor > 1.0],
+    )
+
+
+def _is_separated(pair: SeparatedPair) -> bool:
+    """Return whether the record separates the causes, although their scores are similar."""
+    return pair.recorded is not None and pair.recorded.sufficiency >= 1.0
+
+
+def _describe_pair(pair: SeparatedPair) -> dict[str, Any]:
+    return {
+        "causes": list(pair.causes),
+        "recorded": None if pair.recorded is None else describe_separation(pair.recorded),
+        "predicted": None if pair.predicted is None else describe_separation(pair.predicted),
+        "repeats": pair.repeats,
+    }
+
+
+def _describe_input(designed: DesignedInput) -> dict[str, Any]:
+    range_excess, rate_excess = designed.excess
+    return {
+        "description": designed.description,
+        "name": designed.name,
+        "unit": designed.unit,
+        "samples": designed.u.size,
+        "dt": designed.dt,
+        "limits": _describe_limits(designed.limits),
+        "recorded_limits": _describe_limits(designed.recorded),
+        "is_within_record": designed.is_within,
+        "range_excess": range_excess,
+        "rate_excess": rate_excess,
+        "file": NEXT_EXPERIMENT_FILE,
+    }
+
+
+def _describe_limits(limits: InputLimits) -> dict[str, float]:
+    return {"lower": limits.lower, "upper": limits.upper, "rate": limits.rate}
+
+
+def _label(name: str) -> str:
+    title = get_title(name)
+    return f"{title} (`{name}`)" if title else name

@@ -31,8 +31,7 @@ from islands.records.dataset import Dataset
 from islands.records.flat_extremes import find_limits
 from islands.records.inspection.noise import measure_output_noise
 from islands.records.split import measure_input_ranges
-from islands.report.text.certificates import certificates_document
-from islands.report.text.summary import method_text, summary
+from islands.report.text.summary import certificates_document, method_text, summary
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from islands.report.figures.downsampling import downsample
+from islands.report.figures.lines import downsample
 from islands.report.figures.style import (
     FRAME,
     MEASURED,

@@ -12,14 +12,17 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
+from islands.diagnosis.discovery.effect_shape import EffectShape
+from islands.diagnosis.inference.finding import list_free_forms
+from islands.diagnosis.rate_effect import find_rate_effect
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import get_title
 from islands.effects.interface.context import Signal
+from islands.effects.interface.effect import Effect, ForceLaw
 from islands.records.dataset import Dataset
 from islands.records.inspection.excitation import estimate_spectrum
 from islands.records.segments import fill_gaps, map_segments
-from islands.report.figures.diverging_lines import break_line
-from islands.report.figures.downsampling import VERTICES, downsample
+from islands.report.figures.lines import VERTICES, break_line, downsample, last_loops, representative_window
 from islands.report.figures.style import (
     BAND,
     FRAME,
@@ -35,7 +38,6 @@ from islands.report.figures.style import (
     house_style,
     label,
 )
-from islands.report.figures.windows import last_loops, representative_window
 
 #: Colour of the simulation before extension.
 BEFORE = "#c56fa0"
@@ -340,3 +342,109 @@ def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
 DIAGNOSIS_FIGURES: Mapping[str, Callable[[Diagnosis], Figure]] = MappingProxyType(
     {"over-time": draw_over_time, "loops": draw_loops, "residual": draw_residual, "ladder": draw_screening}
 )
+
+
+@house_style()
+def draw_free_forms(diagnosis: Diagnosis) -> Figure:
+    """Draw the coefficients of each free form with their 95 % intervals, one panel for each form."""
+    forms = list_free_forms(diagnosis.effects)
+    figure = blank(0.4 + 2.4 * len(forms), "Free forms: values with 95 % intervals")
+    panels = figure.subplots(len(forms), 1, squeeze=False)[:, 0]
+    for axes, form in zip(panels, forms, strict=True):
+        values = list(form.parameters.values())
+        middle = [each.value for each in values]
+        bounds = [each.ci95 or (each.value, each.value) for each in values]
+        errors = [
+            [value - low for value, (low, _) in zip(middle, bounds, strict=True)],
+            [high - value for value, (_, high) in zip(middle, bounds, strict=True)],
+        ]
+        axes.errorbar(range(len(values)), middle, errors, color=SIMULATED, marker="o", ms=4, capsize=3)
+        axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
+        axes.set_xticks(range(len(values)), list(form.parameters))
+        axes.set_ylabel(label(get_title(form.name) or form.name, values[0].unit))
+    return finish(figure)
+
+
+@house_style()
+def draw_effect_shape(shape: EffectShape) -> Figure:
+    """Draw the curve of an effect, and the values of the free curve with their 95 % intervals."""
+    name, form = (get_title(each) or each for each in (shape.name, shape.form))
+    figure = blank(2.8, f"Shape of the effect, without gain and offset: {name}")
+    axes = figure.subplots()
+    axes.plot(shape.places, shape.named, color=SIMULATED, label=name)
+    axes.errorbar(
+        shape.free_places,
+        shape.free,
+        shape.half_widths,
+        color=MEASURED,
+        ls="none",
+        marker="o",
+        ms=4,
+        capsize=3,
+        label=f"{form}, 95 % intervals",
+    )
+    axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
+    axes.set_xlabel(label(shape.signal, shape.signal_unit))
+    axes.set_ylabel(label("added", shape.unit))
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return finish(figure)
+
+
+#: Points of the curve of the force.
+_POINTS = 401
+
+
+@house_style()
+def draw_residual_over_rate(diagnosis: Diagnosis) -> Figure:
+    """Draw the residual over the rate that an effect acts on, without the effect and with it, and its force.
+
+    Without the effect, all other values are those of the extended simulation.
+
+    Raises
+    ------
+    ValueError
+        No claimed effect acts on a rate.
+    """
+    effect = find_rate_effect(diagnosis)
+    if effect is None:
+        raise ValueError("no claimed effect acts on a rate")
+    record, context = diagnosis.record, diagnosis.best.simulation.context
+    coordinate = context.force_coordinate
+    signal = diagnosis.best.output if coordinate.is_output else context.u
+    rate = map_segments(lambda part: np.gradient(part, record.dt), signal, record.segments)
+    name = get_title(effect.name) or effect.name
+    figure = blank(4.6, f"Residual over the rate that the effect acts on: {name}")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
+    outputs = (
+        (f"without {name}", BEFORE, _simulate_without(diagnosis, effect)),
+        (f"with {name}", SIMULATED, diagnosis.best.output),
+    )
+    draw_cells(above, rate, [(text, colour, record.y - output) for text, colour, output in outputs])
+    above.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    above.set_ylabel(label("residual", record.output_unit))
+    places = np.linspace(float(rate.min()), float(rate.max()), _POINTS)
+    below.plot(places, _compute_force(diagnosis, effect, places), color=SIMULATED, lw=1.2)
+    below.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
+    moved, unit = record.input_names[0], record.input_units[0]
+    if coordinate.is_output:
+        moved, unit = record.output_name, record.output_unit
+    below.set_xlabel(label(f"rate of {label(moved, unit).partition(' (')[0]}", f"{unit or '1'}/s"))
+    below.set_ylabel(label("added", coordinate.force_unit))
+    return finish(figure)
+
+
+def _simulate_without(diagnosis: Diagnosis, effect: Effect) -> Signal:
+    """Simulate the extended simulation with the nominal values of an effect, at which it vanishes."""
+    fit = diagnosis.best
+    values, part = fit.values.copy(), fit.simulation.get_slice(effect)
+    values[part] = fit.simulation.nominal[part]
+    return fit.simulation.simulate(values)
+
+
+def _compute_force(diagnosis: Diagnosis, effect: Effect, places: Signal) -> Signal:
+    """Return the force of an effect at each rate."""
+    fit, law = diagnosis.best, effect.form
+    assert isinstance(law, ForceLaw)
+    context = fit.simulation.context
+    numbers = np.array([*fit.values[fit.simulation.get_slice(effect)], *law.constants(context)])
+    return np.array([law.force(0.0, float(place), 0.0, numbers) for place in places])

@@ -18,7 +18,7 @@ def tabulate_lines(figure: Figure) -> str:
     ----------
     figure : Figure
         Figure made by a function of this package. Long lines of it have fewer points than the record, see
-        `islands.report.figures.downsampling`.
+        `islands.report.figures.lines`.
 
     Returns
     -------

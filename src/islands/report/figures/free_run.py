@@ -8,15 +8,17 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from islands.records.dataset import Dataset
-from islands.report.figures.diverging_lines import (
+from islands.report.figures.lines import (
     annotate_divergence,
     break_line,
     divergence,
+    downsample,
+    envelope,
     finite_part,
     limits,
+    representative_window,
     within_reach,
 )
-from islands.report.figures.downsampling import downsample, envelope
 from islands.report.figures.style import (
     BAND,
     FRAME,
@@ -32,7 +34,6 @@ from islands.report.figures.style import (
     house_style,
     label,
 )
-from islands.report.figures.windows import representative_window
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 

@@ -9,10 +9,8 @@ from islands.records.inspection.channel import Channel, channels
 from islands.records.inspection.excitation import estimate_spectrum
 from islands.records.inspection.impulse_response import estimate_impulse_response
 from islands.records.inspection.record_facts import RecordFacts
-from islands.report.figures.diverging_lines import break_line
-from islands.report.figures.downsampling import downsample
-from islands.report.figures.style import REMARK, STEPS, blank, finish, label
-from islands.report.figures.themes import Theme, themed_style
+from islands.report.figures.lines import break_line, downsample
+from islands.report.figures.style import REMARK, STEPS, Theme, blank, finish, label, themed_style
 
 #: Inputs that are drawn, at most.
 _MOST_INPUTS = 3
@@ -34,7 +32,7 @@ def draw_overview(record: Dataset, facts: RecordFacts, theme: str = "light") -> 
     facts : RecordFacts
         Facts of the record, which mark bands and the dead time.
     theme : str
-        An entry of `islands.report.figures.themes.THEMES`.
+        An entry of `islands.report.figures.style.THEMES`.
     """
     with themed_style(theme) as colours:
         return _draw(record, facts, colours)

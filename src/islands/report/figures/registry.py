@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from math import isfinite
 from types import MappingProxyType
 from typing import cast
@@ -18,14 +19,13 @@ from islands.records.split import Split
 from islands.report.figures.availability import list_model_figures
 from islands.report.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.report.figures.free_run import draw_free_run, draw_free_run_panel
-from islands.report.figures.hold import draw_holds
-from islands.report.figures.hysteresis_loop import draw_loop, draw_loop_panel
-from islands.report.figures.latent_structure import draw_structure
+from islands.report.figures.hysteresis import draw_holds, draw_loop, draw_loop_panel
+from islands.report.figures.latent import draw_structure, draw_unit_curves
 from islands.report.figures.linear_system import draw_bode
-from islands.report.figures.names import LEAST_ISLANDS
-from islands.report.figures.record import draw_record
+from islands.report.figures.lines import break_line, downsample
+from islands.report.figures.names import FREE_RUN, LEAST_ISLANDS, LOOP
 from islands.report.figures.residuals import draw_residual_correlations
-from islands.report.figures.unit_curves import draw_unit_curves
+from islands.report.figures.style import FRAME, MEASURED, RESIDUAL, blank, finish, house_style, label
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment, assess_residual
 from islands.validation.predictable_residual import ResidualStructure
@@ -144,14 +144,10 @@ def draw_record_figure(
     return cast("Figure", ax.get_figure(root=True))
 
 
-def _free_run(entry: Assessment, split: Split) -> Figure:
-    """Draw the measured output, the free run with its prediction band, and the residual over time."""
-    return _free_run_on(entry.model, split.validation, entry.warm_up, entry.bands)
-
-
-def _structure(entry: Assessment, _split: Split) -> Figure:
-    """Draw the block diagram of a latent model."""
-    return draw_structure(_require_latent(entry.model))
+def _draw_on_part(name: str, entry: Assessment, split: Split) -> Figure:
+    """Draw a figure of a model with the parameters of its errors: runs on the validation data."""
+    part = split.validation if name in (FREE_RUN, LOOP) else split.estimation
+    return RECORD_FIGURES[name](entry.model, part, entry.warm_up, entry.bands)
 
 
 def _curves(entry: Assessment, split: Split) -> Figure:
@@ -159,16 +155,6 @@ def _curves(entry: Assessment, split: Split) -> Figure:
     ensemble = None if entry.bands is None else entry.bands.ensemble
     model = _require_latent(entry.model)
     return draw_unit_curves(model, split.estimation, entry.warm_up, ensemble, split.validation)
-
-
-def _bode(entry: Assessment, split: Split) -> Figure:
-    """Draw the frequency response of a latent model at rest."""
-    return _bode_on(entry.model, split.estimation, entry.warm_up, None)
-
-
-def _loop(entry: Assessment, split: Split) -> Figure:
-    """Draw the measured output and the free run against every input."""
-    return _loop_on(entry.model, split.validation, entry.warm_up, None)
 
 
 def _hold(entry: Assessment, split: Split) -> Figure:
@@ -190,16 +176,10 @@ def _draw_residuals(tests: ResidualTests, structure: ResidualStructure) -> Figur
     return draw_residual_correlations(tests, title)
 
 
+#: Figures of an assessed model; those that need more than a part of the data are functions of their own.
 FIGURES: Mapping[str, ModelFigure] = MappingProxyType(
-    {
-        "free-run": _free_run,
-        "structure": _structure,
-        "curves": _curves,
-        "bode": _bode,
-        "loop": _loop,
-        "hold": _hold,
-        "residuals": _residuals,
-    }
+    {name: partial(_draw_on_part, name) for name in RECORD_FIGURES}
+    | {"curves": _curves, "hold": _hold, "residuals": _residuals}
 )
 
 
@@ -224,3 +204,21 @@ def search_figures(result: SearchResult) -> tuple[str, ...]:
     history = result.search.history
     islands = len(history[-1].islands) if history else 0
     return tuple(name for name in SEARCH_FIGURES if islands >= LEAST_ISLANDS.get(name, 0))
+
+
+@house_style()
+def draw_record(record: Dataset, title: str = "") -> Figure:
+    """Draw every input and, below them, the output; segments are separated by gaps and lines."""
+    names = [*record.input_names, record.output_name]
+    units = [*record.input_units, record.output_unit]
+    figure = blank(1.0 + 1.3 * len(names), title)
+    panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+    for axes, name, unit, values in zip(panels, names, units, [*record.u.T, record.y], strict=True):
+        colour = MEASURED if axes is panels[-1] else RESIDUAL
+        line = downsample(break_line(record, record.time), break_line(record, values))
+        axes.plot(*line, color=colour, linewidth=0.7)
+        axes.set_ylabel(label(name, unit))
+        for begin, _ in record.bounds[1:]:
+            axes.axvline(record.time[begin], color=FRAME, linewidth=0.6)
+    panels[-1].set_xlabel("time (s)")
+    return finish(figure)

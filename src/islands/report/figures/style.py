@@ -1,4 +1,4 @@
-"""Style of figures, and writing of SVG files.
+"""Style and themes of figures, and writing of SVG files.
 
 Equal content gives equal bytes: the matplotlibrc of the user is ignored, and files have no date and no random
 identifiers.
@@ -7,18 +7,23 @@ identifiers.
 from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from html import escape
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
+from types import MappingProxyType
 from typing import IO, Any
 
 import matplotlib
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter
+
+from islands.errors import lookup
 
 #: Width of figures in inches (text column of an article). Font sizes below are points at this width.
 WIDTH = 7.0
@@ -196,3 +201,74 @@ class _PlainLogFormatter(LogFormatter):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Theme:
+    """Colours of a figure.
+
+    Attributes
+    ----------
+    background, text, grid, frame : str
+    inputs : tuple of str
+        Colours of the inputs.
+    output : str
+        Colour of the measured output.
+    mark : str
+        Colour of simulations and of marks.
+    """
+
+    background: str
+    text: str
+    grid: str
+    frame: str
+    inputs: tuple[str, ...]
+    output: str
+    mark: str
+
+
+#: Colours by the name of the theme.
+THEMES = MappingProxyType(
+    {
+        "light": Theme(
+            *("#ffffff", "#222222", "#ececec", "#5a5a5a"),
+            ("#0072b2", "#009e73", "#8c6bb1"),
+            "#3a3a3a",
+            "#d55e00",
+        ),
+        "dark": Theme(
+            *("#16181d", "#dcdfe4", "#2c3038", "#8a909b"),
+            ("#56b4e9", "#4fc39a", "#b9a3e3"),
+            "#e6e6e6",
+            "#f0935a",
+        ),
+    }
+)
+
+
+@contextmanager
+def themed_style(name: str) -> Iterator[Theme]:
+    """Apply the style of figures with the colours of a theme, and restore the settings afterwards.
+
+    Raises
+    ------
+    SettingsError
+        The theme is unknown.
+    """
+    colours = lookup(THEMES, name, "theme")
+    settings: dict[Any, Any] = {
+        "axes.edgecolor": colours.frame,
+        "axes.facecolor": colours.background,
+        "axes.labelcolor": colours.text,
+        "axes.titlecolor": colours.text,
+        "figure.facecolor": colours.background,
+        "grid.color": colours.grid,
+        "savefig.facecolor": colours.background,
+        "text.color": colours.text,
+        "xtick.color": colours.frame,
+        "xtick.labelcolor": colours.text,
+        "ytick.color": colours.frame,
+        "ytick.labelcolor": colours.text,
+    }
+    with house_style(), rc_context(settings):
+        yield colours

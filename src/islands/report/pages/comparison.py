@@ -13,7 +13,8 @@ from islands.errors import SettingsError
 from islands.report.pages.origin import Origin
 from islands.report.pages.rendering import TEMPLATES, inline_figure
 from islands.report.text.facts import BEFORE_REFIT, Document, is_refitted
-from islands.report.text.headlines import write_comparison_headline
+from islands.rounding import NORMAL_95
+from islands.sentences import write, write_one
 
 #: Fewest and most models of a comparison: the colours of more lines are not distinct.
 LEAST_MODELS, MOST_MODELS = 2, 6
@@ -88,13 +89,12 @@ def comparison_report(origin: Origin, models: Sequence[ComparedModel]) -> bytes:
     lettered = dict(zip(ascii_uppercase, models, strict=False))
     groups = _group(lettered)
     letters = tuple(lettered)
+    facts = _compare(lettered, len(groups) == 1)
     text = TEMPLATES.get_template("comparison.html").render(
         origin=origin,
         hashes=list(dict.fromkeys(each.record["sha256"] for each in models)),
-        headline=write_comparison_headline(
-            [(each.name, each.output, each.model) for each in models], len(groups) == 1
-        ),
-        lead=_describe_data(models, len(groups)) + _describe_refits(lettered),
+        headline=write_one("comparison", "headline", **facts),
+        lead=" ".join(write("comparison", "lead", **facts)),
         columns=_COLUMNS,
         errors=[_list_errors(letter, each) for letter, each in lettered.items()],
         figures=_draw_groups(groups),
@@ -115,17 +115,27 @@ def _group(lettered: Mapping[str, ComparedModel]) -> list[dict[str, ComparedMode
     return list(groups.values())
 
 
-def _describe_data(models: Sequence[ComparedModel], groups: int) -> str:
-    if groups == 1:
-        return "All models were validated on the same samples."
-    same = len({each.record["sha256"] for each in models}) == 1
-    what = "different samples of the same data" if same else "different data"
-    return f"The models were validated on {what}, so that their errors are not comparable."
-
-
-def _describe_refits(lettered: Mapping[str, ComparedModel]) -> str:
-    refitted = [letter for letter, each in lettered.items() if is_refitted(each.model)]
-    return f" Errors and free runs of {', '.join(refitted)}: {BEFORE_REFIT}." if refitted else ""
+def _compare(lettered: Mapping[str, ComparedModel], is_comparable: bool) -> dict[str, Any]:
+    """Return the facts of a comparison: the model with the least free-run error on the validation data."""
+    models = tuple(lettered.values())
+    errors = [each.model["metrics"]["validation"]["free_run"] for each in models]
+    known = [at for at, error in enumerate(errors) if error["rmse"] is not None]
+    # The error that is stated is the least one; it is undefined for a constant output.
+    stated = "rmse" if any(errors[at]["mape"] is None for at in known) else "mape"
+    best = min(known, key=lambda at: float(errors[at][stated]), default=0)
+    return {
+        "count": len(models),
+        "outputs": dict.fromkeys(each.output[0] for each in models),
+        "name": models[best].name,
+        "error": errors[best],
+        "unit": models[best].output[1],
+        "note": BEFORE_REFIT if is_refitted(models[best].model) else "",
+        "diverges": not known,
+        "is_comparable": is_comparable,
+        "has_same_data": len({each.record["sha256"] for each in models}) == 1,
+        "refitted": [letter for letter, each in lettered.items() if is_refitted(each.model)],
+        "refit_note": BEFORE_REFIT,
+    }
 
 
 def _list_errors(letter: str, compared: ComparedModel) -> list[str]:
@@ -186,7 +196,7 @@ def _state_parameter(term: Document | None) -> str:
     if term is None:
         return ""
     error = term["standard_error"]
-    return f"{term['parameter']:.5g}" + (f" ± {1.96 * error:.2g}" if error else "")
+    return f"{term['parameter']:.5g}" + (f" ± {NORMAL_95 * error:.2g}" if error else "")
 
 
 def _list_settings(models: Sequence[ComparedModel]) -> list[list[str]]:

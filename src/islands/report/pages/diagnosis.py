@@ -16,21 +16,14 @@ from islands.effects.interface.context import Signal
 from islands.parallel import ParallelMap
 from islands.records.loops import has_loops
 from islands.report.documents.diagnosis_json import diagnosis_document
-from islands.report.documents.extended_equations import write_extended_equations
+from islands.report.documents.extension import write_extended_equations
 from islands.report.pages.origin import Origin
-from islands.report.pages.record_table import list_record
-from islands.report.pages.rendering import TEMPLATES, inline_figure
+from islands.report.pages.rendering import TEMPLATES, inline_figure, list_record
 from islands.report.text.diagnosis_facts import DiagnosisFacts, write_value
-from islands.report.text.diagnosis_statements import (
-    describe_causes,
-    describe_details,
-    describe_extended_values,
-    describe_verdict,
-    name_reference,
-)
 from islands.report.text.facts import Document
-from islands.report.text.headlines import write_diagnosis_headline
 from islands.report.text.layout import write_html
+from islands.report.text.statements import describe_causes, describe_details, describe_verdict
+from islands.sentences import write_one
 
 #: Captions of the figures, in the order of the report.
 _CAPTIONS = {
@@ -110,9 +103,12 @@ def _list_figures(found: Diagnosis) -> list[str]:
 def _draw(found: Diagnosis, name: str) -> str:
     """Draw a figure; return the address of the embedded image."""
     # matplotlib takes half a second to import, and other processes may draw.
-    from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES  # noqa: PLC0415
-    from islands.report.figures.form_values import draw_effect_shape, draw_free_forms  # noqa: PLC0415
-    from islands.report.figures.residual_over_rate import draw_residual_over_rate  # noqa: PLC0415
+    from islands.report.figures.diagnosis import (  # noqa: PLC0415
+        DIAGNOSIS_FIGURES,
+        draw_effect_shape,
+        draw_free_forms,
+        draw_residual_over_rate,
+    )
 
     if name == "rate":
         return inline_figure(draw_residual_over_rate(found))
@@ -122,8 +118,9 @@ def _draw(found: Diagnosis, name: str) -> str:
     return inline_figure(draw(found))
 
 
-def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[str, ...]], str]:
+def _tabulate_errors(facts: DiagnosisFacts) -> tuple[tuple[str, ...], list[tuple[str, ...]], str]:
     """Return the columns and the rows of the errors of the simulation, and a remark on them."""
+    document = facts.document
     if document["verdict"] == "gross error":
         errors = document["record_findings"][0]["errors"]
         columns: tuple[str, ...] = ("error", "RMSE, % of the standard deviation of the output")
@@ -133,19 +130,17 @@ def _tabulate_errors(document: Document) -> tuple[tuple[str, ...], list[tuple[st
         ]
         return columns, rows, "Both are errors over the samples used for estimation."
     unit, gain, deviation = document["record"]["units"]["output"], document["gain"], document["output_std"]
-    # A recorded column has nothing to calibrate.
-    given = "as given" if document.get("calibrated") == {} else "before the calibration"
-    bound = " (upper bound)" if document["noise_floor_is"] == "an upper bound" else ""
-    compared = (
-        [(name_reference(document), gain["before"]["rmse"]), (_EXTENDED, gain["after"]["rmse"])]
-        if gain
-        else [("calibrated", document["calibrated_rmse"])]
-    )
-    errors = [
-        (given, document["as_given_rmse"]),
-        *compared,
-        (f"noise floor{bound}", document["noise_floor_rmse"]),
-    ]
+    is_calibrated, bound = facts.is_calibrated_reference, "" if facts.is_measured else " (upper bound)"
+    errors = [(f"noise floor{bound}", document["noise_floor_rmse"])]
+    if gain:
+        reference = write_one("diagnosis", "reference", f=facts)
+        errors = [(reference, gain["before"]["rmse"]), (_EXTENDED, gain["after"]["rmse"]), *errors]
+    else:
+        # A recorded column has nothing to calibrate.
+        name = "calibrated" if is_calibrated else "as given"
+        errors = [(name, document["calibrated_rmse"]), *errors]
+    if is_calibrated:
+        errors = [("before the calibration", document["as_given_rmse"]), *errors]
     columns = ("error", f"RMSE ({unit})" if unit else "RMSE", "% of the standard deviation of the output")
     rows = [
         (name, f"{error:.4g}", f"{100.0 * error / deviation:.3g}" if deviation else "")
@@ -158,12 +153,11 @@ def _show_code(sentence: str) -> Markup:
     return Markup(write_html(sentence))
 
 
-def _list_candidates(document: Document) -> list[tuple[str, str, str]]:
+def _list_candidates(facts: DiagnosisFacts) -> list[tuple[str, str, str]]:
     """Return the name, the gain and the share of the misfit of the best screened effects."""
-    facts = DiagnosisFacts(document)
     return [
         (_show_code(facts.label_effect(each)), f"{each['score']:.1f}", f"{floor(100 * each['eta'])} %")
-        for each in document["candidates"][:_MAX_CANDIDATES]
+        for each in facts.document["candidates"][:_MAX_CANDIDATES]
     ]
 
 
@@ -179,13 +173,14 @@ def _list_values(document: Document) -> list[tuple[str, ...]]:
     ]
 
 
-def _show_extension(document: Document, found: Diagnosis) -> tuple[str, str, str] | None:
+def _show_extension(facts: DiagnosisFacts, found: Diagnosis) -> tuple[str, str, str] | None:
     """Return the equations of the extended simulation, their values and notes; None if there are none."""
-    if DiagnosisFacts(document).extended is None:
+    if facts.extended is None:
         return None
     return (
         Markup(write_extended_equations(found.best, found.effects, found.record).mathml),
-        *describe_extended_values(document),
+        write_one("diagnosis", "extended_values", f=facts),
+        write_one("diagnosis", "extended_notes", f=facts),
     )
 
 
@@ -212,25 +207,26 @@ def diagnosis_report(
     drawn = parallel_map(partial(_draw, found), names)
     figures = [(_CAPTIONS[each], figure) for each, figure in zip(names, drawn, strict=True)]
     document = diagnosis_document(found, None, tested, proposal)
-    columns, errors, remark = _tabulate_errors(document)
+    facts = DiagnosisFacts(document)
+    columns, errors, remark = _tabulate_errors(facts)
     text = TEMPLATES.get_template("diagnosis.html").render(
         origin=origin,
         sha256=document["record"]["sha256"],
         document=document,
-        headline=_show_code(describe_verdict(document)),
-        lead=write_diagnosis_headline(document),
-        causes=list(map(_show_code, describe_causes(document))),
-        details=list(map(_show_code, describe_details(document, has_extension=False))),
-        extended=_show_extension(document, found),
+        headline=_show_code(describe_verdict(facts)),
+        lead=write_one("diagnosis", "headline", f=facts),
+        causes=list(map(_show_code, describe_causes(facts))),
+        details=list(map(_show_code, describe_details(facts, has_extension=False))),
+        extended=_show_extension(facts, found),
         error_columns=columns,
         errors=errors,
         error_remark=remark,
         figures=figures,
         values=_list_values(document),
-        candidates=_list_candidates(document),
+        candidates=_list_candidates(facts),
         record=list_record(document["record"]),
         strengths=STRENGTHS,
-        limits=[] if tested is None else _limits(tested, DiagnosisFacts(document).label),
+        limits=[] if tested is None else _limits(tested, facts.label),
         mistaken=[] if tested is None else _mistaken(tested),
     )
     return text.encode()

@@ -1,10 +1,12 @@
-"""HTML templates of reports, and figures inside of pages."""
+"""HTML templates of reports, figures inside of pages, and the entries of the record."""
 
 import base64
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+from islands.report.text.facts import Document
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,3 +32,16 @@ def inline_figure(figure: "Figure") -> str:
 def inline_svg(svg: bytes) -> str:
     """Return an SVG as the address of an embedded image."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+
+
+def list_record(record: Document) -> list[tuple[str, Any]]:
+    """Return the samples, sampling time, columns and hash of a record, as ``result.json`` describes it."""
+    names = record["names"]
+    outputs = names.get("outputs", [names.get("output")])
+    return [
+        ("samples", record["samples"]),
+        ("sampling time", f"{record['dt']:g} s"),
+        ("inputs", ", ".join(names["inputs"])),
+        ("output" if len(outputs) == 1 else "outputs", ", ".join(outputs)),
+        ("SHA-256", record["sha256"]),
+    ]

@@ -11,8 +11,9 @@ from math import ceil, floor, log10, sqrt
 from typing import Final
 
 from islands.records.channel_names import TEMPERATURES
-from islands.report.text.facts import FAR_RATIO, NOISE_RATIO, Document, round_ratio, write_amount
+from islands.report.text.facts import FAR_RATIO, NOISE_RATIO, Document, round_ratio
 from islands.rounding import RESOLUTION
+from islands.sentences import write_amount
 
 #: Held-out share of the misfit above which the effects explain it, and above which they explain most of it.
 _WHOLE, _MOST = 0.9, 0.5

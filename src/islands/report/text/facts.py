@@ -1,19 +1,22 @@
 """Facts about results: the quantities and decisions that sentences state, from ``result.json`` alone.
 
-The limits of all sentences about results are here; the templates have none.
+A facts object is made once for each document, and the templates of `islands.sentences` read it. The limits of
+all sentences about results are here; the templates have none.
 """
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from math import inf
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 from islands.estimation.estimator_table import SIGNIFICANT
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.equations import name_columns
 from islands.records.preprocessing_steps import Preprocessing
 from islands.records.split import compare_input_ranges
-from islands.report.text.dry_friction import DryFriction, find_dry_friction
 from islands.rounding import RESOLUTION
+from islands.sentences import write, write_amount
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, NOT_COMPUTED
 from islands.validation.prediction_bands import LEVEL
 
@@ -63,11 +66,39 @@ _UNLIKELY = 0.5
 #: Closure of a loop, in per cent of the output range, above which the loop is open.
 _OPEN_PERCENT = 5.0
 
+#: Units of velocities: a length, an angle or revolutions by a time.
+_VELOCITY: Final = re.compile(r"([kcmunµμ]?m|in|ft|m?rad|deg|°|rev|1)\s*/\s*(s|min|h)|rpm")
+
+#: Terms whose sum is the friction, as long as the direction of motion does not change.
+_OPPOSING: Final = re.compile(r"sign\(y\(k-\d+\)\)")
+
+#: Terms that are linear in the only input.
+_DRIVING: Final = re.compile(r"u\(k(-\d+)?\)")
+
+#: Standard errors that a friction and a gain differ from zero by at least.
+_SIGNIFICANT_FRICTION: Final = 3.0
+
 #: What is added to an error on the validation data if the parameters were estimated again after it.
 BEFORE_REFIT = "measured before the parameters were estimated again on all data"
 
 #: Values of a JSON object.
 Document = Mapping[str, Any]
+
+
+class DryFriction(NamedTuple):
+    """Dry friction of a model of a velocity.
+
+    Attributes
+    ----------
+    step : float
+        Change of the velocity in one sample, in the unit of the velocity.
+    input : float or None
+        Value of the only input that balances it, in the unit of the input. None if there are several inputs,
+        or if the input has other terms than linear ones.
+    """
+
+    step: float
+    input: float | None
 
 
 class RunFacts:
@@ -82,6 +113,9 @@ class RunFacts:
     bands, residual, data : mapping
         Prediction bands, residual tests and facts about the data; empty if they are unknown.
     """
+
+    #: Level of the prediction band.
+    band = f"{100 * LEVEL:g} %"
 
     def __init__(
         self, metrics: Document, unit: str, bands: Document, residual: Document, data: Document
@@ -310,6 +344,9 @@ class ResultFacts(RunFacts):
         Content of ``result.json``.
     """
 
+    #: Inclusion probability of a certain term, and largest predictable share of an adequate residual.
+    certain, largest_share = CERTAIN, LARGEST_SHARE
+
     def __init__(self, document: Document) -> None:
         self.document = document
         self.record: Document = document["record"]
@@ -320,6 +357,11 @@ class ResultFacts(RunFacts):
         super().__init__(
             model["metrics"], unit, model["bands"] or {}, model["residual_tests"], document["data"]
         )
+
+    @cached_property
+    def limits(self) -> list[str]:
+        """Checks that the model fails."""
+        return write("result", "limit", f=self)
 
     @property
     def reasons(self) -> Sequence[str]:
@@ -370,6 +412,11 @@ class ResultFacts(RunFacts):
     def is_refitted(self) -> bool:
         """Whether the parameters are others than those that the errors belong to."""
         return is_refitted(self.model)
+
+    @property
+    def refit_note(self) -> str:
+        """What is added to an error on the validation data; empty without a refit."""
+        return BEFORE_REFIT if self.is_refitted else ""
 
     @property
     def recordings(self) -> Document:
@@ -597,9 +644,92 @@ class ResultFacts(RunFacts):
         return None if name is None else (name, 2 * settings[name])
 
 
-def write_amount(value: float, unit: str) -> str:
-    """Write a value with its unit."""
-    return f"{value:.4g} {unit}".rstrip()
+class OutputFacts(RunFacts):
+    """Quantities of the common free run of one output.
+
+    Parameters
+    ----------
+    output : mapping
+        Entry of the output in ``result.json``.
+    """
+
+    def __init__(self, output: Document) -> None:
+        self.name: str = output["name"]
+        bands, residual = output["bands"] or {}, output["residual"]
+        super().__init__(output["metrics"], output["unit"], bands, residual, output["data"])
+
+
+class CoupledFacts:
+    """Quantities of a result of several outputs that the statements read.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``result.json``.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.outputs = tuple(map(OutputFacts, document["outputs"]))
+
+    @property
+    def model(self) -> Document:
+        """Entry of the model, which a service stores apart from the rest."""
+        model: Document = self.document["models"][0]
+        return model
+
+    @property
+    def is_latent(self) -> bool:
+        """Whether every output has a latent model from a separate search."""
+        return bool(self.model.get("kind") == CoupledLatentModel.kind)
+
+    @cached_property
+    def extrapolation(self) -> list[str]:
+        """Inputs of the validation data that leave the range of the estimation data."""
+        record, ranges = self.document["estimation"], self.document["inputs"]
+        columns = record["names"]["inputs"], record["units"]["inputs"]
+        return compare_input_ranges(*columns, ranges["estimation"], ranges["validation"])
+
+    @cached_property
+    def limits(self) -> list[str]:
+        """Checks that an output or the model fails. A divergence of the free run concerns every output."""
+        failed = [text for each in self.outputs for text in write("coupled", "limit", output=each)]
+        return list(dict.fromkeys([*failed, *write("coupled", "extrapolation", f=self)]))
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the common free run follows every output."""
+        return all(output.simulates for output in self.outputs)
+
+    @property
+    def diverges(self) -> bool:
+        """Whether the common free run on the validation data diverges."""
+        return any(output.diverges for output in self.outputs)
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the prediction one step ahead follows every output."""
+        return all(output.predicts for output in self.outputs)
+
+    @property
+    def generalises_poorly(self) -> bool:
+        """Whether the error of an output is much larger on the validation data."""
+        return any(output.generalises_poorly for output in self.outputs)
+
+    @property
+    def structured(self) -> list[OutputFacts]:
+        """Outputs of which a part of the residual is predictable."""
+        return [output for output in self.outputs if output.has_structure]
+
+    @property
+    def adequate(self) -> list[OutputFacts]:
+        """Outputs in whose residual no structure is left."""
+        return [output for output in self.outputs if output.is_unpredictable and not output.exceeds_noise]
+
+    @cached_property
+    def insignificant(self) -> list[str]:
+        """Terms whose parameters are within two standard errors of zero."""
+        return list_insignificant(self.model["terms"])
 
 
 def exceeds_limit(share: float | None) -> bool:
@@ -632,3 +762,44 @@ def is_refitted(entry: Document) -> bool:
     """
     refit = entry.get("refit")  # an entry of several outputs has none
     return bool(refit and not refit["discarded"])
+
+
+def find_dry_friction(terms: Iterable[Mapping[str, Any]], unit: str) -> DryFriction | None:
+    """Find dry friction: terms in the sign of the output that oppose the motion.
+
+    Parameters
+    ----------
+    terms : iterable of mapping
+        Terms of a model, with ``regressor``, ``parameter`` and ``standard_error``.
+    unit : str
+        Unit of the output.
+
+    Returns
+    -------
+    DryFriction or None
+        None if the unit is not that of a velocity, or if no significant term opposes the motion.
+
+    Notes
+    -----
+    With ``y(k) = a y(k-1) + b u(k-1) - c sign(y(k-1))``, the friction changes the velocity by `c` in each
+    sample, and the input ``c / b`` balances it.
+    """
+    listed = list(terms)
+    if not _VELOCITY.fullmatch(unit):
+        return None
+    friction = _sum_terms(listed, _OPPOSING)
+    if friction is None or friction > 0:
+        return None
+    reads_input = [term for term in listed if re.search(r"\bu\d*\(", term["regressor"])]
+    linear = all(_DRIVING.fullmatch(term["regressor"]) for term in reads_input)
+    gain = _sum_terms(reads_input, _DRIVING) if linear else None
+    return DryFriction(-friction, None if gain is None else abs(friction / gain))
+
+
+def _sum_terms(terms: Iterable[Mapping[str, Any]], kind: re.Pattern[str]) -> float | None:
+    """Return the sum of the parameters of a kind of terms; None if it does not differ from zero."""
+    found = [term for term in terms if kind.fullmatch(term["regressor"])]
+    total = sum(float(term["parameter"]) for term in found)
+    # The sum of the standard errors is not less than the standard error of the sum.
+    limit = _SIGNIFICANT_FRICTION * sum(term["standard_error"] or 0.0 for term in found)
+    return total if found and abs(total) > limit else None

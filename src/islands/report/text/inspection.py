@@ -5,9 +5,8 @@ from textwrap import wrap
 
 from islands.records.inspection.fact import Fact
 from islands.records.inspection.findings import InspectedColumn, InspectedSampling, RecordInspection
-
-#: Width of the text.
-WIDTH = 80
+from islands.report.text.layout import WIDTH
+from islands.sentences import write_one
 
 #: Titles of the facts, by name; facts with the same title are one paragraph.
 _TITLES = {
@@ -32,6 +31,9 @@ _TITLE = 14
 #: Columns of a file that are listed, at most, and characters of a name.
 _MOST_COLUMNS, _NAME = 40, 28
 
+#: Deviation of the steps, relative to the sampling time, from which on it is stated.
+_LEAST_JITTER = 1e-3
+
 #: Rows of a kind, and problems of columns, that are listed.
 _LISTED = 3
 
@@ -40,10 +42,9 @@ def format_inspection(inspection: RecordInspection) -> str:
     """Return an inspection as text with lines of at most 80 characters."""
     lines = [inspection.file] if inspection.file else []
     lines += ["", *_format_columns(inspection.columns), ""]
-    lines += _format_paragraph("sampling", _describe_sampling(inspection.sampling))
     choice = inspection.choice
-    sure = "" if choice.confidence is None else f" Probably right: {100 * choice.confidence:.0f} %."
-    lines += _format_paragraph("choice", choice.reason + sure)
+    lines += _format_paragraph("sampling", _describe_sampling(inspection.sampling))
+    lines += _format_paragraph("choice", write_one("record", "text_choice", choice=choice))
     for title in dict.fromkeys(_TITLES.values()):
         sentences = [
             fact.sentence
@@ -92,22 +93,14 @@ def _shorten(name: str, most: int) -> str:
 
 
 def _describe_sampling(sampling: InspectedSampling) -> str:
-    if sampling.dt is None:
-        return f"{sampling.samples} samples; the sampling time is unknown."
-    text = f"{sampling.samples} samples of {sampling.dt:.6g} s ({1.0 / sampling.dt:.5g} Hz)"
-    text += f", by column {sampling.time}." if sampling.time else "."
-    if sampling.jitter is not None and sampling.jitter >= 1e-3:
-        text += f" The steps vary by {100 * sampling.jitter:.2g} % rms."
-    for kind, rows, verb in (
-        ("gaps", sampling.gaps, "Samples are missing before"),
-        ("repeated", sampling.repeated, "A time stamp is repeated at"),
-        ("backward", sampling.backward, "The time goes back at"),
-    ):
-        if rows:
-            more = sampling.counts[kind] - min(len(rows), _LISTED)
-            listed = ", ".join(rows[:_LISTED]) + (f" and {more} more" if more else "")
-            text += f" {verb} {listed}."
-    return text
+    kinds = {"gaps": sampling.gaps, "repeated": sampling.repeated, "backward": sampling.backward}
+    breaks = [
+        (kind, rows[:_LISTED], sampling.counts[kind] - min(len(rows), _LISTED))
+        for kind, rows in kinds.items()
+        if rows
+    ]
+    varies = sampling.jitter is not None and sampling.jitter >= _LEAST_JITTER
+    return write_one("record", "text_sampling", sampling=sampling, varies=varies, breaks=breaks)
 
 
 def _format_paragraph(title: str, text: str) -> list[str]:

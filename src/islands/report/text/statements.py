@@ -1,10 +1,11 @@
-"""Sentences about the recommended model of a result, from ``result.json`` alone.
+"""Statements about results and diagnoses: those of ``result.json`` and ``discrepancy.json`` alone.
 
-A run, its folder, the REST service, the report and a notebook state the same.
+A run, its folder, the REST service, the page, the report and a notebook state the same.
 """
 
-from islands.report.text.facts import Document, ResultFacts
-from islands.report.text.templates import write
+from islands.report.text.diagnosis_facts import DiagnosisFacts
+from islands.report.text.facts import CoupledFacts, Document, ResultFacts
+from islands.sentences import write, write_named, write_one
 
 
 def describe(document: Document) -> list[str]:
@@ -17,50 +18,65 @@ def describe(document: Document) -> list[str]:
     document : mapping
         Content of ``result.json``.
     """
-    model = ResultFacts(document).model
-    return [
-        *describe_essence(document),
-        describe_choice(document),
-        f"    {model['named_equation']}",
-        f"    {describe_units(document)}",
-        *describe_findings(document),
-    ]
-
-
-def describe_essence(document: Document) -> list[str]:
-    """State verdict, error against noise and a linear model, physics, failed checks and next steps."""
     facts = ResultFacts(document)
-    limits, names = write("result.txt", "limit", f=facts), ("verdict", "error", "physics")
     return [
-        *(text for name in names for text in write("result.txt", name, f=facts, limits=limits)),
-        f"Fails at: {'; '.join(limits) or 'none of the checks'}.",
-        f"Next: {'; '.join(write('result.txt', 'next', f=facts))}.",
+        *write("result", "essence", f=facts),
+        write_one("result", "choice", f=facts),
+        f"    {facts.model['named_equation']}",
+        f"    {write_one('result', 'units', f=facts)}",
+        *write("result", "finding", f=facts),
     ]
 
 
-def describe_choice(document: Document) -> str:
-    """State which model is recommended, and the first reason, or that none is of use."""
-    return "".join(write("result.txt", "choice", f=ResultFacts(document)))
-
-
-def describe_units(document: Document) -> str:
-    """State the units of the columns, the signals that the equation reads and direct feedthrough."""
-    return "".join(write("result.txt", "units", f=ResultFacts(document)))
-
-
-def describe_findings(document: Document) -> list[str]:
-    """Describe the estimate, further errors, uncertainty and uses of the recommended model."""
-    facts = ResultFacts(document)
-    uses = write("result.txt", "use", f=facts, limits=write("result.txt", "limit", f=facts))
-    details = write("result.txt", "detail", f=facts)
+def describe_coupled(document: Document) -> list[str]:
+    """Describe a result of several outputs in sentences; the equations are indented."""
+    facts = CoupledFacts(document)
     return [
-        *write("result.txt", "measure", f=facts),
-        *([f"Measured: {'; '.join(details)}."] if details else []),
-        f"Good for: {'; '.join(uses) or 'no use that the checks confirm'}.",
-        *describe_not_computed(document),
+        *write("coupled", "essence", f=facts),
+        write_one("coupled", "equations", f=facts),
+        f"    {'; '.join(document['equation'].splitlines())}",
+        *write("coupled", "finding", f=facts),
     ]
 
 
-def describe_not_computed(document: Document) -> list[str]:
-    """State each optional step that failed, with the reason."""
-    return [f"Not computed: {each['step']}: {each['reason']}." for each in document["not_computed"]]
+def describe_diagnosis(document: Document) -> list[str]:
+    """Describe a diagnosis in sentences: verdict, causes, findings, errors and next steps.
+
+    The causes are indented.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``discrepancy.json``.
+    """
+    facts = DiagnosisFacts(document)
+    causes = (f"  {cause}" for cause in describe_causes(facts))
+    return [describe_verdict(facts), *causes, *describe_details(facts)]
+
+
+def describe_headline(document: Document) -> list[str]:
+    """Describe a diagnosis in its most important sentences: verdict, causes, and errors or correction.
+
+    They are sentences of `describe_diagnosis`, without indents.
+    """
+    facts = DiagnosisFacts(document)
+    names = ("detail_record",) if facts.is_gross else ("detail_gain", "detail_error")
+    lines = (line for name in names for line in write("diagnosis", name, f=facts))
+    return [describe_verdict(facts), *describe_causes(facts), *lines]
+
+
+def describe_verdict(facts: DiagnosisFacts) -> str:
+    """State the verdict."""
+    return write_one("diagnosis", "verdict", f=facts)
+
+
+def describe_causes(facts: DiagnosisFacts) -> list[str]:
+    """Describe each cause: values, confidence, share of the misfit, and equivalent causes."""
+    return [write_one("diagnosis", "cause", f=facts, cause=cause) for cause in facts.causes]
+
+
+def describe_details(facts: DiagnosisFacts, has_extension: bool = True) -> list[str]:
+    """Describe noise, record, errors, and next steps, and the extended simulation unless it is left out."""
+    named = write_named("diagnosis", "detail", f=facts)
+    chosen = (text for name, text in named if has_extension or name != "detail_extended_simulation")
+    return [line for text in chosen for line in text.splitlines()]

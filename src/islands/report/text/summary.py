@@ -1,26 +1,31 @@
-"""Texts of a result: the summary for a terminal, and the method, which is written to a file only."""
+"""Texts of a result: the summary for a terminal, its table of models, and the method, a file only."""
 
+from collections.abc import Mapping
 from contextlib import suppress
+from typing import Any
 
 from islands.errors import ModelError
+from islands.estimation.latent_models import ORDERS
+from islands.evolution.latent_variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
 from islands.evolution.search_result import SearchResult
+from islands.evolution.settings import LATENT
 from islands.models.equations import named_signals
+from islands.models.latent import STRUCTURE_SUMMARIES
 from islands.models.linearisation import find_rest
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.persistence.saved_documents import find_recommended
-from islands.report.text.certificates import summarise_certificates
-from islands.report.text.facts import Document
-from islands.report.text.latent_method import describe_latent_search, is_latent
-from islands.report.text.layout import LEGEND, term_table, wrap
-from islands.report.text.model_table import table
-from islands.report.text.statements import (
-    describe_choice,
-    describe_essence,
-    describe_findings,
-    describe_units,
-)
+from islands.report.text.facts import Document, ResultFacts
+from islands.report.text.layout import LEGEND, MARK, term_table, wrap
+from islands.sentences import write, write_one
+from islands.validation.assessment import PARTS
+
+#: Columns of every table.
+_COLUMNS = ("rank", "terms", "MAPE est. %", "MAPE val. %", "R2 val.", "residuals")
+
+#: Columns of models of hysteresis.
+_HYSTERESIS_COLUMNS = ("drift %", "Property 1")
 
 
 def summary(document: Document, model: DynamicModel) -> str:
@@ -33,21 +38,73 @@ def summary(document: Document, model: DynamicModel) -> str:
     model : DynamicModel
         The recommended model.
     """
+    facts = ResultFacts(document)
     lines = [
-        *(line for sentence in describe_essence(document) for line in wrap(sentence)),
+        *(line for sentence in write("result", "essence", f=facts) for line in wrap(sentence)),
         "",
-        *wrap(describe_choice(document)),
+        *wrap(write_one("result", "choice", f=facts)),
         "",
         *term_table(model),
         *_describe_linear_part(document, model),
         "",
-        *wrap(describe_units(document)),
-        *(line for sentence in describe_findings(document) for line in wrap(sentence)),
+        *wrap(write_one("result", "units", f=facts)),
+        *(line for sentence in write("result", "finding", f=facts) for line in wrap(sentence)),
         "",
-        *table(document),
+        *table(facts),
         LEGEND,
     ]
     return "\n".join(lines) + "\n"
+
+
+def table(facts: ResultFacts) -> list[str]:
+    """Return the table of models and of the linear one as lines of equal width, with free-run errors."""
+    linear = [_row("lin.", facts.linear, facts.claims_hysteresis)] if facts.linear else []
+    lines = [columns(facts), *rows(facts), *linear]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
+
+
+def columns(facts: ResultFacts) -> tuple[str, ...]:
+    """Return the headings; those of holds only if a model claims hysteresis."""
+    rank, size, *errors, residuals = _COLUMNS
+    counted = "parameters" if facts.has_named_parameters else size
+    return rank, counted, *errors, *(_HYSTERESIS_COLUMNS if facts.claims_hysteresis else ()), residuals
+
+
+def rows(facts: ResultFacts) -> list[tuple[str, ...]]:
+    """Return the cells of every model, in the order of the ranks."""
+    return [
+        _row(f"{entry['rank']}{MARK if entry['recommended'] else ' '}", entry, facts.claims_hysteresis)
+        for entry in facts.document["models"]
+    ]
+
+
+def _row(rank: str, entry: Document, hysteresis: bool) -> tuple[str, ...]:
+    metrics = entry["metrics"]
+    estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
+    estimated, validated = (entry["outcomes"][part]["free_run"] == "ok" for part in PARTS)
+    return (
+        rank,
+        str(entry["size"]),
+        number(estimation["mape"], "{:.4f}", estimated),
+        number(validation["mape"], "{:.4f}", validated),
+        number(validation["r2"], "{:.5f}", validated),
+        *(_describe_claims(entry["physics"]) if hysteresis else ()),
+        entry["residual_tests"]["verdict"],
+    )
+
+
+def _describe_claims(physics: Document) -> tuple[str, str]:
+    bounded = all(hold["bounded"] for hold in physics["holds"])
+    drift = number(physics["hold_drift_percent"], "{:.3f}", bounded)
+    return drift, "yes" if physics["property_1"] else "no"
+
+
+def number(value: float | None, form: str, bounded: bool) -> str:
+    """Format a number. Return "diverged" if its simulation diverged and "-" if there is no number."""
+    if not bounded:
+        return "diverged"
+    return "-" if value is None else form.format(value)
 
 
 def _describe_linear_part(document: Document, model: DynamicModel) -> list[str]:
@@ -62,22 +119,27 @@ def _describe_linear_part(document: Document, model: DynamicModel) -> list[str]:
     with suppress(ModelError):
         y = find_rest(measured_block(model), point, tuple(bands["range"]["output"]))
         system = model.linearise(point, y)
-        return wrap(f"Linear part about {system.describe_point()}: {'; '.join(system.describe())}.")
+        return wrap(
+            write_one("result", "linear_part", point=system.describe_point(), parts=system.describe())
+        )
     return []
 
 
 def method_text(found: SearchResult) -> str:
     """Return data, settings, number of models, bounds, and the equations of all models."""
-    record, search = found.record, found.search
-    outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
+    facts = {
+        "record": found.record,
+        "search": found.search,
+        "settings": _list_settings(found),
+        "latent": _describe_latent_search(found.settings, found.search.generations or 0),
+        "certificates": certificates_document(found),
+        "signals": named_signals(found.recommended.final_model),
+    }
     lines = [
-        f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
-        *wrap(_describe_settings(found)),
-        f"{search.evaluations} models estimated: {outcomes}",
-        *_describe_search(found),
-        *(line for text in summarise_certificates(found) for line in wrap(text)),
+        *(line for text in write("method", "run", **facts) for line in wrap(text)),
+        *(line for text in write("method", "search", **facts) for line in ("", *wrap(text))),
         "",
-        *wrap(_describe_names(found)),
+        *wrap(write_one("method", "names", **facts)),
         *(
             f"{rank:2d}  " + entry.final_model.equation().named.replace("\n", "\n    ")
             for rank, entry in enumerate(found.models, start=1)
@@ -86,29 +148,52 @@ def method_text(found: SearchResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _describe_search(found: SearchResult) -> list[str]:
-    """Return the size of the full polynomial set, or how latent models were searched."""
-    search, full = found.search, found.search.full_set
-    if not is_latent(found.settings):
-        return [
-            f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB"
-        ]
-    paragraphs = describe_latent_search(found.settings, search.generations or 0)
-    return [line for text in paragraphs for line in ("", *wrap(text))]
+def certificates_document(found: SearchResult) -> list[dict[str, Any]]:
+    """Return the certificate of every model's size, by size, and the gap of the model, as JSON values."""
+    documents = []
+    for entry in sorted(found.models, key=lambda each: each.model.size):
+        certificate = found.search.certificates.get(entry.model.size)
+        if certificate is not None:
+            error = entry.metrics["estimation"]["one_step_ahead"].rmse
+            documents.append(
+                {
+                    "terms": certificate.terms,
+                    "bound": certificate.bound,
+                    "gap_percent": 100.0 * certificate.gap(error),
+                    "proved": certificate.proves(error),
+                    "nodes": certificate.nodes,
+                }
+            )
+    return documents
 
 
-def _describe_names(found: SearchResult) -> str:
-    """Return the heading of the equations, with the signals that they read."""
-    statement = named_signals(found.recommended.final_model)
-    where = f", where {statement}" if statement else ""
-    return f"Equations by rank, with the columns of the record{where}:"
+def _describe_latent_search(settings: Mapping[str, Any], generations: int) -> dict[str, Any] | None:
+    """Return the numbers of a search for latent models; None for another one."""
+    if settings.get("model_class") != LATENT:
+        return None
+    constraints = [each.strip() for each in settings.get("constraints", "none").split(";")]
+    return {
+        **settings,
+        "generations": generations,
+        "orders": list(map(str, ORDERS)),
+        "most_states": MOST_STATES,
+        "most_units": MOST_UNITS,
+        "structure_summary": STRUCTURE_SUMMARIES[settings["structure"]],
+        "steps": STEPS,
+        "effect_steps": EFFECT_STEPS,
+        "further_steps": FURTHER_STEPS,
+        "elite": max(1, round(settings["elite"] * settings["population"])),
+        "migrates": settings["islands"] > 1,
+        "is_odd": "odd" in constraints,
+        "statics": [each for each in constraints if each not in {"odd", "none"}],
+    }
 
 
-def _describe_settings(found: SearchResult) -> str:
+def _list_settings(found: SearchResult) -> list[str]:
     hidden = ("own_primitives", "choice")
     settings = {name: value for name, value in found.settings.items() if name not in hidden}
     settings["seed"] = found.seed
-    return ", ".join(f"{name} {_format_setting(name, value)}" for name, value in settings.items())
+    return [f"{name} {_format_setting(name, value)}" for name, value in settings.items()]
 
 
 def _format_setting(name: str, value: object) -> str:

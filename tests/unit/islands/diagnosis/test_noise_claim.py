@@ -33,10 +33,6 @@ def test_white_residual_is_nothing_unless_it_is_far_above_the_stated_noise() -> 
     rms = found.noise_claim.rms
     near = islands.diagnose(record, "linear:2", effects=(), noise_level=rms / 1.5)
     assert near.verdict == Verdict.NOTHING
-    assert near.summary.startswith(
-        "No significant discrepancy: the simulation agrees with the record within the"
-    )
-    assert "stated noise of" in near.summary
     far = islands.diagnose(record, "linear:2", effects=(), noise_level=rms / 2.5)
     assert far.verdict == Verdict.UNKNOWN
     (finding,) = far.record_findings
@@ -62,10 +58,6 @@ def test_clean_coloured_noise_is_left_to_the_user(noise: str) -> None:
     assert not found.causes
     claim = found.noise_claim
     assert claim is not None
-    words = (
-        f"noise of {claim.rms:.2g} V with a correlation time of {claim.correlation_time:.2g} s is plausible"
-    )
-    assert words in found.summary
     assert json.loads(json.dumps(found.document))["noise_claim"]["rms"] == claim.rms
     stated = islands.diagnose(make_noisy_record(noise, 7), "linear:2", noise_level=claim.rms)
     assert stated.verdict == Verdict.NOTHING
@@ -77,7 +69,6 @@ def test_an_error_over_the_input_without_a_name_is_no_noise(seed: int) -> None:
     found = islands.diagnose(make_quantised_actuator(seed), "linear:2", effects=WITHOUT_JUMPS)
     assert found.verdict == Verdict.UNKNOWN
     assert "fine map of the input" in found.residual_structure
-    assert "fine map of the input" in found.summary
     stated = islands.diagnose(
         make_quantised_actuator(seed), "linear:2", effects=WITHOUT_JUMPS, noise_level=SENSOR
     )

@@ -7,7 +7,7 @@ from islands.diagnosis.inference.noise_detectors import DETECTORS
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.interface.context import SimulationContext
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from support.simulated_records import recorded
 
 SAMPLES, DT = 400, 0.1

@@ -6,7 +6,8 @@ import pytest
 import islands
 from islands.cli.options import columns
 from islands.records.reading.options import ReadingOptions
-from islands.report.text.inspection import WIDTH, format_inspection
+from islands.report.text.inspection import format_inspection
+from islands.report.text.layout import WIDTH
 from support.known_records import delay, lag, measure, steps
 
 

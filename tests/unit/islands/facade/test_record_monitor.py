@@ -9,13 +9,18 @@ import scipy
 from islands.diagnosis.monitoring.record_follower import AlarmKind
 from islands.errors import RecordError, SettingsError
 from islands.facade.record_monitor import create_monitor, monitor_record
-from islands.report.documents.monitor_json import describe_alarm, describe_status, monitor_document
+from islands.report.documents.monitor_json import (
+    describe_alarm,
+    describe_alarm_text,
+    describe_last_record,
+    describe_status,
+    monitor_document,
+)
 from islands.report.documents.monitor_state import (
     head_to_json,
     monitor_from_head,
     record_to_json,
 )
-from islands.report.text.monitor import describe_alarm_text, describe_last_record
 from lab.diagnosis.monitor import run
 from support.monitored_oscillator import (
     ONSET,

@@ -14,9 +14,9 @@ from islands.facade.refit import join_data
 from islands.persistence.models import read_validated_model
 from islands.records.dataset import Dataset
 from islands.report.figures.registry import FIGURES
-from islands.report.text.facts import BEFORE_REFIT
-from islands.report.text.headlines import write_headline
+from islands.report.text.facts import BEFORE_REFIT, ResultFacts
 from islands.report.text.statements import describe
+from islands.sentences import write_one
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.metrics import metrics
 from support.noisy_records import TERMS, make_noisy_record
@@ -163,7 +163,7 @@ def test_a_document_has_the_model_whose_errors_it_states(tmp_path):
     assert metrics(data.y, run.y) == saved.metrics["validation"]["free_run"]
     for each in (saved, result.best):
         assert each.describe_error().endswith(BEFORE_REFIT)
-    assert BEFORE_REFIT in write_headline(document)
+    assert BEFORE_REFIT in write_one("result", "headline", f=ResultFacts(document))
     assert "estimated again on all 400 samples" in " ".join(describe(document))
 
 

@@ -11,7 +11,7 @@ from islands.diagnosis.calibration.target import Target
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.persistence.models import model_from_json
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.identified import NarxSimulator
 from islands.simulators.specification.factory import make_model_simulator

@@ -9,7 +9,7 @@ from islands.expressions.parsing import parse
 from islands.models.narx import make_model
 from islands.persistence.models import write_model
 from islands.records.writer import write_record
-from islands.report.pages.saved_result import report_saved_result
+from islands.report.pages.identification import report_saved_result
 from support.identifications import record as make_record
 from support.searches import record
 from support.undrawn import undrawn_figures

@@ -14,7 +14,7 @@ from islands.effects.baseline import JUMP
 from islands.effects.friction import COULOMB_FRICTION
 from islands.facade.results.saved_simulation import SavedSimulation
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.intersample import InterSample, ResampledSimulator
 from islands.simulators.specification.table import LocalExtendedSpec

@@ -6,7 +6,7 @@ import pytest
 from islands.diagnosis.procedure import diagnose
 from islands.diagnosis.result import Diagnosis
 from islands.effects.catalogue import CATALOGUE
-from islands.report.figures.form_values import draw_effect_shape
+from islands.report.figures.diagnosis import draw_effect_shape
 from lab.diagnosis.cases import CASES
 from lab.diagnosis.injection.measurement import inject
 

@@ -12,8 +12,8 @@ from islands.effects.filters import low_pass
 from islands.effects.free_forms import FREE_FORMS
 from islands.effects.interface.context import SimulationContext
 from islands.kernels.curve import PLACES
-from islands.report.documents.extension_json import extended_document
-from islands.report.figures.form_values import draw_free_forms
+from islands.report.documents.extension import extended_document
+from islands.report.figures.diagnosis import draw_free_forms
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.external import RecordedOutput
 from lab.diagnosis.trial import Trial, run_trial

@@ -31,7 +31,7 @@ from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.kernels.lagrange import interpolate_at
 from islands.records.dataset import Dataset
 from islands.report.documents.diagnosis_json import diagnosis_document
-from islands.report.documents.extension_json import extended_json
+from islands.report.documents.extension import extended_json
 from islands.report.pages.diagnosis import diagnosis_report
 from islands.report.pages.origin import Origin
 from islands.simulators.extended import ExtendedSimulator, make_context

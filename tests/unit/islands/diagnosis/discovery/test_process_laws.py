@@ -15,7 +15,7 @@ from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.context import Signal
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_json
+from islands.report.documents.extension import extended_json
 from islands.simulators.specification.equations import OdeSpec
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LocalExtendedSpec

@@ -16,7 +16,8 @@ from islands.effects.interface.effect import Effect
 from islands.records.dataset import Dataset
 from islands.records.split import hold_out
 from islands.report.documents.diagnosis_json import diagnosis_document
-from islands.report.text.diagnosis_statements import describe_details
+from islands.report.text.diagnosis_facts import DiagnosisFacts
+from islands.report.text.statements import describe_details
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.external import PythonFunctionSimulator
 from islands.simulators.specification.factory import make_simulator
@@ -98,6 +99,6 @@ def test_causes_with_another_time_in_validation_data_are_named(
     assert found.is_time_left_out
     assert found.gain is not None
     assert found.gain.ci95[0] > 0.0
-    text = " ".join(describe_details(diagnosis_document(found)))
+    text = " ".join(describe_details(DiagnosisFacts(diagnosis_document(found))))
     assert "It contradicts the validation recording" in text
     assert "They belong to functions of the time, and are those of one recording." in text

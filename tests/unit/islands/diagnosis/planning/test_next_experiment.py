@@ -12,7 +12,7 @@ from islands.diagnosis.inference.screening import ScreenedEffect
 from islands.diagnosis.planning.next_experiment import NextExperiment, design_next_experiment
 from islands.effects.interface.context import Signal
 from islands.records.dataset import Dataset
-from islands.report.documents.experiment_json import (
+from islands.report.documents.plan_json import (
     describe_next_experiment,
     get_suggested_input,
     write_advice,

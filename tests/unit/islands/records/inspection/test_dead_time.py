@@ -86,7 +86,7 @@ def test_a_lag_that_is_probably_wrong_is_stated_as_an_interval():
     fact = estimate(measure(u, delay(lag(lag(u, 20.0), 10.0), 10), 0.05))
     assert fact.value is None
     assert fact.interval[0] <= 12 <= fact.interval[1]
-    assert fact.sentence.startswith("It is uncertain when y responds to u: between")
+    assert fact.finding == "dead_time_uncertain"
 
 
 @pytest.mark.nightly

@@ -28,7 +28,7 @@ def test_noise_below_the_quantisation_step_is_not_stated():
     y = np.round(u / u.std() + 1e-4 * white(3000, 1), 2)
     fact = measure_output_noise(Dataset(u, y, 1.0))
     assert fact.value is None
-    assert "below its quantisation step" in fact.sentence
+    assert fact.finding == "noise_below_step"
 
 
 def test_interval_contains_the_level_of_most_records():

@@ -29,11 +29,11 @@ def test_a_held_excitation_has_one_count_of_levels_and_no_converter():
     force = 20.0 * np.random.default_rng(0).choice([0, 5, 19], 60).repeat(10)
     channel = Channel("force_N", "N", force, is_output=False)
     fact = find_quantisation(channel)
-    assert (fact.value, fact.sentence) == (None, "force_N is held at 3 levels from 0 N to 380 N.")
+    assert (fact.value, fact.finding, fact.details["levels"]) == (None, "quantisation_held", 3)
     levels = measure_excitation(channel, Dataset(force, force, 1.0))[1]
-    assert levels.sentence == "force_N has 3 levels."
+    assert levels.value == 3
 
 
 def test_a_staircase_and_a_converter_have_one_description():
     """Nothing tells 1, 2, 3, 4, each held for a while, from a slow ramp in a coarse lattice."""
-    assert find(np.repeat([1.0, 2.0, 3.0, 4.0], 50)).sentence == "y_V has 4 levels in steps of 1 V."
+    assert find(np.repeat([1.0, 2.0, 3.0, 4.0], 50)).value == 1.0

@@ -1,12 +1,16 @@
 """Figures of a diagnosis: panels, lines and sizes."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 import islands
-from islands.report.figures.diagnosis import draw_residual
+from islands.diagnosis.rate_effect import find_rate_effect
+from islands.effects.catalogue import CATALOGUE
+from islands.report.figures.diagnosis import BEFORE, draw_residual, draw_residual_over_rate
+from islands.report.figures.style import SIMULATED
 
 pytestmark = pytest.mark.usefixtures("without_layout")
 
@@ -58,3 +62,50 @@ def test_spectrum_integrates_to_the_variance_of_the_residual() -> None:
     frequency, density = before.get_xydata().T
     residual = found.record.y - found.base.output
     assert np.trapezoid(density**2, frequency) == pytest.approx(np.var(residual), rel=0.25)
+
+
+FRICTION = 0.3
+
+
+@cache
+def diagnose_shifted(friction: float = FRICTION):
+    """Return a diagnosis of a recorded simulation without dry friction, whose output has an offset."""
+    rng = np.random.default_rng(5)
+    time = 0.01 * np.arange(500)
+    u = 4 * np.sin(3 * time) * np.sin(0.8 * time + 0.5)
+    simulated = 1.5 * u
+    y = 0.2 + simulated - friction * np.sign(np.gradient(u)) + 0.05 * rng.standard_normal(time.size)
+    record = islands.Dataset(u[:, None], y, 0.01, ("u_V",), "y_um", ("V",), "um")
+    effects = [CATALOGUE[name] for name in ("coulomb-friction", "offset")]
+    return islands.diagnose(record, "column:y_sim", columns={"y_sim": simulated}, effects=effects)
+
+
+@pytest.mark.ci
+def test_the_residual_without_friction_is_a_step_over_the_rate_and_with_it_none() -> None:
+    above, below = draw_residual_over_rate(diagnose_shifted()).axes
+    lines = {line.get_color(): line for line in above.lines if line.get_color() in (BEFORE, SIMULATED)}
+    for colour, step in ((BEFORE, -FRICTION), (SIMULATED, 0.0)):
+        rate, mean = lines[colour].get_data()
+        ends = [np.mean(mean[side * rate > 0.3 * np.max(rate)]) for side in (1.0, -1.0)]
+        np.testing.assert_allclose(ends, [step, -step], atol=0.03)
+    places, force = below.lines[0].get_data()
+    np.testing.assert_allclose(np.interp([-5.0, 5.0], places, force), [-FRICTION, FRICTION], atol=0.02)
+    assert (below.get_xlabel(), below.get_ylabel()) == ("rate of u (V/s)", "added (um)")
+
+
+def test_the_effect_is_named_in_plain_words() -> None:
+    figure = draw_residual_over_rate(diagnose_shifted())
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == [
+        "without dry friction",
+        "with dry friction",
+    ]
+
+
+def test_a_cause_that_is_not_claimed_or_has_no_rate_has_no_figure() -> None:
+    found = diagnose_shifted()
+    assert find_rate_effect(found).name == "coulomb-friction"
+    unclaimed = replace(found, effects=tuple(replace(each, is_claimed=False) for each in found.effects))
+    assert find_rate_effect(unclaimed) is None
+    assert find_rate_effect(diagnose_shifted(0.0)) is None
+    with pytest.raises(ValueError, match="no claimed effect"):
+        draw_residual_over_rate(diagnose_shifted(0.0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from islands.records.dataset import Dataset
-from islands.report.figures.hysteresis_loop import draw_loop
+from islands.report.figures.hysteresis import draw_loop
 from islands.report.figures.style import MEASURED, SIMULATED
 
 pytestmark = pytest.mark.usefixtures("without_layout")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from islands.models.latent import StateSpaceLayout
-from islands.report.figures.latent_structure import draw_structure
+from islands.report.figures.latent import draw_structure
 from support.latent_systems import SPRING, make_large_model, make_model
 
 # The kernels of state spaces are compiled at their first use.

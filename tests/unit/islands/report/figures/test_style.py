@@ -63,7 +63,7 @@ import hashlib, importlib.util, pkgutil, sys
 import islands.report.figures
 for module in pkgutil.iter_modules(islands.report.figures.__path__):
     importlib.import_module("islands.report.figures." + module.name)
-assert "islands.report.figures.hold" in sys.modules
+assert "islands.report.figures.hysteresis" in sys.modules
 spec = importlib.util.spec_from_file_location("tests_of_style", sys.argv[1])
 tests = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(tests)

@@ -15,13 +15,11 @@ from islands.models.narx import Model, make_model
 from islands.records.dataset import Dataset
 from islands.report.figures.diagnosis import DIAGNOSIS_FIGURES
 from islands.report.figures.free_run import draw_free_run
-from islands.report.figures.hold import draw_holds
-from islands.report.figures.hysteresis_loop import draw_loop
-from islands.report.figures.latent_structure import draw_structure
+from islands.report.figures.hysteresis import draw_holds, draw_loop
+from islands.report.figures.latent import draw_structure, draw_unit_curves
 from islands.report.figures.linear_system import draw_bode
 from islands.report.figures.residuals import draw_residual_correlations
 from islands.report.figures.style import save
-from islands.report.figures.unit_curves import draw_unit_curves
 from islands.validation.residual_tests import residual_tests
 from support.contrast import DARK_PAPER, LINE_CONTRAST, contrast, shown_in_dark
 from support.latent_systems import make_large_model

@@ -5,7 +5,7 @@ import pytest
 import islands
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
-from islands.report.pages.identification import identification_report
+from islands.report.pages.identification import identification_report, list_terms
 from islands.report.pages.origin import Origin
 from support.identifications import record
 
@@ -49,3 +49,33 @@ def test_diverged_free_run_has_no_number(found):
     page = write(found, models=[changed], recommended={"rank": 1, "reasons": []})
     assert "diverges on the validation data" in page
     assert '<th scope="row">free run, validation data</th><td>diverged</td>' in page
+
+
+def term(parameter, error, inclusion=None):
+    return {"term": "y(k-1)", "parameter": parameter, "standard_error": error, "inclusion": inclusion}
+
+
+def cells(*terms):
+    """Return the values of the first row by heading."""
+    headings, rows = list_terms(terms)
+    return dict(zip(headings, rows[0], strict=True))
+
+
+def test_interval_reaches_1_96_standard_errors_from_the_estimate():
+    assert cells(term(2.0, 0.5, 0.875)) == {
+        "term": "y(k-1)",
+        "parameter": "2",
+        "standard error": "0.5",
+        "95 % interval": "1.02 to 2.98",
+        "inclusion": "0.88",
+    }
+
+
+def test_parameter_that_the_constraints_determine_is_fixed_and_has_no_interval():
+    found = cells(term(1.0, 0.0), term(1.0, 0.1))
+    assert (found["standard error"], found["95 % interval"]) == ("fixed", "-")
+
+
+def test_parameters_with_names_have_values():
+    headings, _ = list_terms([term(1.0, None)], named=True)
+    assert headings == ("parameter", "value")

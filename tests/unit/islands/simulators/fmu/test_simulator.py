@@ -20,7 +20,7 @@ from islands.export.fmu import find_compiler
 from islands.models.narx import Model
 from islands.persistence.models import model_from_json
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
 from islands.simulators.specification.code import FmuSpec

@@ -18,7 +18,7 @@ from islands.errors import ModelError
 from islands.export.closed_form import closed_form
 from islands.export.fmu import find_compiler
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document
+from islands.report.documents.extension import extended_document
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec

@@ -17,7 +17,7 @@ from islands.effects.interface.effect import Effect
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.export.extension import as_json
 from islands.records.dataset import Dataset
-from islands.report.documents.extension_json import extended_document, extended_json
+from islands.report.documents.extension import extended_document, extended_json
 from islands.simulators.extended import ExtendedSimulator, SavedExtension, make_context
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
