@@ -61,6 +61,7 @@ _ROWS: Select[Any] = select(
 #: Schema of a state with its records: that of `islands.report.documents.monitor_state`, which this module
 #: does not import for its numerical packages. A test compares them.
 STATE_SCHEMA = "islands.monitor-state/1"
+
 _other = jobs.alias("other")
 
 #: True for a job of no monitor, and for the next record of a monitor: no other one is being analysed, and
