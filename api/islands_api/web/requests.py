@@ -42,9 +42,6 @@ from islands_service.domain.job import QuotaError
 #: Options of reading a record, which the form field ``reading`` contains.
 _READING = frozenset(option.name for option in fields(ReadingOptions))
 
-#: Characters of a name in a message.
-_SHOWN = 40
-
 #: Maximum number of digits of an integer: parsing takes time proportional to the square of the digits.
 _MAX_INTEGER_DIGITS = 400
 
@@ -85,7 +82,7 @@ def check_names(given: Iterable[str], known: Collection[str], kind: str, path: s
                     f"; {name} is an option of reading: send it in the form field reading, a JSON object, as "
                     'reading={"header": false}'
                 )
-            raise SettingsError(f"{path} has no {kind} {name[:_SHOWN]!r}; {listed}{advice}")
+            raise SettingsError(f"{path} has no {kind} {name[:_MAX_QUOTED_NAME]!r}; {listed}{advice}")
 
 
 class BodyReader:

@@ -36,7 +36,7 @@ from islands_service.store.blobs import translate_disk_full
 from islands_service.store.buckets import ObjectNotFoundError, ObjectStore
 from islands_service.store.datasets import StoredDataset
 
-#: Number of bytes that are copied at once.
+#: Number of bytes that are copied, or collected before they are written, at once.
 CHUNK_BYTES = 1 << 20
 
 #: Suffixes that are refused. The reader of MDF writes temporary files, which the inspection forbids.
@@ -56,9 +56,6 @@ GZIP_SUFFIX = ".gz"
 
 #: Redirects that are followed, each to a listed host.
 _MAX_REDIRECTS = 3
-
-#: Bytes that are collected before they are written.
-_BUFFER_BYTES = 1 << 20
 
 
 def parse_file_name(given: str | None) -> tuple[str, bool]:
@@ -272,7 +269,7 @@ async def _write(state: AppState, host: str, response: httpx.Response, target: I
         buffer += chunk
         if received > room:
             raise _make_size_error(room, state.settings)
-        if len(buffer) >= _BUFFER_BYTES or not chunk:
+        if len(buffer) >= CHUNK_BYTES or not chunk:
             await state.run_blocking(target.write, bytes(buffer))
             buffer.clear()
         if not chunk:

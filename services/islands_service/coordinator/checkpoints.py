@@ -40,12 +40,15 @@ _LOSS_ERRORS = (
     *(BlobNotFoundError, FileNotFoundError, gzip.BadGzipFile, EOFError, zlib.error),
     *(IslandsError, KeyError, TypeError, ValueError),
 )
+
 T = TypeVar("T")
 
 #: Note in the progress and the summary of a job whose checkpoint was lost.
 SEARCH_RESTARTED = (
     "the last checkpoint was lost or damaged: the search started again, which gives the same result"
 )
+
+#: Tag of the checkpoints of diagnoses.
 SCHEMA = "islands.diagnosis-checkpoint/1"
 
 #: Notes in the progress and the summary of a job whose checkpoint was lost, or differs from its diagnosis.

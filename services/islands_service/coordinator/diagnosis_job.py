@@ -49,6 +49,7 @@ from islands_service.store.database import StoreError
 
 #: Seconds between two reports within a step.
 REPORT_EVERY = 0.5
+
 A = TypeVar("A")
 R = TypeVar("R")
 

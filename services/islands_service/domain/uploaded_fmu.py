@@ -31,8 +31,9 @@ class UploadedFmuSpec(FmuSpec):
 def describe_fmu(description: FmiDescription) -> dict[str, Any]:
     """Return a description as JSON; a bound that is infinite is null."""
     document = asdict(description)
-    for each in (variable for kind in VARIABLES for variable in document[kind]):
-        each |= {end: None if isinf(each[end]) else each[end] for end in ("lower", "upper")}
+    for kind in VARIABLES:
+        for variable in document[kind]:
+            variable |= {end: None if isinf(variable[end]) else variable[end] for end in ("lower", "upper")}
     return document
 
 

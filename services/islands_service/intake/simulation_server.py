@@ -64,10 +64,6 @@ def _load_kernels() -> None:
         preview_calibration(record, make_simulator(kind, record))
 
 
-if __name__ == "__main__":
-    main()
-
-
 def compile_kernels() -> None:
     """Call the kernels of both interfaces, so that they are compiled and stored."""
     record = Dataset(np.zeros(2), np.zeros(2), 0.1)
@@ -120,3 +116,7 @@ def _describe(interface: FmiInterface) -> FmiDescription:
         indicators=0,
         completes=False,
     )
+
+
+if __name__ == "__main__":
+    main()

@@ -8,7 +8,7 @@ accepts three times as many jobs as one transaction per job, and the longest wai
 
 import os
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,7 +17,7 @@ from threading import Lock, Thread
 from time import monotonic
 from typing import Any, TypeVar
 
-from sqlalchemy import Connection, PoolProxiedConnection, make_url
+from sqlalchemy import Column, Connection, PoolProxiedConnection, Row, Select, make_url, tuple_
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
@@ -290,6 +290,29 @@ class DatabaseOperations:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+
+    def _read_page(
+        self,
+        query: Select[Any],
+        order: Column[Any],
+        identity: Column[Any],
+        after: tuple[float, str] | None,
+        limit: int,
+        is_descending: bool = True,
+    ) -> tuple[Sequence[Row[Any]], tuple[float, str] | None]:
+        """Return the rows that follow a position, and the position of the next page if there is one.
+
+        A position is the value by which the rows are ordered, and the id of the last row of a page.
+        """
+        if after is not None:
+            place = tuple_(order, identity)
+            query = query.where(place < tuple_(*after) if is_descending else place > tuple_(*after))
+        columns = (order, identity)
+        query = query.order_by(*(each.desc() if is_descending else each for each in columns)).limit(limit + 1)
+        with self._database.read() as connection:
+            rows = connection.execute(query).all()
+        last = rows[limit - 1]._mapping if len(rows) > limit else None
+        return rows[:limit], None if last is None else (last[order], last[identity])
 
 
 def ignore_duration(_seconds: float) -> None:

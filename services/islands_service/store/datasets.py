@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Row, bindparam, func, insert, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, func, insert, select, update
 
 from islands.errors import IslandsError
 from islands_service.domain.job import ACTIVE, QuotaError, Requester
@@ -200,13 +200,8 @@ class Datasets(DatabaseOperations):
         """
         query = _PAGE.where(datasets.c.owner == owner, datasets.c.deleted.is_(None))
         query = query.where((datasets.c.suffix == FMU_SUFFIX) == is_fmu)
-        if after is not None:
-            query = query.where(tuple_(datasets.c.created, datasets.c.id) < tuple_(*after))
-        query = query.order_by(datasets.c.created.desc(), datasets.c.id.desc()).limit(limit + 1)
-        with self._database.read() as connection:
-            found = [_make_dataset(row, _read_summary(row)) for row in connection.execute(query)]
-        more, found = len(found) > limit, found[:limit]
-        return tuple(found), (found[-1].created, found[-1].id) if more else None
+        rows, position = self._read_page(query, datasets.c.created, datasets.c.id, after, limit)
+        return tuple(_make_dataset(row, json.loads(row.summary)) for row in rows), position
 
     def delete(self, owner: str, dataset: str, by: Requester | None = None, is_fmu: bool = False) -> None:
         """Delete a data set or an FMU that no unfinished job needs.
@@ -310,10 +305,6 @@ def _find_row(
 
 #: Rows for a page.
 _PAGE = select(*(column for column in datasets.c if column.name not in ("preview", "deleted")))
-
-
-def _read_summary(row: Any) -> dict[str, Any]:
-    return dict(json.loads(row.summary))
 
 
 def _make_dataset(row: Any, preview: Mapping[str, Any] | None = None) -> StoredDataset:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, Select, bindparam, func, insert, select, tuple_
+from sqlalchemy import Connection, Row, bindparam, func, insert, select
 
 from islands_service.domain.job import (
     ACTIVE,
@@ -253,13 +253,13 @@ class Jobs(DatabaseOperations):
         if tag is not None:
             query = query.where(has_tag(tag))
         query = query.where(*has_words(words))
-        query = _order_by_error(query, after) if by_error else _order_by_age(query, after)
-        size = min(limit, MAX_PAGE_SIZE)
-        with self._database.read() as connection:
-            rows = connection.execute(query.limit(size + 1)).all()
-        found, more = rows[:size], len(rows) > size
-        last = (found[-1].model_error if by_error else found[-1].created, found[-1].id) if more else None
-        return JobRows(tuple(job_from_row(row) for row in found), last)
+        order = jobs.c.created
+        if by_error:
+            query, order = query.where(jobs.c.model_error.is_not(None)), jobs.c.model_error
+        rows, position = self._read_page(
+            query, order, jobs.c.id, after, min(limit, MAX_PAGE_SIZE), not by_error
+        )
+        return JobRows(tuple(map(job_from_row, rows)), position)
 
     def label(
         self,
@@ -428,19 +428,6 @@ class Jobs(DatabaseOperations):
         """Return statistics of the jobs of all owners."""
         with self._database.read() as connection:
             return read_queue_statistics(connection)
-
-
-def _order_by_age(query: Select[Any], after: tuple[float, str] | None) -> Select[Any]:
-    if after is not None:
-        query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
-    return query.order_by(jobs.c.created.desc(), jobs.c.id.desc())
-
-
-def _order_by_error(query: Select[Any], after: tuple[float, str] | None) -> Select[Any]:
-    query = query.where(jobs.c.model_error.is_not(None))
-    if after is not None:
-        query = query.where(tuple_(jobs.c.model_error, jobs.c.id) > tuple_(*after))
-    return query.order_by(jobs.c.model_error, jobs.c.id)
 
 
 def _find_dataset_name(connection: Connection, submission: Submission) -> str | None:

@@ -65,6 +65,7 @@ KEPT = 500
 
 #: Attempts since the last checkpoint after which a job is given up.
 ATTEMPTS = 5
+
 _CANDIDATE: Select[Any] = select(
     jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested, jobs.c.progress, jobs.c.islands
 ).limit(1)

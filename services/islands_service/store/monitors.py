@@ -18,7 +18,6 @@ from sqlalchemy import (
     insert,
     or_,
     select,
-    tuple_,
     update,
 )
 
@@ -61,6 +60,7 @@ _ROWS: Select[Any] = select(
 #: Schema of a state with its records: that of `islands.report.documents.monitor_state`, which this module
 #: does not import for its numerical packages. A test compares them.
 STATE_SCHEMA = "islands.monitor-state/1"
+
 _other = jobs.alias("other")
 
 #: True for a job of no monitor, and for the next record of a monitor: no other one is being analysed, and
@@ -227,13 +227,8 @@ class Monitors(DatabaseOperations):
     ) -> tuple[tuple[Monitor, ...], tuple[float, str] | None]:
         """Return a page of the monitors of an owner, newest first, and the position of the next page."""
         query = _ROWS.where(monitors.c.owner == owner)
-        if after is not None:
-            query = query.where(tuple_(monitors.c.created, monitors.c.id) < tuple_(*after))
-        query = query.order_by(monitors.c.created.desc(), monitors.c.id.desc()).limit(limit + 1)
-        with self._database.read() as connection:
-            found = [_make_monitor(row) for row in connection.execute(query)]
-        more, found = len(found) > limit, found[:limit]
-        return tuple(found), (found[-1].created, found[-1].id) if more else None
+        rows, position = self._read_page(query, monitors.c.created, monitors.c.id, after, limit)
+        return tuple(map(_make_monitor, rows)), position
 
     def delete(self, owner: str, monitor: str, by: Requester | None = None) -> None:
         """Delete a monitor with its states, and cancel the jobs of its records. Finished jobs are kept.

@@ -182,10 +182,10 @@ def _starting_points(context: SimulationContext, residual: Signal, site: Site) -
     points = []
     # The response spreads a weak sweep over time, so that it may be more distinct without it.
     responses = [None] if response is None else [response, None]
-    for found in dict.fromkeys(find_sweep(residual, each, MIN_CHANGE) for each in responses):
-        if found is not None:
-            cosine, sine = _fit_amplitudes(found, residual, response)
-            frequency, rate = found.frequency / context.dt, found.rate / context.dt**2
+    for line in dict.fromkeys(find_sweep(residual, spread, MIN_CHANGE) for spread in responses):
+        if line is not None:
+            cosine, sine = _fit_amplitudes(line, residual, response)
+            frequency, rate = line.frequency / context.dt, line.rate / context.dt**2
             points.append((cosine * unit, sine * unit, frequency, rate))
     return tuple(points)
 

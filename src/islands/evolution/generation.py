@@ -156,7 +156,7 @@ def _evaluate_generation(
     pruned = rng.draw(len(individuals.lengths)) < settings.prune
     if copied is not None:
         copies = set(map(bytes, copied.genes))
-        pruned &= [bytes(each) not in copies for each in individuals.genes]
+        pruned &= [bytes(genes) not in copies for genes in individuals.genes]
     threshold = _abandon_threshold(island, settings)
     thresholds = _thresholds_by_size(island.hall_of_fame, threshold, settings.max_terms)
     population, _ = evaluator.evaluate_genes(individuals, pruned, thresholds)
@@ -170,7 +170,7 @@ def _evaluate_generation(
         island.generation,
         len(population),
         len(population) - int((~np.isin(population.places[first], parents.places)).sum()),
-        dict(Counter(each.verdict.name.lower() for each in population.outcomes)),
+        dict(Counter(outcome.verdict.name.lower() for outcome in population.outcomes)),
         {size: entry.fitness for size, entry in hall.best().items()},
     )
     return replace(

@@ -211,14 +211,14 @@ class LatentEvolution:
             estimated = list(threads.map(self._estimate, drafts))
         population = tuple(each for each in estimated if not isinstance(each, EvaluationOutcome))
         hall = with_entries(island.hall_of_fame, population)
-        known = {each.key for each in island.elite}
+        known = {individual.key for individual in island.elite}
         outcomes = Counter(
             each.verdict.name.lower() if isinstance(each, EvaluationOutcome) else "ok" for each in estimated
         )
         info = StepInfo(
             island.generation,
             len(estimated),
-            len(population) - len({each.key for each in population} - known),
+            len(population) - len({individual.key for individual in population} - known),
             dict(outcomes),
             {size: entry.fitness for size, entry in hall.best().items()},
         )

@@ -87,8 +87,8 @@ def closed_form(spec: SimulationSpec | LocalSpec) -> Model:
     if (spec.hold, spec.times) != ("first-order", 1):
         raise _refuse("a simulation with several steps per sample")
     # A map replaces the input inside the maps before it, so that the last one is applied first.
-    before = [each for each in reversed(spec.effects) if each.name in _INPUT_MAPS]
-    for effect in (*before, *(each for each in spec.effects if each.name not in _INPUT_MAPS)):
+    before = [effect for effect in reversed(spec.effects) if effect.name in _INPUT_MAPS]
+    for effect in (*before, *(effect for effect in spec.effects if effect.name not in _INPUT_MAPS)):
         model = _apply_effect(model, effect, spec.scales)
     return replace(model, output_name=spec.output, dt=spec.scales.dt)
 

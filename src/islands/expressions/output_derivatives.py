@@ -97,7 +97,7 @@ def _differentiate(expression: Expression) -> list[OutputDerivative] | None:
             return [OutputDerivative(lag, 1.0, ())]
         case Apply(_, arguments):
             inner = [_differentiate(argument) for argument in arguments]
-            found = []
+            products = []
             for place, derivatives in enumerate(inner):
                 if derivatives is None:
                     return None
@@ -105,12 +105,12 @@ def _differentiate(expression: Expression) -> list[OutputDerivative] | None:
                 outer = _differentiate_primitive(expression, place) if derivatives else ()
                 if outer is None:
                     return None
-                found += [
+                products += [
                     OutputDerivative(lag, weight * number, (*factors, *rest))
                     for weight, factors in outer
                     for lag, number, rest in derivatives
                 ]
-            return found
+            return products
     return []
 
 

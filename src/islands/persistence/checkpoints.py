@@ -327,8 +327,8 @@ def _read_state_space(document: Mapping[str, Any]) -> FittedStateSpace:
         int(document["inputs"]),
         tuple(map(str, document["units"])),
         tuple(map(float, document["theta"])),
-        tuple(each == "1" for each in document["free"]),
-        tuple(tuple(map(float, each)) for each in document["states"]),
+        tuple(flag == "1" for flag in document["free"]),
+        tuple(tuple(map(float, state)) for state in document["states"]),
         float(document["fitness"]),
         float(document["mean_square"]),
     )

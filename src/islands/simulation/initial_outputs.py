@@ -128,10 +128,10 @@ def _estimate(model: Model, record: Dataset, first: int, least_share: float) -> 
         changes: NDArray[np.float64] = np.zeros((segments, depth))
         for iteration in range(_ITERATIONS):
             started = change_initial_outputs(at_rate, changes, first)
-            found = _linearise(model, started, at_rate.y, changes, first, step)
-            if found is None:
+            solution = _linearise(model, started, at_rate.y, changes, first, step)
+            if solution is None:
                 return record
-            solved, noise, share = found
+            solved, noise, share = solution
             if iteration == 0:
                 noise = min(noise, _bound_noise(at_rate))
                 if not share * noise**2 > least_share:
@@ -143,7 +143,7 @@ def _estimate(model: Model, record: Dataset, first: int, least_share: float) -> 
             if moved <= _NEGLIGIBLE * noise:
                 break
         started = change_initial_outputs(at_rate, changes, first)
-        before, after = (_window_error(model, each, at_rate, first) for each in (at_rate, started))
+        before, after = (_window_error(model, begun, at_rate, first) for begun in (at_rate, started))
         return started if after < before else record
 
 
@@ -192,8 +192,8 @@ def _perturb(record: Dataset, depth: int, first: int, step: float) -> Dataset:
     """Return copies of a record: unchanged, and with one initial output of every segment changed."""
     segments = count_segments(record, first)
     steps = step * np.eye(depth)
-    copies = [change_initial_outputs(record, np.tile(each, (segments, 1)), first) for each in steps]
-    return join((replace(record, recordings=()), *(replace(each, recordings=()) for each in copies)))
+    copies = [change_initial_outputs(record, np.tile(change, (segments, 1)), first) for change in steps]
+    return join((replace(record, recordings=()), *(replace(copy, recordings=()) for copy in copies)))
 
 
 def _linearise(

@@ -82,13 +82,13 @@ def find_intervals(
     """
     step = interval or record.samples
     starts = [np.arange(begin + warm_up, end, step) for begin, end in record.bounds]
-    if not any(each.size for each in starts):
+    if not any(own.size for own in starts):
         longest = max(record.segments)
         raise RecordError(
             f"the longest recording has {longest} samples and the warm-up takes {warm_up}: "
             "take a longer recording, smaller lags or a shorter warm-up"
         )
-    ends = [np.full(each.size, end) for each, (_, end) in zip(starts, record.bounds, strict=True)]
+    ends = [np.full(own.size, end) for own, (_, end) in zip(starts, record.bounds, strict=True)]
     start = np.concatenate(starts)
     return start, np.minimum(step, np.concatenate(ends) - start)
 

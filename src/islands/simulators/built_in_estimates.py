@@ -117,11 +117,11 @@ def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, f
         for damping in DAMPING_RATIOS
     ]
     starts.sort(key=lambda point: float(np.sum(compute_residual(point) ** 2)))
-    found = [
+    fits = [
         scipy.optimize.least_squares(compute_residual, start, method="lm", max_nfev=200)
         for start in starts[:REFINED_STARTS]
     ]
-    best = min(found, key=lambda each: float(each.cost)).x
+    best = min(fits, key=lambda fit: float(fit.cost)).x
     _, weights = solve_linear(best)
     mass, damping, stiffness = _make_parameters(best, given, FASTEST / dt)
     if not scale_known:
@@ -129,7 +129,7 @@ def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, f
             raise RecordError(
                 "the input does not affect the output, so m, c and k cannot be estimated: give them"
             )
-        mass, damping, stiffness = (each / weights[0] for each in (1.0, damping / mass, stiffness / mass))
+        mass, damping, stiffness = (ratio / weights[0] for ratio in (1.0, damping / mass, stiffness / mass))
     return SecondOrder(mass, damping, stiffness, float(weights[1]), float(weights[2]))
 
 

@@ -146,10 +146,15 @@ class ExtendedSimulator:
         ]
         for name, value in (
             ("parameters", tuple(parameters)),
-            ("bounds", tuple(np.reshape([(each.lower, each.upper) for each in parameters], (-1, 2)).T)),
+            (
+                "bounds",
+                tuple(
+                    np.reshape([(parameter.lower, parameter.upper) for parameter in parameters], (-1, 2)).T
+                ),
+            ),
             ("recordings", np.array(recordings, dtype=np.int64)),
             ("parts", tuple(parts)),
-            ("_places", tuple(np.array(each, dtype=np.int64) for each in places)),
+            ("_places", tuple(np.array(part, dtype=np.int64) for part in places)),
             ("_slices", tuple(slices)),
             ("_by_site", _group_by_site(self.effects, slices[1:])),
             ("_before_output", np.array(before_output, dtype=bool)),

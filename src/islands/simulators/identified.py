@@ -41,7 +41,8 @@ _MAX_MULTIPLIED = 4
 #: Largest number of regressors that are delayed by a sample.
 _MAX_DELAYED = 8
 
-#: Typical change of a coefficient, relative to the coefficient of the regressor that the term contains.
+#: Typical change of a parameter, relative to its value; of a coefficient of a missing term, relative to the
+#: coefficient of the regressor that the term contains.
 _SCALE = 0.01
 
 #: Step of a finite difference, relative to the typical change.

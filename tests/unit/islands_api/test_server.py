@@ -1,4 +1,4 @@
-"""Listening socket: no delay of small responses, clear errors."""
+"""Web server: small responses without delay, clear errors, and limits of a request."""
 
 import asyncio
 import json

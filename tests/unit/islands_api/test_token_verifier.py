@@ -1,4 +1,4 @@
-"""Keys of the issuer: cache, rotation, outage and the rate of requests, with a clock of the test."""
+"""Bearer tokens and the keys of their issuer: checks of claims, cache, rotation and outage."""
 
 import asyncio
 import hashlib

@@ -1,4 +1,4 @@
-"""Addresses: the public ones, in every notation, and the resolution of names."""
+"""Outbound requests: addresses in every notation, resolution of names, and checked connections."""
 
 import asyncio
 import ssl

@@ -1,4 +1,4 @@
-"""Endpoint of the metrics of a coordinator."""
+"""Metrics of the processes and their endpoint, and traces."""
 
 import socket
 from http.server import BaseHTTPRequestHandler, HTTPServer

@@ -112,10 +112,10 @@ class Formula:
             for parameter, value in zip(parameters, values, strict=False)  # copies of initial states follow
             if not parameter.initial
         ]
-        symbols = self.symbols or tuple(each.name for each, _ in given)
+        symbols = self.symbols or tuple(parameter.name for parameter, _ in given)
         return tuple(
-            FormulaQuantity(symbol, value, each.unit, each.name)
-            for symbol, (each, value) in zip(symbols, given, strict=True)
+            FormulaQuantity(symbol, value, parameter.unit, parameter.name)
+            for symbol, (parameter, value) in zip(symbols, given, strict=True)
         )
 
 

@@ -265,7 +265,7 @@ def matlab_system_source(block: Block) -> str:
     """
     block.check_names()
     outputs, inputs = block.signals[: block.computed], block.signals[block.computed :]
-    used = [textwrap.indent(matlab_definition(each), "    ") for each in block.primitives]
+    used = [textwrap.indent(matlab_definition(primitive), "    ") for primitive in block.primitives]
     equations = []
     for place in block.order:
         equations += [
@@ -293,7 +293,7 @@ def matlab_system_source(block: Block) -> str:
         conversions="\n      ".join(f"{name} = double({name});" for name in read) or "% no present input",
         equations="\n      ".join(equations),
         ignored=", ".join("~" for _ in inputs),
-        direct=", ".join(str(each).lower() for each in block.feedthrough),
+        direct=", ".join(str(flag).lower() for flag in block.feedthrough),
         dt=block.dt,
         functions=_FUNCTIONS.format(definitions="\n".join(used)) if used else "",
     )

@@ -176,10 +176,10 @@ def choose_variables(
         chosen_output,
         tuple(_find(name, "input", inputs, channel) for channel in channels),
         tuple(
-            _make_parameter(name, _find(name, "parameter", known, each), choice)
-            for each, choice in parameters.items()
+            _make_parameter(name, _find(name, "parameter", known, parameter), choice)
+            for parameter, choice in parameters.items()
         ),
-        tuple(_find(name, "initial value", possible, each) for each in initial),
+        tuple(_find(name, "initial value", possible, start) for start in initial),
         steps,
     )
 

@@ -226,7 +226,7 @@ def make_fmu_simulator(
         source=source,
     )
     context = make_nominal_context(record)
-    values = [each.variable.name for each in model.initial if each.place < 0]
+    values = [start.variable.name for start in model.initial if start.place < 0]
     expressions: list[Expression] = [system.output, *map(Symbol, states)]
     expressions += [right for _, right in system.derivatives]
     expressions += [Apply(FMU, (Symbol(name),)) for name in (*system.of_fmu, *values)]
@@ -238,7 +238,7 @@ def make_fmu_simulator(
     sizes = {name: peak_amplitude(signal) for name, signal in simulated.items()}
     peaks = {"input": peak_amplitude(context.u), "output": peak_amplitude(output)}
     pairs = zip(initial, model.initial, strict=True)
-    sizes |= {name: peaks[each.sample_of] for name, each in pairs if each.sample_of}
+    sizes |= {name: peaks[start.sample_of] for name, start in pairs if start.sample_of}
     definitions = tuple(name for name in states if _is_definition(name, states, simulated))
     return replace(rough, system=replace(rough.system, definitions=definitions), sizes=sizes)
 

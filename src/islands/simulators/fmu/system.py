@@ -51,7 +51,7 @@ def make_fmu_system(
     parsed = parse_equations(equations)
     for equation in parsed:
         _check_target(equation, system)
-    given = {each.target: each.expression for each in parsed}
+    given = {equation.target: equation.expression for equation in parsed}
     states = {name for name, _ in system.derivatives}
     system = replace(
         system,
@@ -62,8 +62,8 @@ def make_fmu_system(
         force=force or system.force,
     )
     _check_names(system, parsed, coefficients)
-    for each in parsed:
-        check_symbols(each.expression, system, each.place)
+    for equation in parsed:
+        check_symbols(equation.expression, system, equation.place)
     for name in (system.force.coordinate, system.force.rate) if force and system.force else ():
         check_symbols(Symbol(name), system, "[force]")
     sort_variables(system)

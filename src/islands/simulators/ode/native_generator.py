@@ -203,8 +203,8 @@ class NativeGenerator:
         count = len(program.slopes)
         starts = [self._row.load(self._arena, self._lanes * (program.states + i)) for i in range(count)]
         limits = [
-            [self._row.load(each, self._lanes * i) for i in range(count)] if used else []
-            for each, used in (
+            [self._row.load(limit, self._lanes * i) for i in range(count)] if used else []
+            for limit, used in (
                 (self._lower, program.receivers is not None),
                 (self._upper, program.receivers is not None),
                 (self._caught, program.is_spilling),
@@ -216,7 +216,7 @@ class NativeGenerator:
         build.position_at_end(loop)
         sample = build.phi(_INTEGER, name="sample")
         sample.add_incoming(_INTEGER(0), entry)
-        carried = [build.phi(each.type) for each in starts]
+        carried = [build.phi(start.type) for start in starts]
         for phi, start in zip(carried, starts, strict=True):
             phi.add_incoming(start, entry)
         before = [*self._restart(carried[: program.restarted], sample), *carried[program.restarted :]]

@@ -239,21 +239,21 @@ class _Generator:
             # Variables that no derivative and no output reads get no instruction.
             self._named[name] = self._make(variables[name])
         slopes = [self._make(right) for _, right in system.derivatives]
-        found = [self._make(output) for output in outputs]
+        read = [self._make(output) for output in outputs]
         # The states of the laws need their derivatives even if no equation reads the forces.
         derived = [*slopes, *([self._force()] if laws else [])]
         leaves = self._place_leaves()
         first_state = leaves - len(system.derivatives)
         own_slopes = leaves + laws
         self._rows = own_slopes + laws
-        for node in (*derived, *found):
+        for node in (*derived, *read):
             self._count(node)
         for node in derived:
             self._emit(node, outputs_only=False)
-        for node in found:
+        for node in read:
             self._emit(node, outputs_only=True)
         slope_rows = [self._slope_row(index, node, first_state) for index, node in enumerate(slopes)]
-        code = [each for section in self._sections for each in section]
+        code = [instruction for section in self._sections for instruction in section]
         if len(code) > MAX_INSTRUCTIONS:
             raise ModelError(f"the equations have {len(code)} operations, and {MAX_INSTRUCTIONS} is the most")
         instructions = Instructions(
@@ -262,13 +262,13 @@ class _Generator:
             np.arange(first_state - len(self.signals), first_state),
             first_state,
             np.array([*slope_rows, *range(own_slopes, own_slopes + laws)], dtype=np.int64),
-            np.array([self.nodes[node].row for node in found], dtype=np.int64),
+            np.array([self.nodes[node].row for node in read], dtype=np.int64),
             self._rows,
         )
         return OdeProgram(
             instructions,
             np.array(self.constants),
-            tuple(each.name for each in system.parameters),
+            tuple(parameter.name for parameter in system.parameters),
             tuple(self.signals),
             tuple(name for name, _ in system.derivatives),
         )

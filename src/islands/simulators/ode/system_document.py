@@ -52,7 +52,7 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
     """
     equations = parse_equations(document["equations"])
     declared = document.get("states", {})
-    names = [each.target for each in equations if each.is_derivative]
+    names = [equation.target for equation in equations if equation.is_derivative]
     for name in declared:
         if name not in names:
             raise ModelError(
@@ -65,8 +65,12 @@ def make_system(document: Mapping[str, Any]) -> OdeSystem:
         summary=document.get("summary", ""),
         input=document["input"],
         channels=tuple(document.get("channels", ())),
-        derivatives=tuple((each.target, each.expression) for each in equations if each.is_derivative),
-        variables=tuple((each.target, each.expression) for each in equations if not each.is_derivative),
+        derivatives=tuple(
+            (equation.target, equation.expression) for equation in equations if equation.is_derivative
+        ),
+        variables=tuple(
+            (equation.target, equation.expression) for equation in equations if not equation.is_derivative
+        ),
         output=parse_expression(document["output"], f"output, {document['output']!r}"),
         parameters=parameters,
         states=tuple(_make_state(name, declared.get(name, {})) for name in names),

@@ -1,4 +1,4 @@
-"""Topologies: definitions, random graphs, lists of edges, invalid texts."""
+"""Migration: definitions of topologies, lists of edges, and schedules."""
 
 from itertools import chain, takewhile
 

@@ -1,4 +1,4 @@
-"""Rate limits: each client has a separate token bucket."""
+"""Limits of requests: rates, counts, fair turns, uploads and threads."""
 
 import asyncio
 import threading

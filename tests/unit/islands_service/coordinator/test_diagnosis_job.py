@@ -1,4 +1,4 @@
-"""`DiagnosisProgress`: fraction and time left of a diagnosis, and the times of its checkpoints."""
+"""Discrepancy jobs: fraction and time left, times of the checkpoints, result and report."""
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby

@@ -1,4 +1,4 @@
-"""`JobNotes`: the owner of a job sees why no epoch is computed."""
+"""Runner of a job: its owner sees why no epoch is computed, and a turn ends at a checkpoint."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Formulas of effects: what readers see is what the simulation computes."""
+"""Formulas and map equations of effects: readers and programs get what the simulation computes."""
 
 from collections.abc import Callable
 
