@@ -10,7 +10,7 @@ INSTALL := $(PYTHON) deploy/packages/install.py .venv $(INSTALL_OPTIONS)
 # The first target, so that `make` alone prints it.
 help:
 	@echo 'make demo     set up, identify a record, show the result: 30 s on a fresh machine with two cores'
-	@echo 'make test     the tests: 180 s'
+	@echo 'make test     the tests: 130 s'
 	@echo 'make setup    the environment .venv with what runs: Ray and the service'
 	@echo 'make lint     format, types, imports     make docs   the site     make bench   speed on this machine'
 	@echo 'CONTRIBUTING.md describes the others.'
