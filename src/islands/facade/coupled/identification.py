@@ -418,8 +418,7 @@ def _couple(
     options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
     results = _search_outputs(names, splits, options, steps, find)
     steps.report("choice of the equations", 0.0)
-    means = partial(average_samples, count=options["average"])
-    data = CoupledSplit(data.estimation.map(means), data.validation.map(means))
+    data = data.map(partial(average_samples, count=options["average"]))
     warm_up = max(entry.warm_up for result in results for entry in result.models)
     ranked = [[require_narx(entry.model) for entry in result.models] for result in results]
     best = [result.recommendation.rank for result in results]

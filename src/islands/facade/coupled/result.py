@@ -37,6 +37,7 @@ from islands.records.split import measure_input_ranges
 from islands.report.documents.result_folder import (
     finite,
     list_failures,
+    measure_left_out,
     record_document,
     residual_structure_document,
     terms_in_result,
@@ -365,6 +366,10 @@ class CoupledResult(FittedCoupledModel):
             steps.attempt(f"residual tests of {name}", partial(self._measure_residual, place))
             for place, name in enumerate(names)
         ]
+        left_out = [
+            steps.attempt(f"gross errors of {name}", partial(self._measure_left_out, place))
+            for place, name in enumerate(names)
+        ]
         not_computed = {**self.not_computed, **steps.not_computed}
         document = {
             "schema": COUPLED_RESULT_SCHEMA,
@@ -389,6 +394,7 @@ class CoupledResult(FittedCoupledModel):
                     "data": {
                         "noise": measure_output_noise(self.split.estimation.records[place]),
                         "output_range": self.split.validation.records[place].output_range,
+                        "left_out": left_out[place],
                     },
                     "residual": residual_structure_document(residuals[place] or missing_structure()),
                     "metrics": {
@@ -417,6 +423,11 @@ class CoupledResult(FittedCoupledModel):
         if bands is not None and self._shared_ensemble is None:
             described["ensemble"] = ensemble_document(bands.ensemble)
         return described
+
+    def _measure_left_out(self, place: int) -> dict[str, Any] | None:
+        """Return the errors of an output over the whole record, without and with its gross errors."""
+        record = self.split.record
+        return measure_left_out(record.records[place], lambda: self.simulate(record).y[:, place])
 
     def _measure_residual(self, place: int) -> ResidualStructure:
         """Measure the residuals of an output on the longest recording of the validation data."""

@@ -20,7 +20,7 @@ from islands.effects.catalogue import find_entry, get_title
 from islands.report.documents.contradictions import list_contradictions
 from islands.report.documents.experiment_json import describe_next_experiment, write_advice
 from islands.report.documents.extended_equations import write_extended_equations
-from islands.report.documents.result_folder import list_failures, record_document
+from islands.report.documents.result_folder import list_failures, measure_left_out, record_document
 
 #: Plain name of a missing term.
 TERM_TITLE = "missing term"
@@ -48,6 +48,7 @@ def diagnosis_document(
     return {
         "schema": SCHEMA,
         "record": record_document(diagnosis.record),
+        "data": {"left_out": measure_left_out(diagnosis.record, lambda: diagnosis.best.output)},
         "simulation": diagnosis.base.simulation.simulator.name,
         "verdict": str(diagnosis.verdict),
         "discovered": None if diagnosis.discovery is None else asdict(diagnosis.discovery),

@@ -92,5 +92,6 @@ def describe_coupled(document: Document) -> list[str]:
         *write("coupled.txt", "equations", f=facts),
         f"    {'; '.join(document['equation'].splitlines())}",
         f"Good for: {'; '.join(uses) or 'no use that the checks confirm'}.",
+        *(text for each in facts.outputs for text in write("coupled.txt", "left_out", output=each)),
         *describe_not_computed(document),
     ]
