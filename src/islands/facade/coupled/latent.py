@@ -47,6 +47,7 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], steps: St
         data,
         steps.left_out,
         steps.not_computed,
+        refusal=steps.refusal,
     )
 
 

@@ -274,6 +274,8 @@ class CoupledResult(FittedCoupledModel):
         Optional steps that failed, each with the reason.
     wall_s : float or None
         Duration of all searches in seconds; None if they were not timed.
+    refusal : str
+        Why the optional facts of the document are not computed; empty if they are.
     """
 
     results: tuple[Result, ...]
@@ -283,6 +285,7 @@ class CoupledResult(FittedCoupledModel):
     left_out: tuple[str, ...] = ()
     not_computed: Mapping[str, str] = field(default_factory=dict)
     wall_s: float | None = None
+    refusal: str = ""
 
     def with_wall_time(self, seconds: float) -> "CoupledResult":
         """Return a copy of the result with the duration of all searches in seconds."""
@@ -362,6 +365,7 @@ class CoupledResult(FittedCoupledModel):
     def document(self) -> dict[str, Any]:
         """Return the content of ``result.json`` as JSON values."""
         metrics, names, steps = self.metrics, self.model.output_names, Steps()
+        steps.refusal = self.refusal
         residuals = [
             steps.attempt(f"residual tests of {name}", partial(self._measure_residual, place))
             for place, name in enumerate(names)
