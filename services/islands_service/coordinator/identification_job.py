@@ -262,7 +262,7 @@ def _identify(
             constraints=spec.changes.get("constraints"),
             progress=reporter.report_stage,
             stop=stop,
-            on_models=reporter.run.keep_answer,
+            on_models=reporter.keep_answer,
         )
         return fitted.with_wall_time(reporter.spent).search_result
     preset: str | Choice = spec.preset
@@ -295,7 +295,7 @@ def _list_arguments(
         "stop": stop,
         "start": start.state,
         "engine": engine,
-        "on_models": reporter.run.keep_answer,
+        "on_models": reporter.keep_answer,
         **spec.changes,
     }
 
@@ -347,7 +347,8 @@ class ProgressReporter:
         self._outputs, self._seed, self._front = len(spec.outputs), spec.seed, front
         self._free_run = StoredFreeRun(run.job, run.blobs)
         self._phases = _make_progress(self._keep_stage, spec, samples)
-        self.run, self._checkpoints, self._stop = run, checkpoints, stop
+        self._run, self._checkpoints, self._stop = run, checkpoints, stop
+        self.keep_answer = run.keep_answer
         self._started_at = monotonic() - start.spent
         state = start.state and sum_searches(start.state)
         #: Number of the search of an output, and time and evaluations after its first epoch in this process.
@@ -382,11 +383,11 @@ class ProgressReporter:
         self._phases(message, fraction)
         reached = self._progress(*self._last) if self._last else self._reached_before()
         try:
-            self.run.store.leases.report(self.run.lease, self._make_report(reached))
+            self._run.store.leases.report(self._run.lease, self._make_report(reached))
             self._free_run.confirm()
         except StoreError as error:
             # Continue the search. The next report has the progress.
-            self._outage.fail(error, job=self.run.job.id)
+            self._outage.fail(error, job=self._run.job.id)
 
     def _keep_stage(self, message: str, fraction: float | None = None, /) -> None:
         """Keep the phase, the completed fraction of the job and the time left for the next report."""
@@ -405,12 +406,12 @@ class ProgressReporter:
     def _make_report(self, reached: dict[str, Any]) -> ProgressReport:
         """Return the report of a progress, with the free run of the best model."""
         artefacts = self._free_run.write(self._front.free_run)
-        progress = self.run.notes.complete({**reached, **self._stage, **self._free_run.describe()})
+        progress = self._run.notes.complete({**reached, **self._stage, **self._free_run.describe()})
         return ProgressReport(progress, artefacts=artefacts)
 
     def _reached_before(self) -> dict[str, Any]:
         """Return the progress of earlier attempts, without their note."""
-        before = {} if self._note else {**(self.run.job.progress or {})}
+        before = {} if self._note else {**(self._run.job.progress or {})}
         before.pop("note", None)
         return {**before, **self._note}
 
@@ -419,7 +420,7 @@ class ProgressReporter:
         self._stage |= {"phase": STORING, "seconds_left": None}
         while self._last is not None and (error := self._report(*self._last, False)) is not None:
             self._stop()
-            self.run.pause(error)
+            self._run.pause(error)
 
     def _report(
         self, state: SearchState, settings: Settings, searching: bool = True
@@ -436,22 +437,22 @@ class ProgressReporter:
             if started >= self._checkpoint_at:
                 blob = self._checkpoints.write(state, self.spent, self.choice)
                 report = replace(report, checkpoint=blob)
-            self.run.store.leases.report(self.run.lease, report)
+            self._run.store.leases.report(self._run.lease, report)
         except (StoreError, ClusterError) as error:
             # Continue the search. The next report contains the same points.
-            self._outage.fail(error, job=self.run.job.id)
+            self._outage.fail(error, job=self._run.job.id)
             if report.checkpoint is not None:
                 self._checkpoints.remember(report.checkpoint)
             self._schedule(started)
             return error
-        self._outage.succeed(job=self.run.job.id)
+        self._outage.succeed(job=self._run.job.id)
         self._free_run.confirm()
         self._stored_points = len(summed.history) - 1
         self._schedule(started)
         if report.checkpoint is not None:
             self._checkpoints.supersede(report.checkpoint)
             if searching:
-                self.run.let_others_pass()
+                self._run.let_others_pass()
         return None
 
     def _schedule(self, started: float) -> None:
@@ -460,7 +461,7 @@ class ProgressReporter:
         self._report_at = now + REPORT_EVERY
         if started >= self._checkpoint_at:
             # Also after a failure: a checkpoint of thousands of islands takes long, and may fail at its end.
-            self._checkpoint_at = now + max(self.run.checkpoint_every, (now - started) / CHECKPOINT_SHARE)
+            self._checkpoint_at = now + max(self._run.checkpoint_every, (now - started) / CHECKPOINT_SHARE)
 
     def _keep_search(self, state: SearchState, settings: Settings, rate: float) -> None:
         """Keep the completed fraction, and the time left by the speed of the search."""
