@@ -1,31 +1,36 @@
 """Load of a service: durable job submissions, requests of jobs, event streams.
 
-    python -m lab.service.load [store claim accept get events] [--repeat 5] [--json FILE]
+    python -m lab.service.load [store claim accept get events owners] [--repeat 5] [--json FILE]
 
 Results are printed, not asserted; the targets are those of the service's design. The server is `islands
-serve` with SQLite and without a coordinator; the clients are this process with persistent connections: httpx
-for the latency of a single client, and a cheaper one for many, so that the server dominates.
+serve` with SQLite, without a coordinator but for ``owners``. The clients are this process with persistent
+connections: httpx for the latency of a single client, and a cheaper one for many, so that the server
+dominates.
 """
 
 import asyncio
 import json
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import insert
 
-from islands_service.domain.job import ProgressReport, Submission
+from islands.records.reading.preview import preview
+from islands_service.domain.job import Job, ProgressReport, Submission
+from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.blobs import Blobs
 from islands_service.store.tables import jobs
 from lab.service.table import Figure, percentile, run
+from support.command_line import write_hysteresis
+from support.processes import eventually
 from support.service_client import SPEC
 from support.service_processes import Service, serving
 
@@ -58,6 +63,12 @@ EVENT_INTERVAL = 0.7
 
 #: Without a coordinator, jobs stay in the queue.
 ENVIRONMENT = {"ISLANDS_COORDINATORS": "0"}
+
+#: Owners with small jobs, small jobs of each, and long jobs of each of two other owners.
+OWNERS, SMALL, LONG = 20, 10, 5
+
+#: Two coordinators, which run short searches themselves, as by default.
+SHARED = {"ISLANDS_COORDINATORS": "2", "ISLANDS_SHORT_SEARCH": "5", "ISLANDS_CHECKPOINT_EVERY": "5"}
 
 
 @contextmanager
@@ -235,7 +246,7 @@ def get(repeat: int) -> Iterator[Figure]:
         job = service.submit(5)
         for _ in range(repeat):
             alone.append(1e3 * percentile(_get_alone(service, job), 0.5))
-            at, p99 = _by_wrk(service, job) if shutil.which("wrk") else asyncio.run(_looked(service, job))
+            at, p99 = asyncio.run(_looked(service, job))
             rate.append(at)
             slow.append(p99)
     yield Figure("GET job, 1 client: p50", "ms", 3.0, tuple(alone))
@@ -252,21 +263,6 @@ def _get_alone(service: Service, job: str) -> list[float]:
         taken.append(time.perf_counter() - began)
         assert answer.status_code == 200, answer.text
     return taken
-
-
-def _by_wrk(service: Service, job: str) -> tuple[float, float]:
-    """Measure with wrk, which uses almost no processor time."""
-    command = ["wrk", "-t1", f"-c{CONNECTIONS}", f"-d{LOOKING:.0f}s", "--latency"]
-    said = subprocess.run(
-        [*command, f"{service.url}/v1/jobs/{job}"], capture_output=True, text=True, check=True
-    ).stdout
-    words = said.split()
-    p99 = words[words.index("99%") + 1]
-    scale = (
-        1e3 if p99.endswith("s") and not p99.endswith(("ms", "us")) else 1e-3 if p99.endswith("us") else 1.0
-    )
-    assert "Non-2xx" not in said, said
-    return float(words[words.index("Requests/sec:") + 1]), scale * float(p99.rstrip("mus"))
 
 
 async def _looked(service: Service, job: str) -> tuple[float, float]:
@@ -352,7 +348,43 @@ def _progress(number: int) -> dict[str, Any]:
     return {"phase": "search", "generation": number, "best_by_size": dict.fromkeys(map(str, range(10)), 0.1)}
 
 
-MEASURES = {"store": store, "claim": claim, "accept": accept, "get": get, "events": events}
+def owners(repeat: int) -> Iterator[Figure]:
+    """Measure how long the first small job of each owner waits behind long jobs of two others."""
+    found: list[list[float]] = []
+    for _ in range(repeat):
+        with (
+            tempfile.TemporaryDirectory(prefix="islands-load-") as folder,
+            serving(Path(folder) / "data", environment=SHARED) as service,
+            Store(f"sqlite:///{service.folder / 'islands.db'}") as opened,
+        ):
+            found.append(_share(opened, Blobs(ServiceSettings(data_dir=service.folder).blobs), folder))
+    yield Figure(f"first small jobs of {OWNERS} owners: longest wait", "s", 60.0, tuple(map(max, found)))
+    yield Figure(f"first small jobs of {OWNERS} owners: shortest wait", "s", None, tuple(map(min, found)))
+
+
+def _share(opened: Store, blobs: Blobs, folder: str) -> list[float]:
+    """Return the seconds for which the first small job of each owner waits."""
+    path = write_hysteresis(Path(folder) / "record.csv")
+    data, described = path.read_bytes(), asdict(preview(path))
+    blob = blobs.write(data)
+
+    def submit(owner: str, generations: int, **settings: int) -> Job:
+        dataset, _ = opened.datasets.add(owner, path.name, path.suffix, blob, len(data), described)
+        chosen = {**SPEC["settings"], "islands": 1, "generations": generations, **settings}
+        return opened.jobs.submit(Submission(owner, {**SPEC, "dataset": dataset.id, "settings": chosen}))[0]
+
+    def read(job: Job) -> Job:
+        return opened.jobs.get(job.owner, job.id)
+
+    long = [submit(f"long {place}", 100_000, population=100) for place in (0, 1) for _ in range(LONG)]
+    eventually(lambda: sum(read(job).checkpoint is not None for job in long) == 2, seconds=300.0)
+    names = [f"small {place}" for place in range(OWNERS)]
+    small = [submit(name, 2) for _ in range(SMALL) for name in names]
+    eventually(lambda: all(read(job).started for job in small[:OWNERS]), seconds=600.0)
+    return [job.started - job.created for job in map(read, small[:OWNERS]) if job.started]
+
+
+MEASURES = {"store": store, "claim": claim, "accept": accept, "get": get, "events": events, "owners": owners}
 
 if __name__ == "__main__":
     sys.exit(run(MEASURES, __doc__))  # type: ignore[arg-type]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from islands.errors import IslandsError, check_callables
 from islands.parallel import ParallelMap
@@ -253,6 +253,22 @@ class StoppedError(IslandsError):
         self.step = step
 
 
+class AnswerFoundError(IslandsError):
+    """A computation has its answer, and the caller wants no optional step.
+
+    A callback that receives the answer raises it.
+
+    Attributes
+    ----------
+    found : object
+        The answer, without the optional steps.
+    """
+
+    def __init__(self, found: Any, reason: str) -> None:
+        super().__init__(reason)
+        self.found = found
+
+
 @dataclass(frozen=True, slots=True)
 class Failure:
     """Why an optional step has no value.
@@ -322,6 +338,8 @@ class Steps:
         self._raised: BaseException | None = None
         self._left_out: dict[str, None] = {}
         self._not_computed: dict[str, str] = {}
+        #: Why the optional steps from now on are not computed; empty if they are.
+        self.refusal = ""
 
     def __call__(self, message: str, fraction: float | None = None, /) -> None:
         """Report a step that the result needs.
@@ -365,6 +383,9 @@ class Steps:
         The name of the step is recorded in `left_out` or, with the reason, in `not_computed`.
         """
         if self.skip(step):
+            return None
+        if self.refusal:
+            self._not_computed[step] = self.refusal
             return None
         self._raised = None
         try:

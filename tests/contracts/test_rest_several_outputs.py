@@ -1,5 +1,7 @@
 """Jobs of several outputs: search, resumption, model, figures, report and download over REST."""
 
+from dataclasses import replace
+
 import httpx
 import numpy as np
 import pytest
@@ -45,8 +47,8 @@ def dataset(service, record, tmp_path):
         yield client.upload(path)
 
 
-def run(service, job):
-    blobs, lease = Blobs(service.settings.blobs), taken(service.store, job.id)
+def run(service, job, **changes):
+    blobs, lease = Blobs(service.settings.blobs), replace(taken(service.store, job.id), **changes)
     outcome = run_identification_job(make_run(lease, service.store, blobs))
     service.store.leases.finish(lease, outcome)
     return outcome
@@ -94,6 +96,17 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         "free-run-1.svg",
         "free-run-2.svg",
     ]
+
+
+def test_the_last_attempt_has_the_models_without_the_steps_after_them(service, dataset):
+    with Client(service.url) as client:
+        job = client.submit(dataset, "u", ["y1", "y2"], seed=3, **SETTINGS)
+        outcome = run(service, job, is_last=True)
+        assert client.models(job)[0].kind == "coupled-narx"
+    reasons = {each["step"]: each["reason"] for each in outcome.document["not_computed"]}
+    assert {"refinement of all equations", "prediction bands", "residual tests of y1"} < set(reasons)
+    assert set(reasons.values()) == {"the attempts before the last one ended without a result"}
+    assert not outcome.artefacts
 
 
 def test_a_job_continues_in_the_search_that_was_interrupted(service, dataset, monkeypatch):

@@ -147,7 +147,8 @@ class DiagnosisProgress:
 def run_diagnosis_job(run: JobRun, map_cases: ParallelMap | None = None) -> JobOutcome:
     """Run a discrepancy job from its last checkpoint.
 
-    A job that is cancelled ends with its findings so far, without formula and report.
+    A job that is cancelled ends with its findings so far, without formula and report. So does the last
+    attempt, once the causes are named.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
     simulator = make_simulator(spec.simulation, record, columns, fmus)
     # The process of an FMU serves this one alone.
     fits = state.journal.record(map_cases or (_map_on_ray(run) if spec.fmu is None else map))
-    interim, artefacts = InterimFindings(), dict[str, str]()
+    interim, artefacts = InterimFindings(run.keep_answer), dict[str, str]()
     formula, left_out = None, [FORMULA, REPORT]
 
     def stop() -> bool:
@@ -196,6 +197,7 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         return False
 
     steps = Steps(report, stop)
+    steps.refusal = run.refusal
     try:
         diagnosed = diagnose(
             *(record, simulator, spec.tolerance, spec.seed, report_part(report, 0.0, BEFORE_FORMULA), fits),
@@ -214,6 +216,7 @@ def _run(run: JobRun, spec: Discrepancy, fmus: FmuSource, map_cases: ParallelMap
         origin = Origin.from_seconds(names, run.job.created, run.job.owner, run.job.id)
         made = {REPORT: steps.attempt(REPORT, partial(result.write_report, origin))}
         left_out.remove(REPORT)
+        steps.refusal = ""  # the extended simulation is part of the answer
         made |= _make_artefacts(result, steps)
         for name, data in made.items():
             if data is not None:

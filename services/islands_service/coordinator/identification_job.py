@@ -13,13 +13,7 @@ from typing import Any
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem
 from islands.evolution.presets import AUTO
-from islands.evolution.search_result import (
-    COMPARISON,
-    ResultCallback,
-    SearchResult,
-    ignore_result,
-    without_optional_steps,
-)
+from islands.evolution.search_result import SearchResult, without_optional_steps
 from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
@@ -32,7 +26,7 @@ from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
 from islands.persistence.checkpoints import history_document
 from islands.persistence.models import NARX
-from islands.progress import PhasedProgress, ProgressCallback, Stop, StoppedError, TimeLeft
+from islands.progress import AnswerFoundError, PhasedProgress, ProgressCallback, Stop, StoppedError, TimeLeft
 from islands.records.coupled import couple, split_coupled
 from islands.records.dataset import Dataset
 from islands.records.split import describe_search_extrapolation
@@ -163,8 +157,7 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     """Run an identification job from its last checkpoint.
 
     A job that is cancelled ends between two steps, with the models found so far. If its owner stops the
-    search, the epochs end, and all other steps follow. The last attempt ends with the models of the search,
-    since a step after it may have ended the process in the attempts before.
+    search, the epochs end, and all other steps follow. The last attempt ends with the models of the search.
 
     Raises
     ------
@@ -195,10 +188,10 @@ def run_identification_job(run: JobRun) -> JobOutcome:
             coupled = _identify_outputs(record, validation, spec, start, engine, reporter, stop)
             outcome = _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
             return keep_free_runs(outcome, partial(write_coupled, coupled), run)
-        on_models = _end_last_attempt if run.lease.is_last else ignore_result
-        result = _identify(record, validation, spec, start, engine, reporter, stop, on_models)
-    except ModelsFoundError as reached:
-        result = Result.from_search(reached.found).with_wall_time(reporter.spent).search_result
+        result = _identify(record, validation, spec, start, engine, reporter, stop)
+    except AnswerFoundError as ended:
+        models = without_optional_steps(ended.found, str(ended))
+        result = Result.from_search(models).with_wall_time(reporter.spent).search_result
     except StoppedError as stopped:
         raise stop.reason or stopped from stopped
     outcome = _end_job(partial(make_outcome, result), result.search.left_out, start.note, stop)
@@ -221,23 +214,6 @@ def _end_job(
         "best models so far; the operator can raise the limit"
     )
     return make("; ".join(filter(None, [note, limit])), RUN_TIME)
-
-
-class ModelsFoundError(StoppedError):
-    """The last attempt of a job has found its models, before the optional steps.
-
-    Attributes
-    ----------
-    found : SearchResult
-    """
-
-    def __init__(self, found: SearchResult) -> None:
-        super().__init__(COMPARISON)
-        self.found = without_optional_steps(found, "the attempts before the last one ended without a result")
-
-
-def _end_last_attempt(found: SearchResult) -> None:
-    raise ModelsFoundError(found)
 
 
 class SearchStop:
@@ -275,7 +251,6 @@ def _identify(
     engine: Engine,
     reporter: "ProgressReporter",
     stop: SearchStop,
-    on_models: ResultCallback,
 ) -> SearchResult:
     if spec.model != NARX:
         fitted = fit_record(
@@ -287,7 +262,7 @@ def _identify(
             constraints=spec.changes.get("constraints"),
             progress=reporter.report_stage,
             stop=stop,
-            on_models=on_models,
+            on_models=reporter.keep_answer,
         )
         return fitted.with_wall_time(reporter.spent).search_result
     preset: str | Choice = spec.preset
@@ -303,7 +278,6 @@ def _identify(
         record,
         validation,
         preset=preset,
-        on_models=on_models,
         **_list_arguments(spec, start, engine, reporter, stop),
     )
     reporter.flush()
@@ -321,6 +295,7 @@ def _list_arguments(
         "stop": stop,
         "start": start.state,
         "engine": engine,
+        "on_models": reporter.keep_answer,
         **spec.changes,
     }
 
@@ -373,6 +348,7 @@ class ProgressReporter:
         self._free_run = StoredFreeRun(run.job, run.blobs)
         self._phases = _make_progress(self._keep_stage, spec, samples)
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
+        self.keep_answer = run.keep_answer
         self._started_at = monotonic() - start.spent
         state = start.state and sum_searches(start.state)
         #: Number of the search of an output, and time and evaluations after its first epoch in this process.

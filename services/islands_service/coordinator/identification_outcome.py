@@ -79,12 +79,12 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
 
 
 def keep_free_runs(outcome: JobOutcome, write: Callable[[], dict[str, bytes]], run: JobRun) -> JobOutcome:
-    """Return an outcome with the free run that a client shows first, unless the job was cancelled.
+    """Return an outcome with the free run that a client shows first, if the job and its steps are complete.
 
     Without it, for example because the disk is full, the first request for it makes it in another process.
     It comes after the result, which it must not take away.
     """
-    if outcome.state != JobState.SUCCEEDED:
+    if outcome.state != JobState.SUCCEEDED or run.refusal:
         return outcome
     try:
         return replace(outcome, artefacts={name: run.blobs.write(data) for name, data in write().items()})

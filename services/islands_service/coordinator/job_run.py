@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import structlog
 
 from islands.errors import IslandsError
-from islands.progress import Stop, never_stop
+from islands.progress import AnswerFoundError, Stop, never_stop
 from islands_service.domain.job import Job, Lease, ProgressReport
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -35,6 +35,9 @@ DISK_NOTE = (
 
 #: Seconds between two attempts to write to a store that is unavailable or full.
 RETRY_SECONDS = 0.5
+
+#: Why the result of the last attempt has no optional steps.
+_LAST_ATTEMPT = "the attempts before the last one ended without a result"
 
 
 class JobNotes:
@@ -170,6 +173,25 @@ class JobRun:
     def job(self) -> Job:
         """The job at the time of the claim."""
         return self.lease.job
+
+    @property
+    def refusal(self) -> str:
+        """Why the optional steps are not computed; empty if they are.
+
+        One of them may have ended the process in the attempts before the last one.
+        """
+        return _LAST_ATTEMPT if self.lease.is_last else ""
+
+    def keep_answer(self, found: Any) -> None:
+        """End the last attempt with its answer, before the optional steps.
+
+        Raises
+        ------
+        AnswerFoundError
+            This is the last attempt.
+        """
+        if self.refusal:
+            raise AnswerFoundError(found, self.refusal)
 
     def get_dataset(self, identity: str) -> StoredDataset:
         """Return a data set or the FMU of the job, which may have been deleted since its submission."""

@@ -1,6 +1,6 @@
 """Findings of a diagnosis while it runs, from which a stopped one makes its result."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,9 +47,15 @@ class InterimFindings:
 
     `diagnose` keeps them. If an exception ends it, such as `KeyboardInterrupt`, the caller gets the result so
     far from `make_diagnosis`.
+
+    Parameters
+    ----------
+    on_found : callable
+        Called with the named causes, before the last step.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, on_found: Callable[[Diagnosis], object] = lambda _found: None) -> None:
+        self._on_found = on_found
         self._begun: (
             tuple[Dataset, CalibrationResult, Target, Sequence[RecordFinding], float | None] | None
         ) = None
@@ -108,6 +114,7 @@ class InterimFindings:
     def keep_diagnosis(self, found: Diagnosis) -> Diagnosis:
         """Keep the diagnosis without the last step, and return it."""
         self._found, self._step = found, EXTENSION
+        self._on_found(found)
         return found
 
     def complete(self, found: Diagnosis) -> Diagnosis:

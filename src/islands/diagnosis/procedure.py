@@ -64,7 +64,7 @@ from islands.effects.catalogue import EFFECTS
 from islands.effects.interface.effect import Effect
 from islands.errors import IslandsError, RecordError
 from islands.parallel import ParallelMap
-from islands.progress import Phase, PhasedProgress, ProgressCallback, ignore_progress
+from islands.progress import AnswerFoundError, Phase, PhasedProgress, ProgressCallback, ignore_progress
 from islands.records.dataset import Dataset
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.interface import Simulator
@@ -183,6 +183,8 @@ def diagnose(
     try:
         found = _find_causes(record, base, target, run.with_effects(effects), forms, interim, seed)
         found = complete_findings(found, held or found.best, target, record_findings, noise_level, run.rng)
+    except AnswerFoundError as ended:
+        found = interim.fail(ended, seed) or ended.found
     except (IslandsError, OSError, MemoryError):
         raise  # of the caller, or of the machine: the diagnosis may succeed if it is repeated
     except Exception as error:

@@ -45,10 +45,6 @@ LARGEST_MEMORY = 100
 #: that of the states, and the rows before and after the first held-out one, at most.
 _DISTURBED, _DISTURBANCE, _FORGETTING, _DISTURBED_ROWS = 2, 1.5, 1_500, 500
 
-#: Factor of the inputs of free runs that have to remain bounded. Units that are powers may diverge just
-#: outside of the range of the estimation data.
-_LARGER_INPUTS = 1.2
-
 #: Seed of the disturbances: all models are compared with the same ones.
 _SEED = 5
 
@@ -271,8 +267,7 @@ class HeldOutRows:
     late : tuple of Segment
         Held-out rows of each block.
     runs : SegmentLanes
-        All rows of each block, then those with larger inputs, then its held-out rows. Outputs that are not
-        scored are missing.
+        All rows of each block, then its held-out rows. Outputs that are not scored are missing.
     disturbed : SegmentLanes
         Rows about the first held-out one of each block, once for each disturbance.
     """
@@ -286,12 +281,11 @@ def _hold_out(whole: Sequence[Segment], used: Sequence[Segment]) -> HeldOutRows:
     """Make the free runs of blocks of which the first rows are used."""
     cuts = [len(each.y) for each in used]
     late = [each.take(cut, None) for each, cut in zip(whole, cuts, strict=True)]
-    larger = [replace(each, u=_LARGER_INPUTS * each.u, y=np.full_like(each.y, np.nan)) for each in whole]
     disturbed = [
         _score(each, cut).take(max(0, cut - _FORGETTING), cut + _DISTURBED_ROWS)
         for each, cut in zip(whole, cuts, strict=True)
     ]
-    runs = [*map(_score, whole, cuts), *larger, *map(_score, late, map(_count_memory, late))]
+    runs = [*map(_score, whole, cuts), *map(_score, late, map(_count_memory, late))]
     return HeldOutRows(tuple(late), SegmentLanes(runs), SegmentLanes(_DISTURBED * disturbed))
 
 
@@ -308,8 +302,10 @@ def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
     It is the largest one of several free runs. That of the block goes on, since a start at the held-out rows
     would hide the error of slow states. Another one starts there from estimated states, as a simulation of
     the model does. The others start in the block from disturbed states, which a model with a second
-    equilibrium does not forget. The error is in the squared unit of the output. A free run with larger inputs
-    has no error, but may not diverge.
+    equilibrium does not forget. The error is in the squared unit of the output.
+
+    No run has inputs that the data do not: a system may diverge at larger ones as its model does. The physics
+    checks of the result choose among models that the data do not distinguish; see `recommend`.
     """
     scales = measure_deviations(fit.theta, fit.codes, data.used[0].u, fit.states[0])
     if scales is None:
@@ -321,7 +317,7 @@ def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
     errors = []
     for lanes, states in (
         (rows.disturbed, disturbed),
-        (rows.runs, np.vstack([fit.states, fit.states, starts])),
+        (rows.runs, np.vstack([fit.states, starts])),
     ):
         squares = lanes.sum_squared_errors(fit.theta, fit.codes, states)
         if squares is None:

@@ -57,14 +57,13 @@ def average_samples(record: Dataset, count: int) -> Dataset:
     return replace(
         record,
         u=np.column_stack([_average(signal, record, count) for signal in record.u.T]),
-        y=_average(record.y, record, count),
+        **record.change_outputs(lambda y: _average(y, record, count)),
         dt=record.dt * count,
         segments=tuple(length for length in lengths if length),
         recordings=tuple(name for name, length in zip(record.recordings, lengths, strict=True) if length),
         start=record.start + 0.5 * (count - 1) * record.dt,
         sha256="",
         held_out=0,
-        left_out=(),
     )
 
 

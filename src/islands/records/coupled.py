@@ -148,15 +148,28 @@ AnyRecord: TypeAlias = Dataset | CoupledRecord
 
 @dataclass(frozen=True, slots=True)
 class CoupledSplit:
-    """Estimation data and validation data of several outputs."""
+    """Estimation data and validation data of several outputs.
+
+    Attributes
+    ----------
+    estimation, validation : CoupledRecord
+        Without samples of which an output is missing.
+    record : CoupledRecord
+        The record as passed by the user.
+    """
 
     estimation: CoupledRecord
     validation: CoupledRecord
+    record: CoupledRecord
 
     @property
     def first(self) -> Split:
         """Data of the first output, with the inputs that all outputs share."""
         return Split(self.estimation.records[0], self.validation.records[0])
+
+    def map(self, function: Callable[[Dataset], Dataset]) -> "CoupledSplit":
+        """Return the split with a function applied to the record of every output."""
+        return CoupledSplit(*(each.map(function) for each in (self.estimation, self.validation, self.record)))
 
 
 class OutputNames(Protocol):
@@ -247,7 +260,7 @@ def couple(record: Dataset, outputs: int) -> CoupledRecord:
     first = record.inputs - outputs + 1
     single = record.first_inputs(first)
     others = [
-        replace(single, y=column, output_name=name, output_unit=unit)
+        replace(single, y=column, measured=None, output_name=name, output_unit=unit)
         for column, name, unit in zip(
             record.u.T[first:], record.input_names[first:], record.input_units[first:], strict=True
         )
@@ -273,7 +286,7 @@ def split_coupled(record: CoupledRecord, validation: CoupledRecord | float) -> C
     SettingsError
         The fraction leaves a part empty, or the validation data has samples of the record.
     """
-    record = record.skip_missing()
+    complete = record.skip_missing()
     if isinstance(validation, CoupledRecord):
         if validation.output_names != record.output_names:
             raise RecordError(
@@ -282,9 +295,10 @@ def split_coupled(record: CoupledRecord, validation: CoupledRecord | float) -> C
             )
         held_out: list[Dataset | float] = list(validation.skip_missing().records)
     else:
-        held_out = [validation] * len(record.records)
-    parts = [split_data(*pair) for pair in zip(record.records, held_out, strict=True)]
+        held_out = [validation] * len(complete.records)
+    parts = [split_data(*pair) for pair in zip(complete.records, held_out, strict=True)]
     return CoupledSplit(
         CoupledRecord(tuple(part.estimation for part in parts)),
         CoupledRecord(tuple(part.validation for part in parts)),
+        record,
     )

@@ -1,6 +1,8 @@
 """Record of inputs and one output on a common uniform time grid, in one or several recordings."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +50,8 @@ class Dataset:
     held_out : int
         Number of samples at the end, in whole segments, that a diagnosis holds out; 0 for a quarter of the
         samples.
-    left_out : tuple of (int, float)
-        Samples of the output that are missing since they are gross errors, with their measured values.
+    measured : ndarray, shape (samples,), or None
+        The output with the gross errors that ``y`` leaves out, after the same steps; None if there are none.
 
     Raises
     ------
@@ -72,7 +74,7 @@ class Dataset:
     reading: tuple[str, ...] = ()
     preprocessing: Preprocessing | None = None
     held_out: int = 0
-    left_out: tuple[tuple[int, float], ...] = ()
+    measured: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         u, y = _to_numbers(self.u, "inputs"), _to_numbers(self.y, "output")
@@ -104,11 +106,16 @@ class Dataset:
         if len(recordings) != len(segments):
             raise RecordError(f"{len(segments)} segments need {len(segments)} names, got {recordings}")
         _check_finite(u, y, names, self.output_name)
-        for array in (u, y):
-            array.setflags(write=False)
+        measured = None if self.measured is None else _to_numbers(self.measured, "measured output")
+        if measured is not None and measured.shape != y.shape:
+            raise RecordError(f"the measured output has {measured.size} samples, the output {y.size}")
+        for array in (u, y, measured):
+            if array is not None:
+                array.setflags(write=False)
         for field, value in (
             ("u", u),
             ("y", y),
+            ("measured", measured),
             ("input_names", tuple(names)),
             ("input_units", units),
             ("segments", segments),
@@ -166,6 +173,15 @@ class Dataset:
     def __len__(self) -> int:
         return self.samples
 
+    def change_outputs(
+        self, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    ) -> dict[str, Any]:
+        """Return the output, and the measured one, after a function, as arguments of ``replace``."""
+        return {
+            "y": function(self.y),
+            "measured": None if self.measured is None else function(self.measured),
+        }
+
     def first_inputs(self, count: int) -> "Dataset":
         """Return the record with only its first ``count`` inputs."""
         return replace(
@@ -191,12 +207,11 @@ class Dataset:
         return replace(
             self,
             u=self.u[first:last],
-            y=self.y[first:last],
+            **self.change_outputs(lambda y: y[first:last]),
             held_out=last - fitted if first < fitted < last else 0,
             segments=tuple(length for length, _ in kept),
             recordings=tuple(name for _, name in kept),
             start=self.start + first * self.dt,
-            left_out=tuple((place - first, value) for place, value in self.left_out if first <= place < last),
         )
 
 
@@ -279,7 +294,6 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
                 f"recordings were sampled at {first.dt:.10g} s and {other.dt:.10g} s: resample one of them"
             )
     names = _name_recordings(recordings)
-    begins = np.cumsum([0, *map(len, recordings)]).tolist()
     return replace(
         first,
         u=np.concatenate([recording.u for recording in recordings]),
@@ -289,11 +303,9 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
         sha256="",
         held_out=0,
         reading=_join_reading(recordings, names),
-        left_out=tuple(
-            (begin + place, value)
-            for begin, recording in zip(begins, recordings, strict=False)
-            for place, value in recording.left_out
-        ),
+        measured=None
+        if all(each.measured is None for each in recordings)
+        else np.concatenate([each.y if each.measured is None else each.measured for each in recordings]),
     )
 
 

@@ -47,5 +47,5 @@ def skip_missing_outputs(record: Dataset) -> Dataset:
         recordings=tuple(names),
         held_out=0,
         start=record.start + int(np.argmax(known)) * record.dt,
-        left_out=(),
+        measured=None,
     )

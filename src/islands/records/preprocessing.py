@@ -82,11 +82,11 @@ def preprocess(
         )
     slope = _fit_slope(reduced) if detrend == "linear" else 0.0
     time = reduced.dt * np.arange(reduced.samples)
-    y = reduced.y - slope * (time - time.mean())
-    known = y[np.isfinite(y)]
+    straight = replace(reduced, **reduced.change_outputs(lambda y: y - slope * (time - time.mean())))
+    known = straight.y[np.isfinite(straight.y)]
     offsets = tuple(float(signal.mean()) for signal in reduced.u.T)
     found = Preprocessing(steps, record.dt, offsets, float(known.mean()) if known.size else 0.0, slope)
-    return _subtract(replace(reduced, y=y), found)
+    return _subtract(straight, found)
 
 
 def apply_preprocessing(record: Dataset, preprocessing: Preprocessing) -> Dataset:
@@ -131,9 +131,8 @@ def _subtract(record: Dataset, found: Preprocessing) -> Dataset:
     return replace(
         record,
         u=record.u - np.array(found.input_offsets),
-        y=record.y - found.output_offset,
+        **record.change_outputs(lambda y: y - found.output_offset),
         preprocessing=found,
-        left_out=tuple((place, value - found.output_offset) for place, value in record.left_out),
     )
 
 
@@ -159,7 +158,7 @@ def _reduce(record: Dataset, steps: PreprocessingSteps) -> Dataset:
     return replace(
         record,
         u=record.u[kept],
-        y=record.y[kept],
+        **record.change_outputs(lambda y: y[kept]),
         dt=record.dt * steps.decimate,
         segments=tuple(-(-length // steps.decimate) for length in record.segments),
     )
@@ -175,9 +174,9 @@ def _filter(record: Dataset, cutoff: float, order: int) -> Dataset:
             f"a segment of {min(record.segments)} samples is too short for a filter: give longer recordings"
         )
     sections = butter(order, cutoff, fs=1.0 / record.dt, output="sos")
-    filter_part = partial(sosfiltfilt, sections)
-    columns = [_filter_signal(signal, record, filter_part) for signal in (*record.u.T, record.y)]
-    return replace(record, u=np.column_stack(columns[:-1]), y=columns[-1], left_out=())
+    filter_one = partial(_filter_signal, record=record, filter_part=partial(sosfiltfilt, sections))
+    u = np.column_stack([filter_one(signal) for signal in record.u.T])
+    return replace(record, u=u, **record.change_outputs(filter_one))
 
 
 def _filter_signal(

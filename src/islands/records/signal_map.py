@@ -113,4 +113,5 @@ def map_signals(model: SignalReference, record: Dataset) -> tuple[Dataset, float
     offset, shift = left.output_offset, np.array(left.input_offsets)
     if offset == 0.0 and not shift.any():
         return record, 0.0
-    return replace(record, u=record.u - shift, y=record.y - offset, preprocessing=expected), offset
+    outputs = record.change_outputs(lambda y: y - offset)
+    return replace(record, u=record.u - shift, preprocessing=expected, **outputs), offset

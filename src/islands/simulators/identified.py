@@ -15,12 +15,15 @@ from islands.effects.interface.force import sum_output_forces
 from islands.errors import ModelError
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.printing import plain
-from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift, Symbol
 from islands.models.block import Block, subtract_offsets
+from islands.models.latent import LatentModel
 from islands.models.narx import Model, make_model
 from islands.models.parametric import ParametricModel
 from islands.models.regressor import Regressor, regressor
+from islands.records.dataset import Dataset
 from islands.simulation.blocks import BlockSimulator
+from islands.simulation.initial_states import estimate_first_states
 from islands.simulation.linked import LinkedModel
 from islands.simulators.interface import (
     BatchSimulator,
@@ -378,8 +381,12 @@ class ParametricSimulator(BatchSimulator):
     ----------
     model : ParametricModel
     name : str
-    start : ndarray, shape (maximum lag,) or longer
-        Measured output; the free run starts from its first samples.
+    record : Dataset
+        Record whose first input drives the model, with a complete output; the free run starts from its first
+        samples.
+    parameters : tuple of Parameter
+        Parameters of the model, and the start of the free run: the states of a latent model at the first
+        sample, which are estimated as for `free_run`; the mean of the initial outputs of other models.
 
     Raises
     ------
@@ -389,30 +396,48 @@ class ParametricSimulator(BatchSimulator):
 
     model: ParametricModel
     name: str = field()  # without it, the property of the base class would be the default
-    start: Signal
+    record: Dataset
+    parameters: tuple[Parameter, ...] = field(init=False)
     sites: ClassVar[frozenset[Site]] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     _block: Block = field(init=False, repr=False)
+    _warm_up: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.model.inputs != 1:
             raise ModelError(
                 f"{self.name} has {self.model.inputs} inputs: a diagnosis takes models of one input"
             )
-        object.__setattr__(self, "_block", subtract_offsets(self.model.block(), self.model.preprocessing))
+        block = subtract_offsets(self.model.block(), self.model.preprocessing)
+        found = list(map(_make_parameter, self.model.names, self.model.parameters))
+        warm_up = block.maximum_lag
+        if isinstance(self.model, LatentModel):
+            first, late = self._estimate_states(self.model)
+            states = {f"initial {name}": value for name, value in zip(self.model.states, first, strict=True)}
+            found += [Parameter(name, "", value, _SCALE, initial=True) for name, value in states.items()]
+            # The states of a run are among its parameters.
+            starts = tuple(map(Symbol, states))
+            block, warm_up = (
+                replace(block, starts=starts, parameters={**block.parameters, **states}),
+                1 + late,
+            )
+        else:
+            found.append(_make_initial_output(self.record.y[:warm_up]))
+        for name, value in (("parameters", tuple(found)), ("_block", block), ("_warm_up", warm_up)):
+            object.__setattr__(self, name, value)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the model, and mean of the initial outputs, whose measured samples have noise."""
-        start = self.start[: self._block.maximum_lag]
-        named = zip(self.model.names, self.model.parameters, strict=True)
-        return (
-            *(_make_parameter(name, value) for name, value in named),
-            _make_initial_output(start),
-        )
+    def _estimate_states(self, model: LatentModel) -> tuple[list[float], int]:
+        """Estimate the states at the first sample whose input is known; return them and this sample."""
+        signals, done = self.record.first_inputs(1), model.preprocessing
+        if done is not None:
+            u = signals.u - np.array(done.input_offsets)
+            signals = replace(signals, u=u, **signals.change_outputs(lambda y: y - done.output_offset))
+        end = min(model.memory, signals.samples)
+        states, u = estimate_first_states(model, signals, 0, end)
+        return states.tolist(), end - len(u)
 
     def for_samples(self, first: int, last: int) -> "ParametricSimulator":
-        """Return the free run from the first measured outputs of one recording."""
-        return replace(self, start=self.start[first:last])
+        """Return the free run from the first samples of one recording."""
+        return replace(self, record=self.record[first:last])
 
     def with_values(self, values: Signal) -> ParametricModel:
         """Return the model with the given values of its parameters."""
@@ -423,22 +448,28 @@ class ParametricSimulator(BatchSimulator):
     ) -> Signal:
         """Simulate several runs; see `Simulator.simulate_batch`."""
         simulated: NDArray[np.float64] = np.empty((len(runs), runs[0].x.size))
-        groups: dict[tuple[int, float], list[int]] = {}
+        count = len(self._block.parameters)
+        groups: dict[tuple[int, tuple[float, ...]], list[int]] = {}
         for place, run in enumerate(runs):
-            groups.setdefault((id(run.x), float(run.values[-1])), []).append(place)
+            groups.setdefault((id(run.x), tuple(run.values[count:].tolist())), []).append(place)
         for (_, level), places in groups.items():
-            parameters = np.array([runs[place].values[:-1] for place in places])
+            parameters = np.array([runs[place].values[:count] for place in places])
             simulated[places] = self._simulate(runs[places[0]].x, level, parameters)
         if any(run.forces for run in runs):
             simulated += sum_output_forces([run.x for run in runs], context, [run.forces for run in runs])
         return simulated[:, ::every]
 
-    def _simulate(self, x: Signal, level: float, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Simulate an input with several sets of parameters; ``level`` is the mean of the initial outputs."""
-        warm_up = self._block.maximum_lag
-        measured = self.start[:warm_up]
+    def _simulate(
+        self, x: Signal, level: Sequence[float], parameters: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Simulate an input with several sets of parameters.
+
+        ``level`` has the mean of the initial outputs; it is empty if the states are parameters.
+        """
+        warm_up = self._warm_up
+        measured = self.record.y[:warm_up]
         outputs = np.full((1, x.size), np.nan)
-        outputs[0, :warm_up] = measured + (level - measured.mean())
+        outputs[0, :warm_up] = measured + (level[0] - measured.mean() if level else 0.0)
         start, length = np.array([warm_up]), np.array([x.size - warm_up])
         simulate = BlockSimulator(self._block, outputs, x[None], start, length, warm_up)
         found = simulate(parameters)[:, 0]

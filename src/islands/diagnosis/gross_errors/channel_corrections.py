@@ -68,6 +68,7 @@ def _exchange_output(record: Dataset, place: int) -> Correction:
             record,
             u=u,
             y=record.u[:, place],
+            measured=None,
             input_names=tuple(names),
             input_units=tuple(units),
             output_name=name,

@@ -46,7 +46,7 @@ def correct_output_unit(record: Dataset) -> Iterator[Correction]:
     for factor, words in _list_factors(name):
         yield Correction(
             "output-unit",
-            replace(record, y=record.y / factor),
+            _divide_output(record, factor),
             f"The output {name} seems to be in another unit than that of the simulation: {words}",
             _advise(name, factor),
             {"factor": (factor, "")},
@@ -81,6 +81,10 @@ def _scale_input(record: Dataset, place: int, factor: float) -> Dataset:
     return replace(record, u=u)
 
 
+def _divide_output(record: Dataset, factor: float) -> Dataset:
+    return replace(record, **record.change_outputs(lambda y: y / factor))
+
+
 def _list_factors(name: str) -> Iterator[tuple[float, str]]:
     """Yield each factor of a recorded signal, with the words for it."""
     for size, example in UNIT_FACTORS:
@@ -99,7 +103,7 @@ def _advise(name: str, factor: float) -> str:
 
 def correct_sign(record: Dataset, read: Set[str] = frozenset()) -> Iterator[Correction]:
     """Yield the record with the output, the input, or a channel that the simulation reads inverted."""
-    inverted = [("output", record.output_name, replace(record, y=-record.y), -1.0)]
+    inverted = [("output", record.output_name, _divide_output(record, -1.0), -1.0)]
     inverted += [
         (role, name, _scale_input(record, place, -1.0), 1.0)
         for place, role, name in _list_driving_signals(record, read)

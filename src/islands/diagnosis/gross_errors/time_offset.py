@@ -63,7 +63,7 @@ def _move_output(record: Dataset, offset: int) -> Correction:
         advice = f"Give {drive}+1 as the input, which reads {drive} one sample early."
     return Correction(
         "time-offset",
-        replace(record, y=shift_signal(record.y, offset, record.bounds)),
+        replace(record, **record.change_outputs(lambda y: shift_signal(y, offset, record.bounds))),
         f"The output {output} is recorded {seconds:.6g} s ({rows}) "
         + (
             f"later than {drive} drives it."

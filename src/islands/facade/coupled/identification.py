@@ -19,6 +19,7 @@ from islands.evolution.presets import (
     resolve_coupled_settings,
     with_tuples,
 )
+from islands.evolution.search_result import ResultCallback, ignore_result, without_optional_steps
 from islands.evolution.search_state import SearchState, keep_hall, stop_reason
 from islands.evolution.settings import LATENT, NARX, Settings
 from islands.facade.coupled.bands import make_bands
@@ -35,6 +36,7 @@ from islands.facade.trials.rate_selection import select_rate
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import require_narx
 from islands.progress import (
+    AnswerFoundError,
     ProgressCallback,
     Steps,
     Stop,
@@ -275,6 +277,7 @@ def identify_coupled_data(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
+    on_models: ResultCallback = ignore_result,
     **changes: Any,
 ) -> CoupledResult:
     """Identify one equation per output, for a caller that states an extrapolation itself.
@@ -284,6 +287,9 @@ def identify_coupled_data(
     data : CoupledSplit
     refine_together, preset, seed, progress, on_epoch, stop, start, engine, **changes
         As for `identify_coupled`.
+    on_models : callable
+        Called with the ranked models of each output, before the optional steps. After an `AnswerFoundError`,
+        the result has none of them.
 
     Raises
     ------
@@ -293,7 +299,7 @@ def identify_coupled_data(
     chosen: dict[str, Any] = {"feedthrough": "no", **with_tuples(changes)}
     settings = resolve_coupled_settings(preset, chosen)
     preset = COUPLED_PRESET if preset == AUTO_PRESET else preset
-    search = partial(identify_record, preset=preset, seed=seed, engine=engine)
+    search = partial(identify_record, preset=preset, seed=seed, engine=engine, on_models=on_models)
     find, steps = _Searches(search, start, on_epoch), Steps(progress, stop)
     if settings.model_class == LATENT:
         return _couple_latent(data, chosen, steps, find)
@@ -327,10 +333,11 @@ class _Searches:
         """Search the next output."""
         place = len(self._ended)
         self._state = self._starts[place] if place < len(self._starts) else None
-        found = self._search(record, validation, start=self._state, on_epoch=self._report, **options)
-        if self._state is not None:
-            self._ended = (*self._ended, self._state)
-        return found
+        try:
+            return self._search(record, validation, start=self._state, on_epoch=self._report, **options)
+        finally:
+            if self._state is not None:
+                self._ended = (*self._ended, self._state)
 
     def _report(self, state: SearchState, settings: Settings) -> None:
         # A search that a limit of time has ended can continue, with its populations.
@@ -380,6 +387,9 @@ def _search_outputs(
         show, stop = partial(_report, steps.report, name), steps.share_stop(len(names) - len(results))
         try:
             found = find(split.estimation, split.validation, progress=show, stop=stop, **options)
+        except AnswerFoundError as ended:
+            steps.refusal = str(ended)
+            found = Result.from_search(without_optional_steps(ended.found, steps.refusal))
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
         search = found.search_result.search
@@ -418,8 +428,7 @@ def _couple(
     options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
     results = _search_outputs(names, splits, options, steps, find)
     steps.report("choice of the equations", 0.0)
-    means = partial(average_samples, count=options["average"])
-    data = CoupledSplit(data.estimation.map(means), data.validation.map(means))
+    data = data.map(partial(average_samples, count=options["average"]))
     warm_up = max(entry.warm_up for result in results for entry in result.models)
     ranked = [[require_narx(entry.model) for entry in result.models] for result in results]
     best = [result.recommendation.rank for result in results]
@@ -444,6 +453,7 @@ def _couple(
         data,
         steps.left_out,
         steps.not_computed,
+        refusal=steps.refusal,
     )
 
 

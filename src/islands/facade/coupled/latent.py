@@ -34,7 +34,7 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], steps: St
     best = [result.best for result in results]
     if any(each.model.input_names != data.estimation.input_names for each in best):
         # An output responds to an input within the sample: the models share the columns.
-        data = CoupledSplit(data.estimation.map(advance_all_inputs), data.validation.map(advance_all_inputs))
+        data = data.map(advance_all_inputs)
     inputs = data.estimation.input_names
     bands = [_name_inputs_of_bands(each.prediction_bands, inputs) for each in best if each.prediction_bands]
     return CoupledResult(
@@ -47,6 +47,7 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], steps: St
         data,
         steps.left_out,
         steps.not_computed,
+        refusal=steps.refusal,
     )
 
 

@@ -38,6 +38,7 @@ from islands.records.split import measure_input_ranges
 from islands.report.documents.result_folder import (
     finite,
     list_failures,
+    measure_left_out,
     record_document,
     residual_structure_document,
     terms_in_result,
@@ -288,6 +289,8 @@ class CoupledResult(FittedCoupledModel):
         Optional steps that failed, each with the reason.
     wall_s : float or None
         Duration of all searches in seconds; None if they were not timed.
+    refusal : str
+        Why the optional facts of the document are not computed; empty if they are.
     """
 
     results: tuple[Result, ...]
@@ -297,6 +300,7 @@ class CoupledResult(FittedCoupledModel):
     left_out: tuple[str, ...] = ()
     not_computed: Mapping[str, str] = field(default_factory=dict)
     wall_s: float | None = None
+    refusal: str = ""
 
     def with_wall_time(self, seconds: float) -> "CoupledResult":
         """Return a copy of the result with the duration of all searches in seconds."""
@@ -399,8 +403,13 @@ class CoupledResult(FittedCoupledModel):
     def document(self) -> dict[str, Any]:
         """Return the content of ``result.json`` as JSON values."""
         metrics, names, steps = self.metrics, self.model.output_names, Steps()
+        steps.refusal = self.refusal
         residuals = [
             steps.attempt(f"residual tests of {name}", partial(self._measure_residual, place))
+            for place, name in enumerate(names)
+        ]
+        left_out = [
+            steps.attempt(f"gross errors of {name}", partial(self._measure_left_out, place))
             for place, name in enumerate(names)
         ]
         not_computed = {**self.not_computed, **steps.not_computed}
@@ -427,6 +436,7 @@ class CoupledResult(FittedCoupledModel):
                     "data": {
                         "noise": measure_output_noise(self.split.estimation.records[place]),
                         "output_range": self.split.validation.records[place].output_range,
+                        "left_out": left_out[place],
                     },
                     "residual": residual_structure_document(residuals[place] or missing_structure()),
                     "metrics": {
@@ -455,6 +465,11 @@ class CoupledResult(FittedCoupledModel):
         if bands is not None and self._shared_ensemble is None:
             described["ensemble"] = ensemble_document(bands.ensemble)
         return described
+
+    def _measure_left_out(self, place: int) -> dict[str, Any] | None:
+        """Return the errors of an output over the whole record, without and with its gross errors."""
+        record = self.split.record
+        return measure_left_out(record.records[place], lambda: self.simulate(record).y[:, place])
 
     def _measure_residual(self, place: int) -> ResidualStructure:
         """Measure the residuals of an output on the longest recording of the validation data."""

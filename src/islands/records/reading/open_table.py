@@ -130,10 +130,10 @@ def read_table(
     if output is not None and (note := _describe_saturation(record)):
         record = replace(record, reading=(*record.reading, note))
     record = advance_inputs(record, _find_advanced(inputs, sources))
-    if measured is None or not excluded or len(measured) != record.samples:
+    if measured is None or len(measured) != record.samples:
         return record
-    places = np.flatnonzero(np.isnan(record.y) & np.isfinite(measured)).tolist()
-    return replace(record, left_out=tuple((place, float(measured[place])) for place in places))
+    is_left_out = np.isnan(record.y) & np.isfinite(measured)
+    return replace(record, measured=measured) if is_left_out.any() else record
 
 
 def _read_rows(

@@ -19,7 +19,7 @@ from islands.diagnosis.result import CalibratedValue, Candidate, Diagnosis
 from islands.effects.catalogue import find_entry, get_title
 from islands.report.documents.extension import list_contradictions, write_extended_equations
 from islands.report.documents.plan_json import describe_next_experiment, write_advice
-from islands.report.documents.result_folder import list_failures, record_document
+from islands.report.documents.result_folder import list_failures, measure_left_out, record_document
 
 #: Plain name of a missing term.
 TERM_TITLE = "missing term"
@@ -47,6 +47,7 @@ def diagnosis_document(
     return {
         "schema": SCHEMA,
         "record": record_document(diagnosis.record),
+        "data": {"left_out": measure_left_out(diagnosis.record, lambda: diagnosis.best.output)},
         "simulation": diagnosis.base.simulation.simulator.name,
         "verdict": str(diagnosis.verdict),
         "discovered": None if diagnosis.discovery is None else asdict(diagnosis.discovery),

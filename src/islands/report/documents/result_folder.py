@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from math import isfinite
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.estimation.estimator_table import Criterion
@@ -30,11 +31,13 @@ from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.flat_extremes import find_limits
 from islands.records.inspection.noise import measure_output_noise
+from islands.records.signal_map import match_rate
 from islands.records.split import measure_input_ranges
 from islands.report.text.summary import certificates_document, method_text, summary
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.ensemble import Ensemble
+from islands.validation.metrics import metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
 from islands.validation.residual_tests import ResidualTests
@@ -139,9 +142,11 @@ def record_document(record: Dataset) -> dict[str, Any]:
 def _data_document(found: SearchResult) -> dict[str, Any]:
     """Return the facts about the data that the statements about a result read."""
     parts = {"estimation": found.split.estimation, "validation": found.split.validation}
+    model = found.recommended.model
+    record = match_rate(model, found.record)
     return {
         "missing_outputs": int(np.isnan(found.record.y).sum()),
-        "left_out": _measure_left_out(found),
+        "left_out": measure_left_out(record, lambda: free_run(model, record).y),
         "output_range": found.record.output_range,
         "output_limits": list(find_limits(found.record.y, found.record.bounds)),
         "noise": measure_output_noise(found.split.estimation),
@@ -149,28 +154,29 @@ def _data_document(found: SearchResult) -> dict[str, Any]:
     }
 
 
-def _measure_left_out(found: SearchResult) -> dict[str, Any] | None:
-    """Return the error of the recommended model over all samples without and with those that are left out.
+def measure_left_out(record: Dataset, simulate: Callable[[], NDArray[np.float64]]) -> dict[str, Any] | None:
+    """Return the error of a simulation over a whole record without and with its gross errors, as JSON values.
 
-    None if no sample is left out, if the model has means of samples, or if its free run has no start or
-    diverges.
+    None if no gross error is left out, or if the simulation has no start or diverges.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record with the signals of the simulation.
+    simulate : callable
+        Returns the simulated output, shape (samples,).
     """
-    record, model = found.record, found.models[found.recommendation.rank - 1].model
-    if not record.left_out or found.average != 1:
+    if record.measured is None:
         return None
     try:
-        run = free_run(model, record).y
+        run = simulate()
     except RecordError:  # an output is missing in a warm-up
         return None
-    places, values = zip(*record.left_out, strict=True)
-    errors, others = record.y - run, np.array(values) - run[list(places)]
-    errors, others = errors[np.isfinite(errors)], others[np.isfinite(others)]
-    if not errors.size or not others.size:
-        return None
-    every = np.concatenate([errors, others])
     with np.errstate(over="ignore"):
-        without, together = (float(np.sqrt(np.mean(each**2))) for each in (errors, every))
-    return {"samples": others.size, "rmse": without, "rmse_with": together}
+        without, together = (metrics(y, run).rmse for y in (record.y, record.measured))
+    samples = int((np.isnan(record.y) & np.isfinite(record.measured - run)).sum())
+    found = {"samples": samples, "rmse": without, "rmse_with": together}
+    return found if np.isfinite([without, together]).all() else None
 
 
 def content_sha256(record: Dataset) -> str:

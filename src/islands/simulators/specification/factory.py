@@ -241,7 +241,7 @@ def make_model_simulator(model: DynamicModel, name: str, record: Dataset) -> Sim
         case Model():
             simulator = NarxSimulator(measured_model(model), name, fill_gaps(record.y))
         case ParametricModel():
-            simulator = ParametricSimulator(model, name, fill_gaps(record.y))
+            simulator = ParametricSimulator(model, name, replace(record, y=fill_gaps(record.y)))
         case _:
             raise ModelError(f"{name} is of the class {model.kind}, which cannot be diagnosed")
     # Further columns of the record are channels, which the model does not read.

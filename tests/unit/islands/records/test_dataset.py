@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
+from islands.records.averaging import average_samples
 from islands.records.channel_names import parse_unit
 from islands.records.dataset import Dataset, join
+from islands.records.preprocessing import preprocess
 
 
 def record(samples: int = 10, **changes: object) -> Dataset:
@@ -23,6 +25,26 @@ def error_message(**changes: object) -> str:
     with pytest.raises(RecordError) as caught:
         record(**changes)
     return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda given: given[3:40],
+        lambda given: join((given, record())),
+        lambda given: average_samples(given, 3),
+        lambda given: preprocess(given, lowpass=0.3),
+        lambda given: preprocess(given, decimate=2),
+    ],
+    ids=["slice", "join", "means", "filter", "decimation"],
+)
+def test_gross_errors_pass_through_the_steps_of_the_output(change):
+    measured = np.sin(np.arange(60.0))
+    measured[[20, 31]] = 50.0
+    y = np.where(measured == 50.0, np.nan, measured)
+    found, expected = change(record(60, y=y, measured=measured)), change(record(60, y=measured))
+    np.testing.assert_array_equal(found.measured, expected.y)
+    assert not found.measured.flags.writeable
 
 
 def test_record_is_read_only():

@@ -1,6 +1,7 @@
 """Identified models in free run, and the missing terms of one: names, response, and the model with them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ from islands.diagnosis.calibration.target import Target
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
 from islands.persistence.models import model_from_json
+from islands.records.dataset import join
+from islands.records.input_lead import advance_all_inputs
+from islands.records.preprocessing_steps import Preprocessing, PreprocessingSteps
 from islands.report.documents.extension import extended_document
+from islands.simulation.predictors import free_run
 from islands.simulators.extended import ExtendedSimulator, make_context
 from islands.simulators.identified import NarxSimulator
 from islands.simulators.specification.factory import make_model_simulator
@@ -94,8 +99,30 @@ def test_small_models_have_missing_terms_only_if_they_read_the_input() -> None:
     assert output_alone.state_effects == ()
 
 
-def test_a_state_space_at_rest_follows_its_input_from_the_first_sample() -> None:
-    record = latent_systems.spring_record(100, start=(0.0, 0.0))
-    simulator = make_model_simulator(latent_systems.make_model(memory=45), "spring", record)
+@pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, -0.4)])
+@pytest.mark.parametrize("is_early", [False, True])
+@pytest.mark.parametrize("offset", [0.0, 2.0])
+def test_a_diagnosis_simulates_a_state_space_as_simulate_does(
+    start: tuple[float, float], is_early: bool, offset: float
+) -> None:
+    """The states are estimated from the first samples, which rest in some records only."""
+    record, spring = latent_systems.spring_record(300, start=start), latent_systems.make_model(memory=45)
+    if is_early:
+        record, spring = advance_all_inputs(record), replace(spring, input_names=("u_V+1",))
+    done = Preprocessing(PreprocessingSteps(detrend="constant"), record.dt, (offset,), -offset, 0.0)
+    record = replace(record, u=record.u + offset, y=record.y - offset)
+    simulator = make_model_simulator(replace(spring, preprocessing=done), "spring", record)
     alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    np.testing.assert_allclose(alone.simulate(alone.nominal), record.y, rtol=1e-12)
+    simulated = alone.simulate(alone.nominal)
+    np.testing.assert_allclose(simulated, record.y, atol=1e-3)
+    expected = free_run(replace(spring, preprocessing=done), record).y
+    np.testing.assert_allclose(simulated[45:], expected[45:], rtol=1e-9)
+
+
+def test_the_states_of_every_recording_are_its_own() -> None:
+    record = join(tuple(latent_systems.spring_record(100, start=each) for each in ((0.5, -0.4), (-0.3, 0.2))))
+    simulator = make_model_simulator(latent_systems.make_model(memory=45), "spring", record)
+    alone = ExtendedSimulator(simulator, (), make_context(record, simulator, 100))
+    np.testing.assert_allclose(alone.simulate(alone.nominal), record.y, atol=1e-3)
+    initial = [parameter.initial for parameter in alone.parameters]
+    assert alone.recordings[initial].tolist() == [0, 0, 1, 1]

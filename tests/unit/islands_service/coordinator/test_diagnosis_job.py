@@ -1,6 +1,7 @@
 """Discrepancy jobs: fraction and time left, times of the checkpoints, result and report."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ import pytest
 import structlog
 
 from islands.diagnosis.inference import noise_floor
+from islands.diagnosis.interim_findings import EXTENSION
 from islands.errors import RecordError, SettingsError
 from islands.facade.explain_residual import FORMULA
 from islands_service.coordinator import diagnosis_job
@@ -18,7 +20,7 @@ from islands_service.coordinator.checkpoints import DiagnosisState
 from islands_service.coordinator.diagnosis_job import DiagnosisProgress
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.job_failures import make_problem_document
-from islands_service.domain.job import EXTENDED, Job, JobState
+from islands_service.domain.job import EXTENDED, REPORT, Job, JobState
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.buckets import ObjectStoreError
@@ -195,6 +197,18 @@ def test_cancelled_job_keeps_what_its_diagnosis_has_found(
     store.leases.finish(lease, run_job(lease, store, blobs))
     resumed = store.results.document(job.id) or {}
     assert (resumed["verdict"], resumed["left_out"]) == ("named", [])
+
+
+@pytest.mark.ci
+def test_last_attempt_ends_with_the_named_causes(store: Store, blobs: Blobs, submit: Submit) -> None:
+    submit()
+    complete = run_job(lease := claim(store), store, blobs)
+    outcome = run_job(replace(lease, is_last=True), store, blobs)
+    document = outcome.document or {}
+    assert (outcome.state, document["left_out"]) == (JobState.SUCCEEDED, [])
+    assert document["effects"] == (complete.document or {})["effects"]
+    assert {each["step"] for each in document["not_computed"]} == {EXTENSION, FORMULA, REPORT}
+    assert complete.artefacts.keys() - outcome.artefacts.keys() == {REPORT}
 
 
 @pytest.mark.parametrize(

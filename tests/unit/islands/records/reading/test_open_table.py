@@ -1,13 +1,17 @@
 """Gross errors of an output are missing values, and what was left out is stated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas
 import pytest
 from scipy.signal import lfilter
 
 import islands
+from islands.records.coupled import CoupledRecord
 from islands.records.reading import read_dataset, read_record
 from islands.records.reading.options import ReadingOptions
+from islands.report.documents.result_folder import result_document
 from support.bad_records import refusal
 
 TIMES = 0.5 * np.arange(1200)
@@ -87,6 +91,51 @@ def test_the_law_is_found_in_a_record_with_gross_errors(tmp_path, values):
     assert result.best.model.parameters == pytest.approx((0.9, 0.2), abs=0.002)
     assert result.best.metrics["validation"]["free_run"].rmse < 0.0215
     assert "3 isolated spikes" in str(result) or "3 times -9999" in str(result)
+
+
+#: Positions and values of gross errors.
+SPIKES = ((150, 700), (60.0, -50.0))
+
+LINEAR = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 2, "certificate": 0, "average": 1}
+
+
+def read_with_spikes():
+    wrong = Y.copy()
+    wrong[list(SPIKES[0])] = SPIKES[1]
+    return islands.as_record(U, wrong, 0.5)
+
+
+def test_a_record_keeps_the_values_of_gross_errors():
+    record = read_with_spikes()
+    assert np.flatnonzero(np.isnan(record.y)).tolist() == list(SPIKES[0])
+    assert record.measured[list(SPIKES[0])].tolist() == list(SPIKES[1])
+
+
+def _fit(record, **changes):
+    return result_document(islands.fit(record, **LINEAR | changes).search_result)["data"]
+
+
+def _fit_outputs(record):
+    other = replace(record, y=np.nan_to_num(record.y) ** 2, measured=None, output_name="z")
+    return islands.fit_coupled(CoupledRecord((record, other)), **LINEAR).document()["outputs"][0]["data"]
+
+
+@pytest.mark.ci  # searches
+@pytest.mark.parametrize(
+    "find",
+    [
+        _fit,
+        lambda record: _fit(record, average=2),
+        lambda record: _fit(islands.preprocess(record, lowpass=0.3)),
+        lambda record: _fit(islands.preprocess(record, decimate=2)),
+        _fit_outputs,
+        lambda record: islands.diagnose(record, "linear:1").document["data"],
+    ],
+    ids=["samples", "means", "filtered", "decimated", "outputs", "diagnosis"],
+)
+def test_every_result_states_its_errors_with_and_without_gross_errors(find):
+    found = find(read_with_spikes())["left_out"]
+    assert found["rmse_with"] > 3.0 * found["rmse"] > 0.0
 
 
 @pytest.mark.parametrize("step", [0.02, 1.0 / 30.0])

@@ -178,6 +178,7 @@ CASES = {
     "detail_separated": [
         named(next_experiment={"pairs": [{"causes": ["delay", "jump"], "recorded": {"is_sufficient": True}}]})
     ],
+    "detail_gross_errors": [named(data={"left_out": {"samples": 3, "rmse": 0.1, "rmse_with": 2.0}})],
     "detail_formula": [make_document("unknown", proposal={"explains": 0.73, "formula": "0.2*u^2"})],
     "detail_left_out": [make_document("stopped", left_out=["free forms", "planning"])],
     "detail_not_computed": [named(not_computed=[{"step": "figures", "reason": "the disk is full"}])],
