@@ -9,9 +9,9 @@ state space itself, so that one form serves every class of models.
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isnan
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError
@@ -34,6 +34,9 @@ from islands.models.equations import name_columns
 from islands.models.state_space import StateSpace
 from islands.records.channel_names import parse_unit
 from islands.rounding import ROUNDING
+
+if TYPE_CHECKING:
+    from numpy.polynomial import Polynomial
 
 #: Magnitudes of outputs between which equilibria are searched if they are not the roots of a polynomial.
 _MAGNITUDES = np.concatenate([[0.0], np.logspace(-9, 9, 1081)])
@@ -329,6 +332,8 @@ def _number_leaves(expression: Expression, leaves: Sequence[Lagged]) -> Expressi
 
 def _find_roots(block: Block, u: Sequence[float], where: str, within: tuple[float, float]) -> list[float]:
     """Return the outputs at which a block of one equation rests."""
+    from numpy.polynomial import Polynomial  # noqa: PLC0415 - ten modules, which few commands need
+
     pairs = [
         (block.parameters[term.weight] if term.weight else 1.0, _insert_parameters(block, term.expression))
         for term in block.equations[0]
@@ -357,8 +362,10 @@ def _find_roots(block: Block, u: Sequence[float], where: str, within: tuple[floa
     return sorted({float(root.real) for root in roots[np.abs(roots.imag) <= scale]})
 
 
-def _to_polynomial(expression: Expression, u: Sequence[float]) -> Polynomial | None:
+def _to_polynomial(expression: Expression, u: Sequence[float]) -> "Polynomial | None":
     """Return a steady state as a polynomial in the output, None if it is not one."""
+    from numpy.polynomial import Polynomial  # noqa: PLC0415 - as above
+
     match expression:
         case Lagged(channel, _):
             return Polynomial([0.0, 1.0]) if channel == 0 else Polynomial([u[channel - 1]])
@@ -390,7 +397,7 @@ def _call(primitive: Primitive, values: Sequence[float]) -> float:
 
 
 #: Primitives of polynomials.
-_ARITHMETIC: Mapping[str, Callable[[Polynomial, Polynomial], Polynomial]] = {
+_ARITHMETIC: Mapping[str, "Callable[[Polynomial, Polynomial], Polynomial]"] = {
     "mul": lambda a, b: a * b,
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
