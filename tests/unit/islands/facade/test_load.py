@@ -108,7 +108,7 @@ def test_a_model_file_starts_after_its_lags_and_has_no_bands(base, tmp_path):
     np.testing.assert_array_equal(loaded.simulate(read(base)).y, printed)
     with pytest.raises(islands.ModelError, match="bands need a model of a result folder"):
         loaded.bands(read(base))
-    assert repr(loaded).startswith("<FittedModel: y(k) =")
+    assert repr(loaded).startswith("<FittedModel: y_um(k) =")
     assert "</math>" in loaded._repr_html_()
 
 
