@@ -38,8 +38,7 @@ class SelectionProblem:
     fixed : tuple of Regressor
         Regressors of every model.
     free : tuple of Direction
-        Candidates, the simplest first; ties go to the first. Of candidates that are multiples of each other
-        on the record, the first one.
+        Candidates. Ties go to the first.
     gram : ndarray, shape (candidates + 1, candidates + 1)
         Inner products of the candidates and, last, the target.
     rows : int
@@ -68,30 +67,11 @@ def make_selection_problem(
     if isinstance(found, EvaluationOutcome):
         return found
     warm_up = max(item.maximum_lag for item in library)
-    free = sorted(found.free, key=_measure_complexity)
+    # Ties go to the first candidate: take the one of the lowest degree.
+    free = sorted(found.free, key=lambda direction: max(item.degree for item in direction.regressors))
     gram = gram_matrix([*(direction.expression for direction in free), found.target], record, warm_up)
-    kept = _find_distinct(gram[:-1, :-1])
-    places = np.append(kept, len(free))
     rows = sum(max(0, length - warm_up) for length in record.segments)
-    return SelectionProblem(
-        found.fixed, tuple(free[place] for place in kept), gram[np.ix_(places, places)], rows
-    )
-
-
-def _measure_complexity(direction: Direction) -> tuple[int, int]:
-    """Return the degree of a candidate, and the size of its expression."""
-    return max(item.degree for item in direction.regressors), sum(1 for _ in walk(direction.expression))
-
-
-def _find_distinct(gram: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the candidates that are not a multiple of an earlier one on the record.
-
-    Rounding would choose between a constant and the sign of a positive output.
-    """
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        norms = np.sqrt(np.diag(gram))
-        is_multiple = 1.0 - (gram / norms[:, None] / norms) ** 2 <= RESOLUTION**2
-    return np.flatnonzero(~np.triu(is_multiple, 1).any(axis=0))
+    return SelectionProblem(found.fixed, tuple(free), gram, rows)
 
 
 def forward_selection(
@@ -146,16 +126,17 @@ def select_forward(
     return tuple(structures)
 
 
-def select_pool(problem: SelectionProblem, max_terms: int) -> Sequence[Regressor]:
+def select_pool(
+    library: Sequence[Regressor], problem: SelectionProblem, max_terms: int
+) -> Sequence[Regressor]:
     """Return the regressors for a search by exchange.
 
-    They are those of the candidates or, if these are more than `MAX_POOL`, the largest structure of forward
-    selection and the candidates that would reduce its error most. Further steps of the selection would follow
-    the rounding of the record: a few hundred rows are explained by fewer terms than the pool has.
+    They are the library or, if it has more than `MAX_POOL`, the largest structure of forward selection and
+    the candidates that would reduce its error most. Further steps of the selection would follow the rounding
+    of the record: a few hundred rows are explained by fewer terms than the pool has.
     """
-    candidates = dict.fromkeys(item for direction in problem.free for item in direction.regressors)
-    if len(candidates | dict.fromkeys(problem.fixed)) <= MAX_POOL:
-        return canonical_order([*problem.fixed, *candidates])
+    if len(library) <= MAX_POOL:
+        return library
     chosen = froe(problem.gram, max_terms=max_terms).order
     pool: dict[Regressor, None] = dict.fromkeys(problem.compose(chosen))
     for at in _rank_by_gain(problem.gram, chosen):
@@ -177,3 +158,20 @@ def _rank_by_gain(gram: NDArray[np.float64], chosen: Sequence[int]) -> NDArray[n
     gain = (scaled[:-1, -1] - np.einsum("ij,i->j", parts[:, :-1], explained[:, -1])) ** 2
     gain = np.divide(gain, left, out=np.zeros_like(gain), where=left > ROUNDING)
     return np.argsort(-np.nan_to_num(gain), kind="stable")
+
+
+def find_simplest(problem: SelectionProblem) -> dict[Regressor, Regressor]:
+    """Return the simplest regressor that has the same column on the record, for every candidate.
+
+    The sign of a positive output is a constant, and its absolute value the output: rounding would choose.
+    """
+    single = [at for at, direction in enumerate(problem.free) if len(direction.regressors) == 1]
+    items = [problem.free[at].regressors[0] for at in single]
+    order = sorted(range(len(items)), key=lambda at: sum(1 for _ in walk(items[at].expression)))
+    places = np.array([single[at] for at in order], np.int64)
+    gram = problem.gram[np.ix_(places, places)]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        norms = np.sqrt(np.diag(gram))
+        same = np.abs(gram / norms[:, None] / norms) >= 1.0 - RESOLUTION**2
+    np.fill_diagonal(same, True)
+    return {items[at]: items[order[first]] for at, first in zip(order, same.argmax(axis=0), strict=True)}

@@ -161,7 +161,7 @@ def make_problem(record: Dataset, settings: Settings, steps: Steps | None = None
         structures = select_forward(selection, settings.max_terms)
         seeds = tuple(tuple(genes[item] for item in structure) for structure in structures)
         if settings.swap_search:
-            exchanged = select_pool(selection, settings.max_terms)
+            exchanged = select_pool(library, selection, settings.max_terms)
     if settings.swap_search:
         pool = [genes[item] for item in exchanged]
         evaluator = Evaluator(record, settings, threads=count_cpus())

@@ -12,6 +12,7 @@ from islands.estimation.estimator_table import make_criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
     Structure,
+    find_simplest,
     make_selection_problem,
     select_forward,
     select_pool,
@@ -49,7 +50,7 @@ from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.candidate_library import full_set
-from islands.models.narx import Model
+from islands.models.narx import Model, canonical_order
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
@@ -381,9 +382,13 @@ def _select(
             is_given = len(searches) <= len(subsets)
             started.append(subsets[len(searches) - 1] if is_given else searches[-1].structures)
             starts += started[-1]
-        exchanged = select_pool(problem, settings.max_terms)
+        exchanged = select_pool(pool, problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, steps)]
-        structures += [(structure, offsets) for structure in chosen]
+        simplest = find_simplest(problem)
+        structures += [
+            (tuple(canonical_order(simplest.get(item, item) for item in structure)), offsets)
+            for structure in chosen
+        ]
     return list(dict.fromkeys(structures)), tuple(searches), tuple(started), warm_up
 
 

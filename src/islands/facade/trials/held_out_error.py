@@ -133,7 +133,7 @@ def _select(
     shooting = min(_SHOOTING, max(1, record.samples // 10))
     by_size = swap_search(
         Evaluator(record, library.make_settings(_SWAP_TERMS, shooting), threads=count_cpus()),
-        [item.expression for item in select_pool(problem, _SWAP_TERMS)],
+        [item.expression for item in select_pool(pool, problem, _SWAP_TERMS)],
         [
             tuple(item.expression for item in structure)
             for structure in structures
