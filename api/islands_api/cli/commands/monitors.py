@@ -43,14 +43,16 @@ class RecordJobSettings:
 @with_settings
 def add(
     *,
-    records: options.RecordsOrNone = None,
+    records: Annotated[
+        list[Path] | None, typer.Argument(metavar="RECORD...", help="Records to add, as for islands fit.")
+    ] = None,
     monitor: Annotated[
         str | None, typer.Option("--monitor", help="Id of a monitor; without one, a new one is created.")
     ] = None,
     diagnosis: Annotated[
         str | None,
         typer.Option(
-            "--diagnosis", help="Id of a discrepancy job whose simulation a new monitor follows, or:"
+            "--diagnosis", help="Id of a discrepancy job whose simulation is followed, or give --simulation."
         ),
     ] = None,
     simulated: Annotated[
@@ -66,6 +68,7 @@ def add(
     reading: ReadingOptions,
     url: Url = LOCAL,
     key: ApiKey = None,
+    as_json: Json = False,
     watch: Annotated[
         bool, typer.Option("--watch/--no-watch", help="Wait until the records are analysed, and show them.")
     ] = True,
@@ -88,7 +91,7 @@ def add(
     with open_client(url, key) as client:
         if monitor is None:
             made = client.create_monitor(diagnosis, **described)
-            _show_status(made, as_json=False)
+            _show_status(made, as_json)
             monitor = made.id
         elif given := [each for each, value in {"diagnosis": diagnosis, **described}.items() if value]:
             raise SettingsError(f"{given[0]} is of a new monitor: leave it out, or leave out --monitor")

@@ -43,7 +43,7 @@ def test_the_states_of_a_monitor_are_shown_and_downloaded(
     run: Run, command_line: Run, service: Service, tmp_path: Path
 ) -> None:
     saved = reject_record(follow(make_records(1)), "short.csv", "", "it is too short")
-    monitor = run(*CREATE)[1].split()[1].rstrip(":")
+    monitor = json.loads(run(*CREATE, "--json")[1])["id"]
     submission = Submission(LOCAL_OWNER, {}, MONITORING, priority=100, monitor=monitor)
     job, _ = service.store.jobs.submit(submission)
     texts = monitor_to_json(saved), json.dumps(monitor_document(saved))
