@@ -166,7 +166,17 @@ PLAN = {
 }
 
 
-@pytest.mark.parametrize(("template", "cases"), [("record", RECORD), ("monitor", MONITOR), ("plan", PLAN)])
+LEVEL = SimpleNamespace(name="h", lower=0.0, unit="m")
+EXTENSION = {
+    "offset": [{"title": "offset of the input", "input": "q", "state": LEVEL, "loss": 0.01}],
+    "output": [{"end": -0.3, "limit": 0.0, "unit": unit, "state": LEVEL} for unit in ("m", "")],
+}
+
+
+@pytest.mark.parametrize(
+    ("template", "cases"),
+    [("record", RECORD), ("monitor", MONITOR), ("plan", PLAN), ("extension", EXTENSION)],
+)
 def test_each_statement_is_complete(template, cases):
     check_template(template, cases)
 

@@ -36,6 +36,7 @@ from islands.expressions.tree import (
 from islands.records.dataset import Dataset
 from islands.records.signal_ranges import measure_ranges
 from islands.rounding import RESOLUTION
+from islands.sentences import write_one
 from islands.simulators.extended import ExtendedSimulator
 from islands.simulators.interface import Simulator
 from islands.simulators.intersample import ResampledSimulator
@@ -562,13 +563,8 @@ def _check_offsets(fit: CalibrationResult, system: OdeSystem) -> Iterator[str]:
         alone, extended = (_compute_balance(fit, system, effect, each) for each in (False, True))
         if alone is None or extended is None or not alone >= 0.0 > extended:
             continue
-        unit = f" {state.unit}" if state.unit else ""
-        yield (
-            f"{get_title(effect.name).capitalize()}: with {system.input} = 0 and {state.name} at its limit "
-            f"of {state.lower:g}{unit}, the extended simulation still takes away {-extended:.3g}{unit}/s. "
-            "It is valid above the limit only, or the cause is another one, such as an outflow that depends "
-            f"on {state.name}."
-        )
+        quantities = {"title": get_title(effect.name), "input": system.input, "state": state}
+        yield write_one("extension", "offset", loss=-extended, **quantities)
 
 
 def _compute_balance(
@@ -625,8 +621,4 @@ def _check_output(fit: CalibrationResult, system: OdeSystem) -> Iterator[str]:
     ):
         if is_beyond:
             unit = fit.simulation.context.output_unit
-            yield (
-                f"The output of the extended simulation reaches {end:.3g} {unit}, beyond the limit of "
-                f"{limit:g} {unit} that the simulation states for {state.name}: this is possible for an "
-                "error of the sensor only."
-            )
+            yield write_one("extension", "output", end=end, limit=limit, unit=unit, state=state)

@@ -168,7 +168,7 @@ ADEQUATE = {"residual.verdict": "adequate", "residual.predictable_share.free_run
 #: The same for a result of two outputs; the second one is changed.
 COUPLED = {
     "equations": [{}, {"models.0.kind": "coupled-latent"}],
-    "finding_left_out": [{"data": {"left_out": {"samples": 3, "rmse": 0.1, "rmse_with": 2.0}}}],
+    "finding_left_out": [{"data.left_out": {"samples": 3, "rmse": 0.1, "rmse_with": 2.0}}],
     "error": [{}, {"metrics.validation.free_run": LOST[f"{METRICS}.free_run"], "bands": None}],
     "essence_verdict": [{}],
     "essence_errors": [{}],
