@@ -97,13 +97,10 @@ def test_file_for_validation_is_held_out_as_a_whole(folder: Path) -> None:
         (("--simulation", "bouc-wen-piezo:none.json"), "none.json cannot be read as JSON"),
         (("--simulation", "model:none.json"), "none.json"),
         (("--simulation", "column:y_sim"), "no column y_sim"),
-        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
+        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "tolerance is NAME=VALUE"),
         (("--simulation", "bouc-wen-piezo", "--tolerance", "mass=0.1"), "has no parameter 'mass'"),
         (("--simulation", "bouc-wen-piezo", "--input", "theirs_um"), "is driven by one input"),
-        (
-            ("--simulation", "bouc-wen-piezo", "--noise-level", "0"),
-            "the noise level is the standard deviation",
-        ),
+        (("--simulation", "bouc-wen-piezo", "--noise-level", "0"), "noise_level is a number above 0"),
     ],
 )
 def test_invalid_option_is_rejected_with_a_one_line_message(
