@@ -1,0 +1,345 @@
+"""Search for the order, the dead times and the noise of a linear model."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from islands.errors import RecordError
+from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
+from islands.estimation.linear.regression import Fit, Structure, minimise, project
+from islands.estimation.linear.sections import Signal, Signals, find_poles, pair_poles
+from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
+from islands.records.noise_model import fit_noise
+
+#: Samples of the part of a record on which starts and dead times are searched.
+_PART = 6000
+
+#: Dead times that are tried first, and changes that are tried then.
+_COARSE, _CHANGES = (0, 1, 2, 3, 5, 8, 12, 17, 23, 30, 40, 55, 75, 100), (-1, 1, -2, 2, -4, 4)
+
+#: Starts whose dead times are tried, starts that are minimised, and orders without a gain that end a search.
+_PLACED, _MINIMISED, _PATIENCE = 8, 3, 2
+
+#: Orders up to which every start is tried; those of the ARX model follow.
+_SMALL = 2
+
+#: Changes of a structure that are minimised, those of the least criterion first.
+_NEIGHBOURS = 5
+
+#: Largest order of the autoregression of the noise.
+_NOISE_ORDER = 16
+
+
+def identify_linear(
+    u: NDArray[np.float64],
+    y: NDArray[np.float64],
+    dt: float = 1.0,
+    segments: Sequence[int] = (),
+    *,
+    max_order: int = 12,
+    max_dead_time: int = 60,
+    feedthrough: bool = False,
+) -> LinearModel:
+    """Identify a linear model of the least information criterion.
+
+    Parameters
+    ----------
+    u : ndarray, shape (samples, inputs)
+    y : ndarray, shape (samples,) or (samples, outputs)
+    dt : float
+        Sampling time in seconds.
+    segments : sequence of int
+        Lengths of the recordings in samples; one recording if empty.
+    max_order : int
+        Largest number of poles, 0 to 40.
+    max_dead_time : int
+        Largest dead time in samples; not more than a sixth of the shortest recording.
+    feedthrough : bool
+        Whether an output may read an input of the same sample. In closed loop it must not.
+
+    Returns
+    -------
+    LinearModel
+
+    Raises
+    ------
+    RecordError
+        The arrays do not fit together, have missing values, or are too short.
+    """
+    u, y = (np.asarray(each, dtype=np.float64).reshape(len(each), -1) for each in (u, y))
+    lengths = tuple(segments) or (len(y),)
+    if len(u) != len(y) or sum(lengths) != len(y):
+        raise RecordError(
+            f"u, y and segments must have equal lengths, got {len(u)}, {len(y)} and {sum(lengths)} samples"
+        )
+    if not (np.isfinite(u).all() and np.isfinite(y).all()):
+        raise RecordError("a linear identification needs all samples: fill or cut out missing values")
+    if len(y) < 10:
+        raise RecordError(f"a linear identification needs at least 10 samples, got {len(y)}")
+    signals, scales = scale_signals(u, y, dt, lengths)
+    longest = min(max_dead_time, min(lengths) // 6)
+    # On small matrices, several threads take a hundred times as long, and sums have other bits.
+    with threadpool_limits(1, user_api="blas"):
+        fits = _search(signals, longest, max_order, feedthrough)
+        best = min(fits, key=attrgetter("criterion"))
+        return make_model(signals, best, scales, list(map(_describe, fits)))
+
+
+def _describe(fit: Fit) -> LinearCandidate:
+    structure, error = fit.structure, float(np.sqrt(np.mean(fit.residual**2)))
+    return LinearCandidate(structure.order, structure.integrators, fit.criterion, error)
+
+
+def scale_signals(
+    u: NDArray[np.float64], y: NDArray[np.float64], dt: float, segments: Sequence[int] = ()
+) -> tuple[Signals, Scales]:
+    """Return signals of mean 0 and standard deviation 1, and their units.
+
+    Parameters
+    ----------
+    u, y : ndarray, shapes (samples, inputs) and (samples,) or (samples, outputs)
+    dt : float
+    segments : sequence of int
+        Lengths of the recordings in samples.
+    """
+    u, y = u.reshape(len(u), -1), y.reshape(len(y), -1)
+    means, units = zip(*((each.mean(axis=0), each.std(axis=0)) for each in (u, y)), strict=True)
+    (u0, y0), (u_unit, y_unit) = means, [np.where(each > 0.0, each, 1.0) for each in units]
+    ends = np.cumsum(segments or (len(u),), dtype=np.int64)
+    u, y = np.ascontiguousarray(((u - u0) / u_unit).T), np.ascontiguousarray(((y - y0) / y_unit).T)
+    return Signals(u, y, ends), Scales(u0, u_unit, y0, y_unit, dt)
+
+
+def _search(signals: Signals, longest: int, max_order: int, feedthrough: bool) -> list[Fit]:
+    """Return the best fit of every order, on a part of a long record first."""
+    search = Search(_take_part(signals), longest, max_order, feedthrough)
+    found = search.run()
+    best = search.improve(min(found, key=attrgetter("criterion")))
+    found = [each for each in found if each.structure.order != best.structure.order] + [best]
+    if signals.samples <= _PART:
+        return found
+    # More samples show more: orders that a part rejects are compared again.
+    larger = [
+        project(signals, each.structure) for each in found if each.structure.order >= best.structure.order
+    ]
+    return [minimise(signals, each, 20, 1e-2) for each in larger if each is not None]
+
+
+def _take_part(signals: Signals) -> Signals:
+    """Return the signals, of a long record consecutive samples where the inputs vary most."""
+    if signals.samples <= _PART:
+        return signals
+    begins = range(0, signals.samples - _PART + 1, _PART)
+    spreads = [
+        float(np.log(signals.u[:, begin : begin + _PART].var(axis=1) + 1e-12).sum()) for begin in begins
+    ]
+    begin = begins[int(np.argmax(spreads))]
+    return signals.keep(begin, begin + _PART)
+
+
+class Search:
+    """Search for fits of increasing order."""
+
+    def __init__(self, signals: Signals, longest: int, max_order: int, feedthrough: bool) -> None:
+        self.signals, self.longest, self.max_order, self.feedthrough = (
+            signals,
+            longest,
+            max_order,
+            feedthrough,
+        )
+        self.high: HighOrder | None = None
+        self.fits: dict[int, Fit] = {}
+
+    def run(self) -> list[Fit]:
+        """Return the best fit of every order that was reached."""
+        shape = len(self.signals.y), len(self.signals.u)
+        self.high = fit_high_order(self.signals, self.longest)
+        static = Structure((), 0, np.zeros(shape, np.int64), np.ones(shape, bool), (np.zeros(0),) * shape[0])
+        self._keep(self._fit([static]))
+        for order in range(1, min(_SMALL, self.max_order) + 1):
+            self._keep(self._fit(list(self._starts(order))))
+        for fit in self._reduce():
+            self._keep(self._colour(fit))
+        return self._grow()
+
+    @property
+    def best(self) -> Fit:
+        """Fit of the least criterion."""
+        return min(self.fits.values(), key=attrgetter("criterion"))
+
+    def _keep(self, fit: Fit | None) -> None:
+        """Keep a fit that is the best of its order."""
+        if fit is not None:
+            order = fit.structure.order
+            self.fits[order] = min(self.fits.get(order, fit), fit, key=attrgetter("criterion"))
+
+    def _reduce(self) -> list[Fit]:
+        """Return the two most promising fits that begin with the ARX model."""
+        if self.high is None:
+            return []
+        found = []
+        for order in range(_SMALL + 1, min(self.max_order, self.high.vectors.shape[1]) + 1):
+            structure = self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
+            start = project(self.signals, structure)
+            if start is not None:
+                found.append(minimise(self.signals, start, 6, 1.0))
+        return sorted(found, key=attrgetter("criterion"))[:2]
+
+    def _grow(self) -> list[Fit]:
+        """Add orders after the best one as long as one of a few reduces the criterion."""
+        order = self.best.structure.order
+        while order < min(self.max_order, self.best.structure.order + _PATIENCE):
+            order += 1
+            self._keep(self._fit(list(self._starts(order))))
+        return [self.fits[order] for order in sorted(self.fits)]
+
+    def _starts(self, order: int) -> Iterator[Structure]:
+        """Yield structures of an order: of the ARX model, and smaller ones with further poles."""
+        samples = self.signals.samples
+        smaller, smallest = self.fits.get(order - 1), self.fits.get(order - 2)
+        if self.high is not None and order <= self.high.vectors.shape[1]:
+            yield self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
+        if smaller is not None:
+            for pole in grid_real(samples):
+                yield self._extend(smaller.structure, pole)
+        if smallest is not None:
+            for pair in grid_pairs(samples):
+                yield self._extend(smallest.structure, pair)
+
+    def _extend(
+        self,
+        structure: Structure,
+        poles: Iterable[complex],
+        delays: NDArray[np.int64] | None = None,
+        integrators: int | None = None,
+    ) -> Structure:
+        """Return a structure with further poles, or with other ones and their dead times."""
+        kept = find_poles(structure.sections) if delays is None else ()
+        delays = structure.delays if delays is None else delays
+        leads = structure.leads
+        if structure.order == 0:
+            leads = np.zeros_like(leads)
+            delays = np.maximum(delays - structure.leads, 0) if delays is structure.delays else delays
+        noise = (np.zeros(0),) * len(structure.noise)
+        kind = structure.integrators if integrators is None else integrators
+        sections = tuple(pair_poles([*kept, *poles]))
+        return Structure(sections, kind, delays, leads & (delays > 0), noise, structure.held)
+
+    def _fit(self, structures: Sequence[Structure]) -> Fit | None:
+        """Return the best fit that the most promising structures lead to."""
+        tried = [each for each in (project(self.signals, structure) for structure in structures) if each]
+        tried = sorted(tried, key=attrgetter("deviance"))
+        if tried and tried[0].structure.order <= 2:
+            tried = sorted((self._place(each) for each in tried[:_PLACED]), key=attrgetter("deviance"))
+        refined = [self._move_delays(minimise(self.signals, each, 8, 1.0)) for each in tried[:_MINIMISED]]
+        return self._colour(min(refined, key=attrgetter("deviance"))) if refined else None
+
+    def improve(self, fit: Fit) -> Fit:
+        """Return the fit after changes of its structure, as long as one reduces the criterion."""
+        improved = True
+        while improved:
+            improved = False
+            tried = [project(self.signals, each) for each in self._list_neighbours(fit.structure)]
+            for start in sorted(filter(None, tried), key=attrgetter("criterion"))[:_NEIGHBOURS]:
+                found = minimise(self.signals, start, 15, 0.1)
+                # An order that is too large hides a wrong dead time.
+                if found.structure.order < fit.structure.order:
+                    found = self._move_delays(found)
+                if found.criterion < fit.criterion - 1e-6:
+                    fit, improved = self._colour(found), True
+                    break
+        return fit
+
+    def _list_neighbours(self, structure: Structure) -> Iterator[Structure]:
+        """Yield a smaller structure, one with an integrator, and those with other fractions of dead times."""
+        poles = find_poles(structure.sections)
+        modes = [pole for pole in poles if pole.imag >= 0.0]
+        for mode in sorted(modes, key=abs):
+            left = [pole for pole in poles if pole not in (mode, mode.conjugate())]
+            smaller = replace(structure, sections=tuple(pair_poles(left)))
+            yield smaller
+            # With a pole near 0, an order reads the lags of the order below and a fraction.
+            if left:
+                delays = structure.delays + ~structure.leads
+                yield replace(smaller, leads=np.ones_like(structure.leads), delays=delays)
+        real = [pole for pole in poles if pole.imag == 0.0 and pole.real > 0.0]
+        if real and not structure.integrators:
+            left = [pole for pole in poles if pole != max(real, key=abs)]
+            yield replace(structure, sections=tuple(pair_poles(left)), integrators=1)
+        if structure.order == 0:
+            return
+        for place in np.ndindex(structure.delays.shape):
+            for change in (-1,) if structure.leads[place] else (0, 1):
+                leads, delays = structure.leads.copy(), structure.delays.copy()
+                leads[place] = not leads[place]
+                delays[place] += max(change, 0)
+                if not leads[place] or delays[place] > 0 or self.feedthrough:
+                    yield replace(structure, leads=leads, delays=delays)
+
+    def _place(self, fit: Fit) -> Fit:
+        """Return the fit with the best of a few dead times of every input, one after the other."""
+        for output, place in np.ndindex(fit.structure.delays.shape):
+            for delay in _COARSE:
+                found = self._with_delay(fit, output, place, delay)
+                fit = found if found is not None and found.deviance < fit.deviance else fit
+        return fit
+
+    def _with_delay(self, fit: Fit, output: int, place: int, delay: int) -> Fit | None:
+        least = int(fit.structure.leads[output, place] and fit.structure.order > 0 and not self.feedthrough)
+        if not least <= delay <= self.longest:
+            return None
+        delays = fit.structure.delays.copy()
+        delays[output, place] = delay
+        return project(self.signals, replace(fit.structure, delays=delays))
+
+    def _move_delays(self, fit: Fit) -> Fit:
+        """Return the fit with dead times that were moved as long as the error falls."""
+        changes = _CHANGES if fit.structure.order <= 2 else _CHANGES[:2]
+        improved = True
+        while improved:
+            improved = False
+            for output, place in np.ndindex(fit.structure.delays.shape):
+                for change in changes:
+                    delay = int(fit.structure.delays[output, place]) + change
+                    moved = self._with_delay(fit, output, place, delay)
+                    if moved is None:
+                        continue
+                    moved = minimise(self.signals, moved, 4, 2.0)
+                    if moved.deviance < fit.deviance - 1e-3:
+                        fit, improved = moved, True
+        return fit
+
+    def _colour(self, fit: Fit) -> Fit:
+        """Return the minimum with the noise of its residual, and with other inputs before the recordings."""
+        best = minimise(self.signals, fit, 20, 1e-2)
+        if best.structure.delays.any():
+            found = project(self.signals, replace(best.structure, held=not best.structure.held))
+            if found is not None:
+                found = self._move_delays(minimise(self.signals, found, 20, 1e-2))
+                best = min(best, found, key=attrgetter("criterion"))
+        sizes = [each.size for each in best.structure.noise]
+        for _ in range(2):
+            noise = self._fit_noise(best)
+            if [each.size for each in noise] == sizes:
+                break
+            sizes = [each.size for each in noise]
+            start = project(self.signals, replace(best.structure, noise=noise))
+            if start is None:
+                break
+            found = minimise(self.signals, self._move_delays(minimise(self.signals, start, 8, 0.1)), 20, 1e-2)
+            if found.criterion >= best.criterion:
+                break
+            best = found
+        return best
+
+    def _fit_noise(self, fit: Fit) -> tuple[Signal, ...]:
+        """Return the autoregression of the residual of every output."""
+        intervals = fit.structure.find_intervals(self.signals)
+        lengths = [end - begin for begin, end in intervals]
+        kept = np.concatenate([np.arange(begin, end) for begin, end in intervals])
+        limit = min(_NOISE_ORDER, min(lengths) // 10)
+        return tuple([fit_noise(each[kept], limit, lengths, ()).coefficients for each in fit.residual])
