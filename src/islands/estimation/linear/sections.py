@@ -56,7 +56,8 @@ class Signals:
             [int(np.argmax(np.append(x[begin:end] != x[begin], True))) for x in self.u]
             for begin, end in self.bounds
         ]
-        return np.min(np.array(kept, np.int64), axis=0)
+        least: NDArray[np.int64] = np.min(np.array(kept, np.int64), axis=0)
+        return least
 
     def keep(self, begin: int, end: int) -> "Signals":
         """Return the samples of an interval."""
