@@ -14,7 +14,7 @@ import numpy as np
 
 from islands.estimation.linear.identify import identify_linear
 from islands.estimation.linear.model import LinearModel
-from islands.models.linear_system import list_modes, measure_mode
+from islands.models.state_space import list_modes, measure_mode
 from lab.linear.oracle import fit_from_truth
 from lab.linear.plants import Trial, make_trial
 

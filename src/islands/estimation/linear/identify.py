@@ -185,6 +185,8 @@ class Search:
         for order in range(_SMALL + 1, min(self.max_order, self.high.vectors.shape[1]) + 1):
             structure = self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
             start = project(self.signals, structure)
+            # Without the noise, poles of a closed loop would move away from the consistent ones.
+            start = start and project(self.signals, replace(structure, noise=self._fit_noise(start)))
             if start is not None:
                 found.append(minimise(self.signals, start, 6, 1.0))
         return sorted(found, key=attrgetter("criterion"))[:2]
@@ -316,7 +318,7 @@ class Search:
     def _colour(self, fit: Fit) -> Fit:
         """Return the minimum with the noise of its residual, and with other inputs before the recordings."""
         best = minimise(self.signals, fit, 20, 1e-2)
-        if best.structure.delays.any():
+        if best.structure.delays.any() and (best.structure.delays <= self.signals.rest).all():
             found = project(self.signals, replace(best.structure, held=not best.structure.held))
             if found is not None:
                 found = self._move_delays(minimise(self.signals, found, 20, 1e-2))

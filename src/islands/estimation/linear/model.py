@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from islands.estimation.linear.regression import Fit, Structure, linearise, move
 from islands.estimation.linear.sections import Section, Signal, Signals, find_poles
 from islands.kernels.state_space import simulate_state_space
-from islands.models.linear_system import LinearSystem, Quantity, measure_mode
+from islands.models.state_space import Quantity, StateSpace, measure_mode
 
 #: Part of a standard error by which parameters are moved for the derivatives of quantities.
 _STEP = 1e-3
@@ -106,9 +106,18 @@ class LinearModel:
         """Poles in discrete time."""
         return np.linalg.eigvals(self.a).astype(np.complex128)
 
-    def system(self, output: int = 0) -> LinearSystem:
-        """Return the state space of an output, without its dead times."""
-        return LinearSystem(self.a, self.b[output], self.c, self.d[output])
+    def state_space(self, output: int = 0) -> StateSpace:
+        """Return the linear system of an output about the operating point, with its dead times."""
+        return StateSpace(
+            A=self.a,
+            B=self.b[output],
+            C=self.c[None],
+            D=self.d[output, None],
+            dt=self.dt,
+            dead_times=tuple((self.delays[output] * self.dt).tolist()),
+            operating_inputs=tuple(self.u0.tolist()),
+            operating_outputs=(float(self.y0[output]),),
+        )
 
     def simulate(self, u: Signal, start: Signal | None = None) -> Signal:
         """Simulate the outputs.
@@ -188,7 +197,7 @@ def make_model(
         structure.delays,
         scales.dt,
         starts,
-        structure.skipped,
+        fit.skipped,
         structure.noise,
         np.sqrt(fit.squares / degrees) * scales.y_unit,
         quantities,

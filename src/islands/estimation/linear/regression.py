@@ -53,8 +53,8 @@ class Structure:
     noise : tuple of ndarray
         Autoregression of the noise of every output: ``v(k) = c1 v(k-1) + ... + e(k)``.
     held : bool
-        Whether every input had its first value before a recording. If not, outputs that read inputs before it
-        are not counted.
+        Whether an input that begins at rest had its first value before a recording. If not, outputs that read
+        inputs before it are not counted.
     """
 
     sections: tuple[Section, ...]
@@ -64,14 +64,18 @@ class Structure:
     noise: tuple[Signal, ...]
     held: bool = True
 
-    @property
-    def skipped(self) -> int:
-        """Samples of every recording that are not counted, and after which the initial states apply."""
-        return 0 if self.held else int(self.delays.max(initial=0))
+    def count_skipped(self, signals: Signals) -> int:
+        """Return the samples of every recording that are not counted; the initial states apply after them.
+
+        An input that changes before its dead time has passed was not at rest before the recording.
+        """
+        at_rest = self.held and bool((self.delays <= signals.rest).all())
+        return 0 if at_rest else int(self.delays.max(initial=0))
 
     def find_intervals(self, signals: Signals) -> list[tuple[int, int]]:
         """Return the first sample that is counted of every recording, and the sample after its last one."""
-        return [(begin + self.skipped, end) for begin, end in signals.bounds]
+        skipped = self.count_skipped(signals)
+        return [(begin + skipped, end) for begin, end in signals.bounds]
 
     @property
     def parts(self) -> tuple[Section, ...]:
@@ -107,6 +111,8 @@ class Fit:
         Sum of squares of the whitened error.
     counts : ndarray, shape (outputs,)
         Samples of the whitened error.
+    skipped : int
+        Samples of every recording that are not counted.
     """
 
     structure: Structure
@@ -115,6 +121,7 @@ class Fit:
     residual: Signal
     squares: Signal
     counts: Signal
+    skipped: int
 
     @property
     def deviance(self) -> float:
@@ -126,7 +133,7 @@ class Fit:
         """
         mean_squares = np.maximum(self.squares, np.finfo(float).tiny) / self.counts
         outputs, samples = self.residual.shape
-        free = outputs * self.structure.skipped * len(self.starts[0])
+        free = outputs * self.skipped * len(self.starts[0])
         return float(samples * np.log(mean_squares).sum() + 2.0 * free)
 
     @property
@@ -169,15 +176,16 @@ def project(signals: Signals, structure: Structure) -> Fit | None:
     squares = np.array([each.squares for each in found])
     if not np.isfinite(squares).all():
         return None
-    lost = [structure.skipped + noise.size for noise in structure.noise]
-    counts = [float(signals.samples - each * signals.ends.size) for each in lost]
+    skipped = structure.count_skipped(signals)
+    lost = [(skipped + noise.size) * signals.ends.size for noise in structure.noise]
     return Fit(
         structure,
         tuple([each.coefficients for each in found]),
         tuple([each.starts for each in found]),
         np.array([each.residual for each in found]),
         squares,
-        np.array(counts),
+        signals.samples - np.array(lost, np.float64),
+        skipped,
     )
 
 

@@ -49,6 +49,16 @@ class Signals:
         """Number of samples."""
         return int(self.y.shape[1])
 
+    @property
+    def rest(self) -> NDArray[np.int64]:
+        """Samples for which every input keeps the first value of a recording, at least, shape (inputs,)."""
+        kept = [
+            [int(np.argmax(np.append(x[begin:end] != x[begin], True))) for x in self.u]
+            for begin, end in self.bounds
+        ]
+        least: NDArray[np.int64] = np.min(np.array(kept, np.int64), axis=0)
+        return least
+
     def keep(self, begin: int, end: int) -> "Signals":
         """Return the samples of an interval."""
         ends = np.clip(self.ends, begin, end) - begin

@@ -73,6 +73,13 @@ def test_simulation_leaves_the_noise(two_inputs, model):
     assert model.deviations[0] == pytest.approx(0.02, rel=0.1)
 
 
+def test_state_space_has_the_gains_and_the_dead_times(model):
+    system = model.state_space()
+    assert system.dead_times == (2.0, 9.0)
+    gains = [find(model, "static gain", place)[0] for place in (1, 2)]
+    np.testing.assert_allclose(system.static_gain, [gains], 1e-9)
+
+
 def test_one_output_is_a_special_case_of_several(two_inputs, model):
     u, y = two_inputs
     both = identify_linear(u, np.column_stack([y, -3.0 * y]), max_order=1, max_dead_time=12)

@@ -16,7 +16,10 @@ from islands.estimation.linear.sections import Signals, respond_freely
 @pytest.fixture
 def signals():
     random = np.random.default_rng(1)
-    return Signals(random.normal(size=(2, 300)), random.normal(size=(1, 300)), np.array([140, 300]))
+    u, ends = random.normal(size=(2, 300)), np.array([140, 300])
+    for begin in (0, 140):
+        u[:, begin : begin + 3] = u[:, begin, None]  # at rest
+    return Signals(u, random.normal(size=(1, 300)), ends)
 
 
 @pytest.fixture
@@ -47,6 +50,15 @@ def test_sensitivities_are_derivatives_of_the_free_run(signals, structure):
 def test_residual_is_the_output_less_the_free_run(signals, structure):
     fit = project(signals, structure)
     np.testing.assert_allclose(fit.residual[0], signals.y[0] - simulate(signals, structure, fit), atol=1e-10)
+
+
+def test_outputs_that_read_inputs_before_a_recording_are_not_counted(signals, structure):
+    signals.u[0, 1] += 1.0
+    fit = project(signals, structure)
+    assert fit.skipped == 2
+    assert (fit.residual[0, [0, 1, 140, 141]] == 0.0).all()
+    signals.y[0, [0, 1, 140, 141]] = 1e3
+    assert project(signals, structure).squares == pytest.approx(fit.squares)
 
 
 def test_blocks_have_the_products_of_all_samples():
