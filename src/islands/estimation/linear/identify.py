@@ -277,6 +277,9 @@ class Search:
             left = [pole for pole in poles if pole not in (mode, mode.conjugate())]
             smaller = replace(structure, sections=tuple(pair_poles(left)))
             yield smaller
+            # A mode may describe the response to other inputs before the recordings.
+            if structure.held and (structure.delays <= self.signals.rest).all():
+                yield replace(smaller, held=False)
             # With a pole near 0, an order reads the lags of the order below and a fraction.
             if left:
                 delays = structure.delays + ~structure.leads
