@@ -24,6 +24,9 @@ _COARSE, _CHANGES = (0, 1, 2, 3, 5, 8, 12, 17, 23, 30, 40, 55, 75, 100), (-1, 1,
 #: Starts whose dead times are tried, starts that are minimised, and orders without a gain that end a search.
 _PLACED, _MINIMISED, _PATIENCE = 8, 3, 2
 
+#: Dead times that differ by less lead to the same minimum.
+_NEAR = 4
+
 #: Orders up to which every start is tried; those of the ARX model follow.
 _SMALL = 2
 
@@ -141,6 +144,15 @@ def _take_part(signals: Signals) -> Signals:
     return signals.keep(begin, begin + _PART)
 
 
+def _take_distant(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the first fit of each minimum: of an oscillation, half a period more inverts the gain."""
+    kept: list[Fit] = []
+    for fit in fits:
+        if all(np.abs(fit.structure.delays - each.structure.delays).max() > _NEAR for each in kept):
+            kept.append(fit)
+    return kept
+
+
 class Search:
     """Search for fits of increasing order."""
 
@@ -236,7 +248,8 @@ class Search:
         tried = [each for each in (project(self.signals, structure) for structure in structures) if each]
         tried = sorted(tried, key=attrgetter("deviance"))
         if tried and tried[0].structure.order <= 2:
-            tried = sorted((self._place(each) for each in tried[:_PLACED]), key=attrgetter("deviance"))
+            placed = [fit for each in tried[:_PLACED] for fit in self._place(each)]
+            tried = _take_distant(sorted(placed, key=attrgetter("deviance")))
         refined = [self._move_delays(minimise(self.signals, each, 8, 1.0)) for each in tried[:_MINIMISED]]
         return self._colour(min(refined, key=attrgetter("deviance"))) if refined else None
 
@@ -264,6 +277,9 @@ class Search:
             left = [pole for pole in poles if pole not in (mode, mode.conjugate())]
             smaller = replace(structure, sections=tuple(pair_poles(left)))
             yield smaller
+            # A mode may describe the response to other inputs before the recordings.
+            if structure.held and (structure.delays <= self.signals.rest).all():
+                yield replace(smaller, held=False)
             # With a pole near 0, an order reads the lags of the order below and a fraction.
             if left:
                 delays = structure.delays + ~structure.leads
@@ -282,13 +298,14 @@ class Search:
                 if not leads[place] or delays[place] > 0 or self.feedthrough:
                     yield replace(structure, leads=leads, delays=delays)
 
-    def _place(self, fit: Fit) -> Fit:
-        """Return the fit with the best of a few dead times of every input, one after the other."""
+    def _place(self, fit: Fit) -> list[Fit]:
+        """Return fits with a few dead times of every input, one after the other from the best one so far."""
+        every = [fit]
         for output, place in np.ndindex(fit.structure.delays.shape):
-            for delay in _COARSE:
-                found = self._with_delay(fit, output, place, delay)
-                fit = found if found is not None and found.deviance < fit.deviance else fit
-        return fit
+            best = min(every, key=attrgetter("deviance"))
+            found = [self._with_delay(best, output, place, delay) for delay in _COARSE]
+            every += [each for each in found if each is not None]
+        return every
 
     def _with_delay(self, fit: Fit, output: int, place: int, delay: int) -> Fit | None:
         least = int(fit.structure.leads[output, place] and fit.structure.order > 0 and not self.feedthrough)
