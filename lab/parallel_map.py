@@ -9,7 +9,7 @@ from islands.cli.console import print_message
 from islands.cli.engines import has_ray
 from islands.errors import EngineError
 from islands.parallel import ParallelMap
-from islands.processes import process_pool
+from islands.process_pool import process_pool
 
 
 @contextmanager

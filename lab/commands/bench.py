@@ -15,7 +15,8 @@ from islands.cli.console import output
 from islands.cli.output_folder import check_folder
 from islands.cli.progress_display import compile_kernels, progress
 from islands.errors import IslandsError
-from islands.processes import THREADS, block_sigint
+from islands.process_pool import block_sigint
+from islands.processes import THREADS
 from islands.progress import ProgressCallback
 from lab.speed.report import BenchmarkReport, check_goals, to_document
 from lab.speed.run import measure

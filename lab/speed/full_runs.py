@@ -14,7 +14,7 @@ from islands.evolution.generation import first_generation, step
 from islands.evolution.offspring import Offspring
 from islands.evolution.settings import Settings
 from islands.kernels.breeding import Individuals
-from islands.processes import prepare_process
+from islands.process_pool import prepare_process
 from islands.records.dataset import Dataset
 from lab.speed import kernel_evaluator
 from lab.speed.clock import cpu, wall

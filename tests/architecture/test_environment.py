@@ -14,7 +14,7 @@ NAMES = {"environ", "environb", "getenv", "getenvb"}
 
 SOURCES = sorted(
     path.relative_to(ROOT).as_posix()
-    for folder in ("services", "measurements", "api", "src/islands/cli", "src/islands/processes")
+    for folder in ("services", "api", "src/islands/cli")
     for path in (ROOT / folder).rglob("*.py")
 )
 

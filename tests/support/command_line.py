@@ -68,11 +68,11 @@ def islands(*arguments: object) -> Result:
     It starts no further processes, which would import everything for a part of a second of work, unless an
     argument asks for them.
     """
-    from islands import processes
+    from islands import process_pool
     from islands_api.cli.app import app
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(processes, "count_cpus", lambda: 1)
+        patch.setattr(process_pool, "count_cpus", lambda: 1)
         return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
 
 

@@ -45,7 +45,7 @@ from islands.facade.explain_residual import (
     explain_residual,
 )
 from islands.facade.results.complete_diagnosis import DIAGNOSIS_FILE, DiagnosisResult
-from islands.processes import process_pool
+from islands.process_pool import process_pool
 from islands.progress import Steps, report_part
 from islands.records.dataset import Dataset
 from islands.records.reading.options import ReadingOptions
