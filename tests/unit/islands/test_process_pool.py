@@ -133,7 +133,7 @@ def test_fork_server_starts_with_sigint_blocked_and_ends_at_an_error() -> None:
 def test_processes_end_with_the_one_that_started_them(number: signal.Signals) -> None:
     code = (
         "import time; from islands import process_pool; process_pool._PRELOADED = []\n"
-        "with processes.process_pool(2, start_after=0.0) as parallel_map:\n"
+        "with process_pool.process_pool(2, start_after=0.0) as parallel_map:\n"
         "    for seconds in parallel_map(lambda seconds: time.sleep(seconds) or seconds, (0.0, 0.0, 60.0)):\n"
         "        print(seconds, flush=True)"
     )
