@@ -42,6 +42,17 @@ def test_a_new_job_appears_and_changes_its_state(
     expect(page.get_by_role("status")).to_have_text("\u2068tank, level 3\u2069: failed")
 
 
+def test_a_name_cannot_reverse_the_text_around_it(
+    quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
+) -> None:
+    """A right-to-left override would turn "report\u202efdp.exe" into "reportexe.pdf" and all that follows."""
+    job = desk.submit(500, name="report\u202efdp")
+    link = row(quiet(desk.url).go(), job).locator("th a")
+    expect(link.locator("bdi")).to_have_text("report\u202efdp")
+    assert link.locator("bdi").evaluate("node => getComputedStyle(node).unicodeBidi") == "isolate"
+    desk.ask("POST", f"/v1/jobs/{job}/cancel")
+
+
 def test_a_row_shows_that_its_job_waits_for_capacity_and_why_it_failed(
     quiet: Callable[..., Screen], desk: ServiceClient, expect: Any
 ) -> None:

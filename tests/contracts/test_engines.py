@@ -165,6 +165,16 @@ def test_run_with_more_generations_continues_a_shorter_run(engine, history, sear
 
 
 @separate_actors(pytest.mark.nightly)
+def test_run_that_ended_between_stops_continues_to_the_same_stops(engine, history, search_problem):
+    shorter = replace(search_problem, settings=replace(SETTINGS, generations=5))
+    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never_stop)
+    assert stopped.archipelago.generation == 5
+    assert (
+        archipelagos(engine.run(search_problem, stopped.archipelago, never_stop)) == archipelagos(history)[3:]
+    )
+
+
+@separate_actors(pytest.mark.nightly)
 def test_stopped_engine_yields_no_further_epochs(engine, history, search_problem):
     seen = []
     for epoch in engine.run(search_problem, empty_archipelago(3, 7), lambda: len(seen) == 2):

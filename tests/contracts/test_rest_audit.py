@@ -98,3 +98,14 @@ def test_every_change_is_recorded_with_its_key_and_address(service):
         assert (entry.action, entry.subject) == (CHANGES[method, route], subject)
         assert (entry.owner, entry.key_id, entry.address) == ("me", key.id, "127.0.0.1")
     assert len(service.store.audit.entries()) == len(requests)
+
+
+def test_refused_and_repeated_requests_are_not_recorded(service):
+    order = spec(kept(service.store))
+    first = service.submit({"Idempotency-Key": "k"}, **order)
+    before = service.store.audit.entries()
+    assert [entry.key_id for entry in before] == [None]
+    assert service.submit({"Idempotency-Key": "k"}, **order).status_code == 202
+    service.submit(**{**order, "dataset": "gone-csv"})
+    assert service.client.delete(first.headers["location"]).status_code == 409
+    assert service.store.audit.entries() == before

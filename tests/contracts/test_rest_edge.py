@@ -35,6 +35,18 @@ def test_the_default_of_a_proxy_that_changes_the_host_is_accepted(behind_proxy):
         problem_of(behind_proxy.submit({**headers, SITE: site}, **order), 403, "cross-origin")
 
 
+@pytest.mark.parametrize("site", ["cross-site", "same-site", "same-origin"])
+def test_a_service_without_keys_believes_the_browser_about_the_site(service, site):
+    """A proxy on another port of this machine changes the host, and the browser knows it better."""
+    headers = {"Origin": "http://127.0.0.1:1", SITE: site}
+    answer = service.submit(headers, **spec(kept(service.store)))
+    assert answer.status_code == (202 if site == "same-origin" else 403)
+    rebound = {"Origin": "http://evil.example", "Host": "evil.example", SITE: "same-origin"}
+    assert "--require-keys" in problem_of(
+        service.client.get("/v1/jobs", headers=rebound), 403, "cross-origin"
+    )
+
+
 @pytest.mark.ci
 @pytest.mark.parametrize("prefix", ["", "/tools/islands"])
 def test_a_location_has_the_prefix_of_the_proxy(behind_proxy, prefix, monkeypatch):
@@ -63,6 +75,19 @@ def test_only_a_trusted_proxy_names_the_address_of_a_client(serve):
                 for number in range(6)
             ]
             assert {answer.status_code for answer in answers} == expected
+
+
+def test_the_last_untrusted_address_is_that_of_the_client(serve):
+    """A client may send X-Forwarded-For itself: the proxy appends the address that it sees."""
+    with serve(require_keys=True, trusted_proxies="127.0.0.1", rate=0.1, burst=20) as running:
+        answers = [
+            running.client.get(
+                "/v1/jobs",
+                headers={"Authorization": "Bearer x", "X-Forwarded-For": f"203.0.113.{number}, 198.51.100.7"},
+            )
+            for number in range(6)
+        ]
+    assert {answer.status_code for answer in answers} == {401, 429}
 
 
 @pytest.mark.parametrize("value", ["localhost", "10.0.0.1/8", "*", "10.0.0.0/33"])

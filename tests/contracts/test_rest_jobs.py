@@ -179,3 +179,12 @@ def test_figures_of_a_job_of_another_version_are_rejected(service):
     detail = problem_of(answer, 422, "invalid-settings")
     assert "this version of islands cannot read the job (colour: " in detail
     assert "submit it again" in detail
+
+
+def test_cached_figures_vary_with_the_key(service):
+    job = make_job_in_state(service, JobState.SUCCEEDED)
+    blob = service.app.state.islands.blobs.write(b"<svg/>" * 1000)
+    service.store.results.keep(job, {"1/loop.svg": blob})
+    headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers
+    assert headers["cache-control"] == "private, max-age=86400, immutable"
+    assert headers["vary"] == "Authorization, Accept-Encoding"

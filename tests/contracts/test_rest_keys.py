@@ -1,12 +1,13 @@
 """API keys over REST: authentication, scopes, owners, quotas and rate limits."""
 
+import socket
 import time
 
 import pytest
 
 from islands_api.web.routes import events
 from islands_service.store.keys import SCOPES
-from support.service import PATIENCE, held, kept, problem_of, queued, spec
+from support.service import PATIENCE, csv, held, kept, problem_of, queued, spec
 
 #: Routes that need a key, and the scope that they need.
 GUARDED = {
@@ -221,3 +222,27 @@ def test_the_rate_of_invalid_keys_of_an_address_is_limited(strict, wrong, least)
     assert int(answer.headers["retry-after"]) >= 1
     assert strict.client.get("/v1/jobs", headers=mine).status_code == 200
     assert strict.client.get("/healthz").status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/v1/datasets", "/v1/jobs"])
+def test_a_request_without_a_key_is_rejected_before_its_body(service, path):
+    """The response must arrive before the body is complete."""
+    with socket.create_connection(("127.0.0.1", service.port), PATIENCE) as client:
+        client.sendall(
+            f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000\r\n"
+            "Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n".encode()
+        )
+        assert client.recv(100).startswith(b"HTTP/1.1 401 ")
+
+
+@pytest.mark.parametrize(
+    ("form", "why"),
+    [
+        ([("file", ("a.csv", csv())), ("file", ("b.csv", csv()))], "Too many files"),
+        ([("file", ("a.csv", csv())), ("output", (None, "y" * 20_000))], "exceeded maximum size"),
+        ([("file", ("a.csv", csv())), *[("inputs", (None, "u"))] * 300], "Too many fields"),
+    ],
+)
+def test_forms_with_too_many_or_too_large_parts_are_rejected(service, form, why):
+    answer = service.client.post("/v1/datasets", files=form, headers=service.key())
+    assert why in problem_of(answer, 400, "bad-request")

@@ -151,6 +151,16 @@ def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
     assert isinstance(entry["exc_info"], ZeroDivisionError | KeyError)
 
 
+def test_an_unknown_commit_is_not_reported_as_failed(service):
+    """A client that takes it for a failure would repeat the request and create a duplicate."""
+    answer = service.client.post("/doubt")
+    detail = problem_of(answer, 504, "store-in-doubt")
+    assert CommitUnknownError.__doc__ in detail
+    assert "repeat the request with the same idempotency key" in detail
+    assert "10.0.0.7" not in answer.text
+    assert "retry-after" not in answer.headers
+
+
 def test_a_truncated_response_is_an_error_for_the_client(service):
     service.logs.clear()
     with pytest.raises(httpx.RemoteProtocolError, match="incomplete"):

@@ -36,6 +36,14 @@ def test_requests_from_pages_of_other_sites_are_rejected(service, method, origin
     assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
+@pytest.mark.parametrize("requested_method", ["GET", "POST", "DELETE"])
+def test_preflight_requests_for_other_sites_are_rejected(service, requested_method):
+    headers = {"Origin": "https://evil.example", "Access-Control-Request-Method": requested_method}
+    answer = service.client.options("/v1/jobs", headers=headers)
+    problem_of(answer, 403, "cross-origin")
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
 @pytest.mark.parametrize(
     "host",
     [

@@ -1,12 +1,14 @@
 """Tokens over REST: an issuer on this machine, owners, roles, rotation, an outage, and refused tokens."""
 
+import time
+
 import pytest
 
 from islands.errors import SettingsError
 from islands_api.__main__ import check_safe
 from islands_service.settings import ServiceSettings
 from support.issuers import AUDIENCE, encode_part, issuing, make_claims, make_key
-from support.service import emptied, kept, problem_of, spec
+from support.service import emptied, kept, problem_of, queued, spec
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +118,31 @@ def test_known_tokens_are_accepted_while_the_issuer_is_away(service, issuer, pat
     finally:
         issuer.away = False
         patient(10.0)
+
+
+def test_a_stream_ends_when_its_token_expires(service, issuer, monkeypatch):
+    from islands_api.web.routes import events
+
+    monkeypatch.setattr(events, "_KEEP_ALIVE_SECONDS", 0.05)
+    owner = owner_of(service, issuer)
+    job = queued(service.store, owner).id
+    token = issuer.token(exp=time.time() - 29.5)
+    began = time.monotonic()
+    with service.client.stream("GET", f"/v1/jobs/{job}/events", headers=bearer(token)) as stream:
+        assert stream.status_code == 200
+        assert sum(map(len, stream.iter_raw())) > 0
+    assert time.monotonic() - began < 10.0
+
+
+def test_refused_tokens_use_up_the_rate_of_their_address(serve, issuer):
+    settings = {"oidc_issuer": issuer.url, "oidc_audience": AUDIENCE, "http_hosts": "127.0.0.1"}
+    with serve(**settings, rate=0.001, burst=20) as service:
+        answers = [
+            service.client.get("/v1/jobs", headers=bearer(issuer.token(exp=1.0))).status_code
+            for _ in range(3)
+        ]
+        assert answers == [401, 401, 429]
+        assert service.client.get("/v1/jobs", headers=bearer(issuer.token())).status_code == 200
 
 
 def test_the_description_names_the_issuer_as_an_alternative_to_keys(service, issuer):

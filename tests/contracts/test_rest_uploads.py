@@ -141,6 +141,22 @@ def test_a_body_that_stalls_or_is_too_slow_is_a_problem_and_frees_everything(imp
     assert not receiving(impatient)
 
 
+def test_a_declared_length_above_the_quota_is_refused_before_the_body(service):
+    headers = service.key()
+    with started(service, headers, 6_000_000) as connection:
+        status, kind, detail, _ = answer(connection)
+    assert (status, kind) == (429, "quota-exceeded")
+    assert "this one has 5.9 MB, and 5.0 MB is the most" in detail
+
+
+def test_uploads_in_progress_count_towards_the_quota(service):
+    headers = service.key()
+    with started(service, headers, 4_000_000):
+        eventually(lambda: len(receiving(service)) == 1)
+        with started(service, headers, 4_000_000) as connection:
+            assert "uploads in progress 3.9 MB" in answer(connection)[2]
+
+
 def test_a_body_of_undeclared_length_ends_at_the_quota(service):
     sent = 0
     with started(service, service.key(), None) as connection:
@@ -166,6 +182,11 @@ def test_bodies_in_progress_are_on_the_disk_and_not_in_memory(service):
         eventually(lambda: sum(map(size, receiving(service))) > 3 * 4_500_000)
         assert resident_bytes() - before < 6_000_000
     eventually(lambda: not receiving(service))
+
+
+def test_a_key_without_the_scope_is_refused_before_the_body(service):
+    with started(service, service.key("read")) as connection:
+        assert answer(connection)[1] == "scope-missing"
 
 
 def test_a_small_record_does_not_wait_for_large_ones_of_others(service):

@@ -72,6 +72,17 @@ def test_the_client_creates_lists_and_deletes_webhooks(service, receiver):
         assert [each.id for each in client.webhooks()] == [made.id]
 
 
+def test_the_secret_of_a_webhook_is_shown_once(service, receiver):
+    made = service.client.post("/v1/webhooks", json={"url": receiver.url})
+    assert made.headers["cache-control"] == "no-store"
+    webhook = made.json()
+    assert webhook["events"] == sorted(EVENTS)
+    assert len(base64.b64decode(webhook.pop("secret").removeprefix("whsec_"))) == 32
+    assert service.client.get("/v1/webhooks").json() == {"items": [webhook]}
+    assert service.client.delete(f"/v1/webhooks/{webhook['id']}").status_code == 204
+    assert service.client.get("/v1/webhooks").json() == {"items": []}
+
+
 def test_a_finished_job_is_sent_with_a_signature_that_the_receiver_can_verify(service, receiver):
     """The signature is computed here from the text of the standard, not with the code of the service."""
     webhook = register(service, receiver.url)

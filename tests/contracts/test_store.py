@@ -26,6 +26,12 @@ from support.stores import (
 )
 
 
+def test_floats_are_stored_bit_for_bit(store):
+    spec = {"values": [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0]}
+    job = submitted(store, spec=spec)
+    assert repr(store.jobs.get(ALICE, job.id).spec) == repr(spec)
+
+
 @pytest.mark.parametrize(
     "change", [{"spec": {"seed": 8}}, {"kind": "other"}, {"name": "other"}, {"priority": 1}]
 )
@@ -68,6 +74,22 @@ def test_concurrent_requests_with_the_same_key_get_one_job(database):
             assert len({job.id for job, _ in answers}) == 1
             assert sum(new for _, new in answers) == 1
             assert len(stores[0].jobs.page(ALICE).jobs) == turn + 1
+
+
+def test_different_concurrent_requests_with_one_key_get_conflicts(database):
+    with open_stores(database) as stores:
+        answers = at_once(
+            [
+                lambda store=stores[i // 2 % 4], i=i: store.jobs.submit(
+                    asked(idempotency_key="k", spec={"seed": i % 2})
+                )
+                for i in range(MANY)
+            ]
+        )
+        refused = [answer for answer in answers if isinstance(answer, IdempotencyError)]
+        taken = [answer for answer in answers if isinstance(answer, tuple)]
+        assert (len(refused), len(taken)) == (MANY // 2, MANY // 2)
+        assert len({job.id for job, _ in taken}) == 1
 
 
 @pytest.mark.parametrize("quota", [1, 7])

@@ -1,5 +1,6 @@
 """Contract of the store for data sets, keys and retention."""
 
+from functools import partial
 from hashlib import sha256
 
 import pytest
@@ -9,6 +10,7 @@ from islands.errors import SettingsError
 from islands_service.domain.job import TERMINAL, DatasetDeletedError, JobState, QuotaError
 from islands_service.store import retention
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, dataset_id
+from islands_service.store.keys import PREFIX, SCOPES
 from islands_service.store.tables import datasets, jobs
 from support.stores import (
     ALICE,
@@ -18,11 +20,14 @@ from support.stores import (
     FAILED,
     FOUND,
     LONG,
+    MANY,
+    at_once,
     brought_on,
     claimed,
     commits,
     contents,
     job_in,
+    open_stores,
     submitted,
 )
 
@@ -51,6 +56,14 @@ def test_same_bytes_in_the_same_format_are_the_same_data_set(store):
     assert changed.id != dataset.id
 
 
+def test_owners_of_the_same_bytes_have_separate_data_sets(store):
+    (mine, _), (theirs, new) = added(store, ALICE), added(store, BOB)
+    assert new
+    assert mine.id == theirs.id
+    store.datasets.delete(ALICE, mine.id)
+    assert store.datasets.get(BOB, theirs.id) == theirs
+
+
 def test_data_sets_of_an_owner_are_limited_in_size(store):
     added(store, ALICE, 1, 600, most_bytes=1000)
     added(store, BOB, 1, 600, most_bytes=1000)
@@ -61,6 +74,13 @@ def test_data_sets_of_an_owner_are_limited_in_size(store):
     assert added(store, ALICE, 3, 400, most_bytes=1000)[1]
     # An existing data set needs no further space.
     assert not added(store, ALICE, 3, 400, most_bytes=1000)[1]
+
+
+def test_concurrent_uploads_get_exactly_the_allowed_bytes(database):
+    with open_stores(database) as stores:
+        answers = at_once([partial(added, stores[i % 4], ALICE, i, 100, most_bytes=550) for i in range(MANY)])
+        assert sum(isinstance(answer, QuotaError) for answer in answers) == MANY - 5
+        assert len(stores[0].datasets.page(ALICE)[0]) == 5
 
 
 def test_pages_of_data_sets_are_newest_first_and_hold_each_once(store):
@@ -147,11 +167,46 @@ def test_job_without_its_data_set_is_not_resumed(store):
     assert store.jobs.resume(ALICE, job.id).state == JobState.QUEUED
 
 
+def test_job_of_another_owner_does_not_block_a_deletion(store):
+    dataset, _ = added(store, ALICE)
+    added(store, BOB)
+    submitted(store, BOB, spec={"dataset": dataset.id})
+    store.datasets.delete(ALICE, dataset.id)
+
+
+def test_key_is_found_only_by_its_secret(store):
+    key, secret = store.keys.create("laptop", frozenset(SCOPES), ALICE)
+    assert store.keys.find(secret) == key
+    assert (key.owner, key.name, key.scopes) == (ALICE, "laptop", frozenset(SCOPES))
+    assert (key.expires, key.revoked, key.expired) == (None, None, False)
+    for wrong in (secret[:-1], secret + "a", secret.swapcase(), "", PREFIX, key.id):
+        assert store.keys.find(wrong) is None
+
+
 @pytest.mark.parametrize("scopes", [frozenset(), frozenset({"read", "rule"})])
 def test_key_with_an_unknown_scope_is_refused(store, scopes):
     with pytest.raises(SettingsError, match="take some of read, write, metrics"):
         store.keys.create("laptop", scopes)
     assert store.keys.all() == ()
+
+
+def test_key_expires(store):
+    lasting, secret = store.keys.create("a", READ, seconds=LONG)
+    over, old = store.keys.create("b", READ, seconds=-1.0)
+    assert (lasting.expired, over.expired) == (False, True)
+    assert lasting.expires == pytest.approx(lasting.created + LONG, abs=0.1)
+    assert (store.keys.find(secret).expired, store.keys.find(old).expired) == (False, True)
+
+
+def test_expired_and_revoked_keys_are_not_valid(store):
+    assert not store.keys.any_valid()
+    store.keys.create("expired", READ, seconds=-1.0)
+    key, _ = store.keys.create("revoked", READ)
+    assert store.keys.any_valid()
+    store.keys.revoke(key.id)
+    assert not store.keys.any_valid()
+    store.keys.create("lasting", READ, seconds=LONG)
+    assert store.keys.any_valid()
 
 
 def test_only_jobs_finished_long_ago_are_deleted(store):

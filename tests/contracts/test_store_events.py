@@ -114,6 +114,32 @@ def test_reader_that_continues_from_the_last_number_misses_nothing(database):
             assert seen == list(range(1, last + 1))
 
 
+def test_reader_that_sees_a_version_finds_its_event(database):
+    with open_stores(database, 2) as (writer, reader):
+        job = submitted(writer)
+        lease = claimed(writer)
+        over = threading.Event()
+
+        def write():
+            try:
+                for generation in range(100):
+                    writer.leases.report(lease, brought_on(generation))
+            finally:
+                over.set()
+
+        def read():
+            looks = 0
+            while not over.wait(0.001):
+                version = reader.jobs.versions([job.id])[job.id]
+                assert reader.jobs.events(job.id, version - 1)[0].number == version
+                looks += 1
+            return looks
+
+        written, looks = at_once([write, read])
+        assert written is None
+        assert looks > 0
+
+
 @pytest.mark.parametrize("waiting", [0, 3])
 def test_queue_statistics_count_the_jobs_of_all_owners(store, waiting):
     before = store.jobs.queue_statistics()

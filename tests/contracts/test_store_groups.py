@@ -97,6 +97,25 @@ def test_failed_operation_does_not_affect_its_group(store):
     assert kinds(store, job.id) == ["queued"]
 
 
+def test_writes_are_invisible_before_their_commit(database):
+    with open_stores(database, 2) as (one, other):
+        job = submitted(one)
+        written, seen = threading.Event(), threading.Event()
+
+        def slow(connection):
+            touched(connection, job.id)
+            written.set()
+            seen.wait(10)
+
+        thread = threading.Thread(target=one.database.write, args=(slow,))
+        thread.start()
+        written.wait(10)
+        assert kinds(other, job.id) == ["queued"]
+        seen.set()
+        thread.join()
+        assert kinds(other, job.id) == ["queued", "touched"]
+
+
 def test_closed_store_has_written_its_queue(database):
     store, answers = Store(database), []
 

@@ -9,6 +9,7 @@ from support.stores import (
     ALICE,
     BOB,
     CANCELLED,
+    EXPIRED,
     LONG,
     MANY,
     asked,
@@ -69,6 +70,23 @@ def test_smaller_jobs_do_not_overtake_a_large_one(store, claim):
     assert [size(claim()) for _ in range(5)] == [1, 1, 1, 1, None]
 
 
+def test_owner_whose_job_does_not_fit_delays_no_other(store, claim):
+    queue(store, ALICE, 3, 4)
+    assert size(claim()) == 3
+    queue(store, BOB, 1, 2)
+    assert [size(claim()) for _ in range(3)] == [1, 2, None]
+
+
+def test_waiting_for_islands_costs_no_turn(store, claim):
+    queue(store, ALICE, 3, 4)
+    large = claim()
+    queue(store, BOB, *[1] * 3)
+    assert [size(claim()) for _ in range(3)] == [1, 1, 1]
+    store.leases.finish(large, CANCELLED)
+    queue(store, BOB, 1)
+    assert size(claim()) == 4
+
+
 def test_accepted_job_runs_alone_after_the_quota_was_lowered(store, claim):
     job, _ = store.jobs.submit(asked(islands=8, spec={"islands": 8}, idempotency_key="k"), most_islands=8)
     queue(store, ALICE, 1)
@@ -90,6 +108,20 @@ def test_accepted_job_runs_alone_after_the_quota_was_lowered(store, claim):
     assert (size(small), claim()) == (1, None)
     store.leases.finish(small, CANCELLED)
     assert size(claim()) == 8
+
+
+def test_quota_of_zero_pauses_an_owner(store, claim):
+    queue(store, ALICE, 1)
+    store.owners.change(ALICE, {"max_islands": 0})
+    assert claim() is None
+    store.owners.change(ALICE, {"max_islands": None})
+    assert size(claim()) == 1
+
+
+def test_lost_job_is_taken_over_whatever_the_quota(store, claim):
+    queue(store, ALICE, 3)
+    claim(seconds=EXPIRED)
+    assert size(claim(1)) == 3
 
 
 @pytest.mark.ci

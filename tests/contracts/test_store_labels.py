@@ -2,7 +2,7 @@
 
 import pytest
 
-from islands_service.domain.job import JobOutcome, JobState
+from islands_service.domain.job import JobNotFoundError, JobOutcome, JobState
 from support.stores import ALICE, BLOB, BOB, claimed, job_in, kinds, submitted
 
 
@@ -26,6 +26,12 @@ def test_a_job_is_labelled_in_every_state(store, state):
     assert (changed.state, changed.spec, changed.summary) == (state, job.spec, job.summary)
     assert store.jobs.get(ALICE, job.id) == changed
     assert kinds(store, job.id) == [*before, "labelled"]
+
+
+def test_only_the_owner_labels_a_job(store):
+    job = submitted(store)
+    with pytest.raises(JobNotFoundError):
+        store.jobs.label(BOB, job.id, "mine")
 
 
 def test_a_tag_selects_the_jobs_that_have_exactly_it(store):

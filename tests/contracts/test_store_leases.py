@@ -41,6 +41,19 @@ def test_owner_with_its_quota_of_running_jobs_waits_and_others_do_not(store, own
     assert other.id in {lease.job.id for lease in leases}
 
 
+def test_concurrent_claims_do_not_exceed_the_quota_of_running_jobs(database):
+    with open_stores(database) as stores:
+        for _ in range(MANY):
+            submitted(stores[0])
+        answers = at_once(
+            [
+                lambda store=stores[i % 4], i=i: store.leases.claim(f"{i}", LONG, most_running=3)
+                for i in range(MANY)
+            ]
+        )
+        assert sum(lease is not None for lease in answers) == 3
+
+
 def test_every_job_is_claimed_once_by_concurrent_claimers(database):
     with open_stores(database) as stores:
         jobs = [submitted(stores[0], priority=each % 3) for each in range(24)]

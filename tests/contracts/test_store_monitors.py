@@ -193,6 +193,17 @@ def test_deletion_of_a_monitor_cancels_its_waiting_records(store):
     assert (entry.action, entry.subject) == ("delete-monitor", monitor.id)
 
 
+def test_a_monitor_of_another_owner_is_not_found(store):
+    monitor = created(store, BOB).id
+    reads = (store.monitors.get, store.monitors.load, store.monitors.result, store.monitors.saved)
+    for operation in (*reads, store.monitors.delete):
+        with pytest.raises(MonitorNotFoundError, match=monitor):
+            operation(ALICE, monitor)
+    with pytest.raises(MonitorNotFoundError):
+        submitted(store, ALICE, kind=MONITORING, monitor=monitor)
+    assert store.jobs.page(ALICE).jobs == ()
+
+
 @pytest.mark.ci
 def test_concurrent_coordinators_analyse_every_record_once_and_in_order(database):
     count, processes = 24, 4

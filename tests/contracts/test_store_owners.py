@@ -3,9 +3,11 @@
 import pytest
 
 from islands_service.domain.job import JobNotFoundError, JobState, JobStateError
+from islands_service.store.datasets import DatasetNotFoundError
 from support.stores import (
     ALICE,
     BOB,
+    FAILED,
     FOUND,
     brought_on,
     claimed,
@@ -47,6 +49,15 @@ def test_operation_is_allowed_only_in_its_states(store, ask, state):
         kinds(store, job.id)
 
 
+def test_late_cancel_request_does_not_discard_a_result(store):
+    job = submitted(store)
+    lease = claimed(store)
+    store.jobs.cancel(ALICE, job.id)
+    store.leases.finish(lease, FOUND)
+    assert store.jobs.get(ALICE, job.id).state == SUCCEEDED
+    assert kinds(store, job.id) == ["queued", "running", "cancelling", "succeeded"]
+
+
 def test_deleted_job_leaves_no_rows_and_other_jobs_are_unchanged(store):
     for _ in range(2):
         submitted(store)
@@ -77,3 +88,45 @@ def test_job_of_another_owner_is_not_found_and_unchanged(store, ask, state):
     # The message does not reveal that the job exists.
     assert messages[0] == messages[1]
     assert contents(store) == before
+
+
+def test_owner_cannot_see_data_of_another_owner(store):
+    theirs = submitted(store, BOB)
+    dataset, _ = store.datasets.add(BOB, "a.csv", ".csv", "1" * 64, 10, {})
+    assert store.jobs.page(ALICE).jobs == ()
+    assert store.jobs.page(ALICE, QUEUED, (theirs.created + 1, "f" * 32)).jobs == ()
+    assert store.datasets.page(ALICE) == ((), None)
+    for ask in ("get", "delete"):
+        with pytest.raises(DatasetNotFoundError, match=dataset.id):
+            getattr(store.datasets, ask)(ALICE, dataset.id)
+    assert store.datasets.get(BOB, dataset.id) == dataset
+
+
+def pages(store, owner, limit, state=None, between=lambda: None):
+    """Read a list to its end, and call a function between two pages."""
+    after, found = None, []
+    while True:
+        assert len(found) < 100, "the list has no end"
+        page = store.jobs.page(owner, state, after, limit)
+        found.append([job.id for job in page.jobs])
+        if page.after is None:
+            return found
+        after = page.after
+        between()
+
+
+def test_list_read_during_changes_contains_every_other_job_once(store):
+    jobs = [submitted(store, priority=-each) for each in range(12)]
+    deleted = store.jobs.cancel(ALICE, submitted(store).id)
+    events = [
+        lambda: submitted(store, priority=-50),
+        lambda: claimed(store),
+        lambda: store.leases.finish(claimed(store), FAILED),
+        lambda: store.jobs.cancel(ALICE, jobs[5].id),
+        lambda: (store.jobs.delete(ALICE, deleted.id), submitted(store, priority=-50)),
+    ]
+    found = pages(store, ALICE, 2, between=lambda: events.pop(0)() if events else None)
+    assert not events
+    listed = [each for page in found for each in page]
+    assert len(listed) == len(set(listed))
+    assert {job.id for job in jobs} <= set(listed)

@@ -109,6 +109,13 @@ def test_failed_report_is_rolled_back(store, lease, report):
     assert store.leases.report(lease, brought_on(2)).progress == {"generation": 2}
 
 
+def test_report_without_a_checkpoint_keeps_the_previous_one(store, lease):
+    store.leases.report(lease, brought_on(4))
+    reported = store.leases.report(lease, ProgressReport({"generation": 5}, (point(5),), after=4))
+    assert (reported.checkpoint, reported.progress) == (brought_on(4).checkpoint, {"generation": 5})
+    assert generations(store, lease) == [4, 5]
+
+
 def test_points_replace_those_after_the_given_generation(store, lease):
     """After a crash the same generations are reported again, from the checkpoint on."""
     store.leases.report(lease, ProgressReport({}, tuple(map(point, range(8)))))
@@ -172,6 +179,16 @@ def test_new_result_replaces_the_whole_old_one(store, lease):
     assert store.results.document(job) == {"new": 1}
     assert [each.file for each in store.results.models(job)] == ["only"]
     assert store.results.artefact(job, "pareto.svg") is None
+
+
+def test_finish_without_a_result_keeps_the_old_one(store, lease):
+    job = lease.job.id
+    lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
+    store.results.keep(job, {"pareto.svg": BLOB})
+    store.leases.finish(lease, FAILED)
+    assert store.results.document(job) == {"old": 1}
+    assert len(store.results.models(job)) == 2
+    assert store.results.artefact(job, "pareto.svg") == BLOB
 
 
 def test_artefacts_of_a_deleted_job_are_refused(store, lease):

@@ -80,6 +80,20 @@ def test_a_data_set_that_a_job_names_is_kept_and_its_time_begins_after_the_job(
     assert store.retention.expire_datasets(DAY) == 1
 
 
+def test_validation_data_and_recordings_are_named_too(store: Store) -> None:
+    used = [added(store, blob=str(number) * 64) for number in range(3)]
+    named = {
+        **spec(used[0]),
+        "recordings": [{"dataset": used[1]}],
+        "validation": {"dataset": used[2], "rows": "0:9"},
+    }
+    job_in(store, JobState.SUCCEEDED, ALICE, spec=named)
+    for _ in range(2):
+        assert store.retention.expire_datasets(DAY) == 0
+        pass_time(store, 2 * DAY)
+    assert len(listed(store)) == 3
+
+
 def test_a_job_that_is_submitted_while_the_data_set_expires_can_read_it(store: Store) -> None:
     dataset = added(store)
     store.retention.expire_datasets(DAY)

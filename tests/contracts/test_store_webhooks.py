@@ -5,7 +5,7 @@ import json
 import pytest
 
 from islands_service.domain.job import JobState
-from islands_service.domain.webhook import MAX_ATTEMPTS, retry_delay
+from islands_service.domain.webhook import MAX_ATTEMPTS, WebhookNotFoundError, retry_delay
 from islands_service.store import Store
 from support.stores import (
     ALICE,
@@ -20,7 +20,11 @@ from support.stores import (
     job_in,
     open_stores,
     submitted,
+    turn_clock,
 )
+
+UNKNOWN = "0" * 32
+
 
 ALL = ("job.succeeded", "job.failed", "job.cancelled")
 
@@ -144,3 +148,31 @@ def test_a_failed_attempt_is_repeated_at_growing_intervals_over_hours(store):
     assert intervals == pytest.approx([retry_delay(number) for number in range(1, MAX_ATTEMPTS)], abs=0.5)
     assert intervals[0] < 10.0
     assert 12 * 3600 < sum(intervals) < 24 * 3600
+
+
+def test_deliveries_are_sent_after_the_clock_has_gone_back(store):
+    """Their times, and the lease of a process that has ended, would last for an hour more."""
+    created(store)
+    created(store, BOB)
+    job_in(store, JobState.FAILED)
+    job_in(store, JobState.FAILED, BOB)
+    failed, interrupted = store.deliveries.claim(60.0, 10)
+    store.deliveries.record(failed, 500, "away")
+    assert store.deliveries.claim(60.0, 10) == ()
+    store.deliveries.sweep(LONG)
+    assert store.deliveries.claim(60.0, 10) == ()
+    turn_clock(store, -3600.0)
+    store.deliveries.sweep(LONG)
+    found = store.deliveries.claim(60.0, 10)
+    assert {(each.id, each.attempt) for each in found} == {(failed.id, 2), (interrupted.id, 2)}
+    assert store.deliveries.claim(60.0, 10) == ()
+
+
+@pytest.mark.parametrize("operation", ["delete", "deliveries"])
+def test_a_webhook_of_another_owner_does_not_exist(store, operation):
+    webhook = created(store)
+    for owner, identity in ((BOB, webhook.id), (ALICE, UNKNOWN)):
+        with pytest.raises(WebhookNotFoundError, match=f"there is no webhook '{identity}'"):
+            getattr(store.webhooks, operation)(owner, identity)
+    assert store.webhooks.all(BOB) == ()
+    assert store.webhooks.all(ALICE) == (webhook,)

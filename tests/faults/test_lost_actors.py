@@ -111,6 +111,18 @@ def test_frozen_actor_is_replaced_and_does_not_change_the_result(posed, undistur
 
 
 @pytest.mark.nightly
+def test_loss_of_all_actors_does_not_change_the_result(posed, undisturbed, engine, messages):
+    found = []
+    for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
+        found.append(exactly(epoch.archipelago))
+        if len(found) == 3:
+            for pid in actors():
+                kill(pid)
+    assert found == undisturbed
+    assert sum("was lost" in message for message in messages) == min(3, count_cpus())
+
+
+@pytest.mark.nightly
 def test_standby_actor_replaces_a_lost_one_until_its_restart(posed, engine, messages, monkeypatch):
     import ray
 

@@ -103,6 +103,19 @@ def test_acknowledged_jobs_of_a_killed_process_are_stored(database, lines):
             assert (again.id, new) == (job, False)
 
 
+@pytest.mark.nightly
+def test_repeated_kills_lose_no_acknowledged_job(database):
+    acknowledged = []
+    for turn in range(15):
+        with child(SUBMIT, database) as process:
+            acknowledged += killed_after(process, 1 + 7 * turn)
+        intact(database)
+    with Store(database) as store:
+        found = {job: " ".join(key) for job, *key in acknowledged}
+        assert all(store.jobs.get(ALICE, job).spec == {"key": key} for job, key in found.items())
+        assert len(set(found.values())) == len(found)
+
+
 @pytest.mark.ci
 @pytest.mark.parametrize("reports", [1, *(pytest.param(n, marks=pytest.mark.nightly) for n in (2, 9)), 30])
 def test_killed_coordinator_leaves_complete_reports(database, reports):

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -85,6 +86,37 @@ def test_stopped_postgresql_raises_errors_and_is_used_after_a_restart(restartabl
         assert store.jobs.get(ALICE, job.id) == lease.job
         store.leases.report(lease, brought_on(1))
         assert kinds(store, submitted(store).id) == ["queued"]
+
+
+@pytest.mark.ci
+def test_acknowledged_jobs_survive_a_crash_of_postgresql(restartable):
+    over, acknowledged, failed = threading.Event(), [], []
+    with Store(restartable.url) as store:
+
+        def submit():
+            while not over.is_set():
+                try:
+                    acknowledged.append(submitted(store).id)
+                except StoreUnavailableError:
+                    failed.append(1)
+                    over.wait(0.01)
+
+        threads = [threading.Thread(target=submit) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for _ in range(3):
+            seen = len(acknowledged)
+            eventually(lambda seen=seen: len(acknowledged) >= seen + 30)
+            restartable.stop(signal.SIGQUIT)
+            seen_failures = len(failed)
+            eventually(lambda seen=seen_failures: len(failed) > seen)
+            restartable.start()
+        over.set()
+        for thread in threads:
+            thread.join()
+        assert failed
+        for job in acknowledged:
+            assert kinds(store, job) == ["queued"]
 
 
 def test_read_only_postgresql_counts_as_unavailable(prepared_postgres):

@@ -67,6 +67,15 @@ def test_validation_record_equals_that_of_the_notebook(notebook, validation):
     np.testing.assert_allclose(validation.y, displaced, rtol=0, atol=1e-12)
 
 
+def test_sample_counts_times_and_peaks_equal_those_of_the_paper(estimation, validation):
+    assert (estimation.samples, validation.samples) == (99_999, 100_000)
+    assert (estimation.dt, validation.dt) == (1e-3, 1e-3)
+    assert estimation.time[0] == pytest.approx(1.001, abs=1e-12)
+    assert validation.time[0] == pytest.approx(1.0, abs=1e-12)
+    assert np.abs(estimation.u).max() == pytest.approx(58.8, abs=0.05)
+    assert np.abs(validation.u).max() == pytest.approx(40.0, abs=1e-9)
+
+
 def test_record_has_golden_values(estimation, validation):
     # Independent of the package and of the transcription, so that a change in SciPy is detected. The filter
     # of the notebook (order five, 0.002 of Nyquist) amplifies the last bit of the linear algebra to 2.5e-4,
@@ -76,6 +85,11 @@ def test_record_has_golden_values(estimation, validation):
     assert np.abs(estimation.u).max() == pytest.approx(58.7775, abs=1e-3)
     assert estimation.y[49_999] == pytest.approx(-26.9289, abs=1e-3)
     assert validation.y[250] == pytest.approx(37.41019885244359, abs=1e-8)
+
+
+def test_dropped_first_row_has_an_output_step(estimation):
+    # In the dropped row the notebook sets the output to zero.
+    assert abs(estimation.y[0] - 0.0) == pytest.approx(10.7, abs=0.05)
 
 
 def test_slope_is_one_sample_late_only_in_the_estimation_record(estimation, validation):

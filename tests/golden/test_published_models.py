@@ -10,7 +10,7 @@ from islands.estimation.estimate import FittedStructure, estimate
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
-from islands.systems.published_models import get_published_model
+from islands.systems.published_models import PUBLISHED, get_published_model
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import check_physics, cluster_sums
 
@@ -63,3 +63,7 @@ def test_published_models_have_property_1(records, number):
     assert checked.property_1
     assert len(checked.holds) == 10
     assert checked.hold_drift_percent < 1e-9
+
+
+def test_catalogue_has_the_models_of_the_paper():
+    assert {number: entry.model.size for number, entry in PUBLISHED.items()} == {"12": 6, "13": 9, "14": 9}

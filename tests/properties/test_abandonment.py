@@ -118,3 +118,12 @@ def test_threshold_admits_candidates_of_elite_and_hall_of_fame(setting, history)
         for size, allowed in enumerate(thresholds):
             known = [entry.fitness for entry in island.hall_of_fame.entries if entry.size == size]
             assert allowed == (max(threshold, known[-1]) if len(known) == Individual.kept else inf)
+
+
+def test_threshold_is_the_80_percent_quantile_of_known_parents():
+    (first,) = islands_of(Evaluator(record(), SMALL), 0)
+    parents = sorted(each.fitness for each in (*first.elite, *first.population))
+    known = sum(fitness < inf for fitness in parents)
+    threshold = _abandon_threshold(first, SMALL)
+    expected = parents[min(int(0.8 * len(parents)), known - 1)]
+    assert threshold == max(expected, first.elite[-1].fitness)

@@ -52,6 +52,13 @@ def test_number_of_emigrants_follows_the_schedule(policy):
     assert len(select_migrants(replace(island, generation=8), many)) == len(population)
 
 
+@given(islands(), st.integers(1, 5))
+def test_best_policy_selects_the_fittest(island, count):
+    emigrants = SELECTION_POLICIES["best"](island.elite, count, Stream(0, 0, 0, Purpose.EMIGRATION))
+    fitness = {each.key: each.fitness for each in island.elite if isfinite(each.fitness)}
+    assert [each.fitness for each in emigrants] == sorted(fitness.values())[:count]
+
+
 def pareto_reference(elite):
     """Return the non-dominated members of the elite, the first of equals."""
     size_and_fitness = {

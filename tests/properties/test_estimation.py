@@ -55,6 +55,28 @@ def test_least_squares_is_accurate_if_normal_equations_are_singular():
     np.testing.assert_allclose(found.theta, [1.0, -2.0, 3.0, 0.5], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("layout", ["C", "F"])
+@pytest.mark.parametrize("kind", [np.float64, np.int64])
+def test_memory_layout_and_integer_data_have_no_effect(layout, kind):
+    psi, y = (np.round(10 * item) for item in problem(1))
+    expected = least_squares(psi, y)
+    found = least_squares(np.array(psi, dtype=kind, order=layout), y.astype(kind))
+    assert np.array_equal(found.theta, expected.theta)
+    assert np.array_equal(found.standard_errors, expected.standard_errors)
+
+
+def test_estimation_does_not_modify_its_arguments():
+    psi, y = problem(2)
+    S, c = restriction(2, 2, 5)
+    arguments = (psi, y, S, c)
+    copies = [item.copy() for item in arguments]
+    for item in arguments:
+        item.setflags(write=False)
+    assert constrained_least_squares(*arguments).outcome
+    for item, copy in zip(arguments, copies, strict=True):
+        assert np.array_equal(item, copy)
+
+
 def test_target_of_another_length_raises_record_error():
     psi, y = problem(3)
     for wrong in (y[:-1], np.append(y, 0.0), y[:, None]):
@@ -145,6 +167,24 @@ def test_infeasible_constraints_are_outcomes_with_a_reason(S, c, reason, size):
     found = constrained_least_squares(size * psi, y, np.array(S, float), np.array(c, float))
     assert found.outcome == EvaluationOutcome(Status.INFEASIBLE, reason)
     assert np.isnan(found.theta).all()
+
+
+@given(seeds, st.booleans())
+def test_redundant_and_contradictory_constraints_are_distinguished(seed, contradicts):
+    psi, y = problem(seed, 6)
+    S, c = restriction(seed + 1, 3, 6)
+    weights = np.random.default_rng(seed + 2).normal(size=3)
+    S, c = np.vstack([S, weights @ S]), np.append(c, weights @ c + 0.01 * contradicts)
+    outcome = constrained_least_squares(psi, y, S, c).outcome
+    assert outcome.verdict is Status.INFEASIBLE
+    assert outcome.reason.endswith("contradicts the others" if contradicts else "others: leave it out")
+
+
+def test_zero_constraints_equal_least_squares_bit_for_bit():
+    psi, y = problem(11)
+    found, free = constrained_least_squares(psi, y, np.empty((0, 5)), np.empty(0)), least_squares(psi, y)
+    assert np.array_equal(found.theta, free.theta)
+    assert np.array_equal(found.standard_errors, free.standard_errors)
 
 
 # Units.

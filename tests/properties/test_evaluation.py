@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 from islands.evolution import evaluation
 from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.generation import first_generation
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
 from islands.simulation.outcome import Status
-from support.searches import record
+from support.searches import SMALL, record
 from support.variation import random_genes
 
 FREE = Settings(
@@ -162,6 +163,16 @@ def test_small_pair_table_splits_a_generation_into_several_batches(batches, name
     assert sum(batches) == selected + evaluated
 
 
+def test_pruning_decision_is_part_of_the_cache_key():
+    genes = tuple(parse(text) for text in ("y(k-1)", "phi1(u(k-1), u(k-2))", "phi2(u(k-1), u(k-9))*y(k-3)"))
+    each = Individual(genes)
+    evaluator = Evaluator(record(), replace(SMALL, tolerance=1e-3))
+    (whole, pruned), duplicates = evaluator.evaluate([(each, False), (each, True)])
+    assert (whole.size, duplicates) == (3, 0)
+    assert pruned.size < 3
+    assert evaluator.evaluate([(each, True), (each, False), (each, True)]) == ((pruned, whole, pruned), 3)
+
+
 # Duplicates.
 
 
@@ -181,6 +192,31 @@ def test_abandoned_evaluation_answers_only_lower_thresholds():
     # An exact fitness answers every threshold.
     assert evaluated(exact.fitness / 4) == ("ABANDONED", 1)
     assert evaluated(inf) == ("OK", 1)
+
+
+def test_duplicates_consume_random_draws():
+    """The pruning of every individual is drawn in order, also if the individual is cached."""
+
+    class Spy(Evaluator):
+        decisions, known = (), 0
+
+        def evaluate_genes(self, individuals, pruned, thresholds=None):
+            self.decisions = pruned.tolist()
+            found, self.known = super().evaluate_genes(individuals, pruned, thresholds)
+            return found, self.known
+
+    setting = replace(SMALL, prune=0.5, initial_terms=(1, 1), initial_height=0)
+    spy = Spy(record(), setting)
+    island, info = first_generation(0, 8, spy)
+    draw = Stream(8, 0, 0, Purpose.PRUNING)
+    assert spy.decisions == [draw.chance(0.5) for _ in range(setting.population)]
+    # Individuals of one leaf are mostly duplicates.
+    assert setting.population > info.duplicates >= setting.population - 8
+    assert spy.known < setting.population
+    second_island, second_info = first_generation(0, 8, spy)
+    assert spy.known == setting.population
+    # The cache affects the speed of a generation, not its result.
+    assert (second_island, second_info) == (island, info)
 
 
 # Emptied caches, and zero genes.

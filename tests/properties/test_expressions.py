@@ -1,7 +1,10 @@
 """Properties of expressions: text, canonical form and value."""
 
 import math
+import os
 import pickle
+import subprocess
+import sys
 from copy import deepcopy
 from dataclasses import replace
 
@@ -24,6 +27,26 @@ from support.strategies import (
     settled_value,
     signals,
 )
+
+CARRIED = """
+import pickle, sys
+from islands.expressions.tree import (walk)
+from islands.expressions.parsing import parse
+from islands.models.regressor import regressor
+trees = [parse(text) for text in sys.argv[1:]]
+regressors = [regressor(tree)[1] for tree in trees]
+carried = sys.stdin.buffer.read()
+if carried:
+    others, other_regressors = pickle.loads(carried)
+    assert others == trees and other_regressors == regressors
+    found = dict.fromkeys(node for tree in trees for node in walk(tree))
+    assert all(node in found for tree in others for node in walk(tree))
+    assert [hash(tree) for tree in others] == [hash(tree) for tree in trees]
+    assert {*others} == {*trees} and {*other_regressors} == {*regressors}
+    assert {item.expression for item in other_regressors} == {item.expression for item in regressors}
+sys.stderr.write(str(hash(trees[0])))
+sys.stdout.buffer.write(pickle.dumps((trees, regressors)))
+"""
 
 
 def product(*factors):
@@ -84,6 +107,14 @@ def test_parity_and_degree_move_factors_out_of_functions(entry, leaf, number):
     assert found == factor * abs(number) ** (entry.degree or 0.0)
 
 
+@given(st.sampled_from(["phi1", "phi2"]), st.permutations(range(1, 9)), st.integers(1, 2))
+def test_phi_is_antisymmetric(name, lags, channel):
+    phi = Apply(PRIMITIVES[name], (Lagged(channel, lags[0]), Lagged(channel, lags[1])))
+    exchanged = Apply(phi.primitive, phi.arguments[::-1])
+    factor, core = canonical(phi)
+    assert canonical(exchanged) == (-factor, core)
+
+
 @given(expressions(height=2), leaves().map(lambda leaf: Lagged(leaf.channel, 0)))
 def test_regressor_with_lag_zero_raises_model_error(expression, present):
     assume(canonical(expression)[0] != 0.0)
@@ -142,3 +173,26 @@ def test_copies_and_pickles_are_equal_and_found_under_the_same_key(expression):
         assert copied == expression
         assert hash(copied) == hash(expression)
         assert {expression: "found"}[copied] == "found"
+
+
+def test_pickled_trees_equal_those_of_other_hash_seeds():
+    texts = [
+        "q5(q3(tanh(u(k-1)*y(k-2))))",
+        "phi1(u(k-1), q4(u(k-1)))*y(k-1)^2",
+        "2.5*y(k-1) - u2(k-3)",
+        "y(k-7)",
+    ]
+    carried, seeds = b"", []
+    for seed in ("1", "2", "1"):
+        run = subprocess.run(
+            [sys.executable, "-c", CARRIED, *texts],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            input=carried,
+            capture_output=True,
+            check=False,
+        )
+        assert run.returncode == 0, run.stderr.decode()
+        carried = run.stdout
+        seeds.append(run.stderr)
+    # The test is meaningful only if the hashes of the processes differ.
+    assert seeds[0] == seeds[2] != seeds[1]

@@ -103,6 +103,24 @@ def test_no_owner_waits_longer_than_its_bound(fair, weighted, earlier, data):
     assert bound > most or late in served
 
 
+def test_idle_owner_gets_no_credit(fair):
+    start(fair, {})
+    submit(fair, *"a" * 20, "b")
+    claims(fair, 11)
+    submit(fair, *"b" * 10, first=100)
+    got = Counter(claims(fair, 8))
+    assert max(got.values()) - min(got.values()) <= 1
+
+
+def test_claims_alternate_after_a_weight_is_changed(fair):
+    start(fair, {"a": 300, "b": 100})
+    submit(fair, *"a" * 40, *"b" * 40)
+    claims(fair, 12)
+    fair.database.write(lambda connection: connection.execute(owners.update().values(weight=100)))
+    claims(fair, 2)
+    assert Counter(claims(fair, 20)) == {"a": 10, "b": 10}
+
+
 @few
 @given(weights, st.lists(st.sampled_from(OWNERS), min_size=1, max_size=20), st.integers(0, 19))
 def test_positions_are_the_order_of_the_claims(fair, weighted, queued, before):

@@ -148,6 +148,20 @@ def test_structures_selected_under_the_constraint_meet_it(name, degree, seed):
         assert all(total == pytest.approx(0.0, abs=1e-9) for total in sums.values())
 
 
+def test_constrained_selection_is_better_than_repaired_free_selection():
+    # The constraint removes some of the freely selected terms.
+    data = measured(1)
+    free, bound = (
+        forward_selection(library("polynomial", 2), data, name, 8) for name in ("none", "hysteresis")
+    )
+    repaired = [estimate(structure, data, "hysteresis", LAGS) for structure in free]
+    assert [entry.model.size for entry in repaired] == [1, 2, 3, 3, 5, 6, 6, 8]
+    for size in range(3, 9):
+        structure = max((item for item in bound if len(item) <= size), key=len)
+        chosen = estimate(structure, data, "hysteresis", LAGS)
+        assert chosen.residual_variance < 0.8 * repaired[size - 1].residual_variance
+
+
 def test_library_that_cannot_meet_the_constraint_is_infeasible():
     without = [item for item in library("phi-polynomial", 2) if plain(item.expression) != "y(k-1)"]
     found = forward_selection(without, measured(), "hysteresis")

@@ -1,13 +1,14 @@
 """Properties of the hall of fame: merging is commutative, associative and idempotent."""
 
 from collections import Counter
+from itertools import pairwise
 from math import inf, nan
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
+from islands.evolution.hall_of_fame import HallOfFame, merge, pareto_front, with_entries
 from islands.evolution.individual import Individual, make_regressor
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged, Shift
@@ -97,6 +98,18 @@ def test_hall_keeps_the_best_distinct_structures_of_every_size(found):
         assert [best[entry.key] for entry in kept] == expected
     assert max(Counter(entry.key for entry in hall.entries).values(), default=1) == 1
     assert [entry.size for entry in hall.entries] == sorted(entry.size for entry in hall.entries)
+
+
+@given(halls)
+def test_fitness_improves_along_the_pareto_front(hall):
+    best = pareto_front(hall.entries)
+    assert all(one.size < other.size and one.fitness > other.fitness for one, other in pairwise(best))
+    for entry in hall.entries:
+        assert min(each.fitness for each in best if each.size <= entry.size) <= entry.fitness
+    assert hall.best() == {
+        size: next(entry for entry in hall.entries if entry.size == size)
+        for size in {entry.size for entry in hall.entries}
+    }
 
 
 def entry(fitness, *texts, theta=None):

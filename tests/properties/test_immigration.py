@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.archipelago import Island, empty_archipelago
 from islands.evolution.engine import receive_migrants, run_epoch
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.generation import select_elite
+from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
 from islands.evolution.migration import parse_topology
 from islands.evolution.problem import GeneEvolution, Problem
@@ -23,6 +24,7 @@ from support.migrations import (
     islands,
     keys,
     known_fitness,
+    models,
     never_stop,
     recorded,
 )
@@ -76,6 +78,18 @@ def test_elite_is_the_best_of_elite_and_immigrants(replaced, distinct, data, arr
     assert after.elite == select_elite(contenders, SETTINGS.elites, distinct)
     if len(island.elite) == SETTINGS.elites:
         assert len(after.elite) == SETTINGS.elites
+
+
+def test_structures_in_the_elite_do_not_immigrate_again():
+    one, two, *others = models()
+    population = tuple(others[: SETTINGS.population])
+    island = Island(0, 3, 6, population, (one,), HallOfFame())
+    assert receive_migrants(island, [(replace(one),), (replace(one),)], evolution(SETTINGS)) == island
+    # Structures that are only in the population do immigrate, because the population may lose them.
+    after = receive_migrants(island, [(replace(one), replace(population[0]))], evolution(SETTINGS))
+    assert one not in after.population
+    assert population[0] in after.elite
+    assert two in receive_migrants(island, [(two, one)], evolution(SETTINGS)).population
 
 
 @given(islands(), arrivals())

@@ -81,6 +81,10 @@ def test_settings_of_an_island_override_those_of_the_evaluator():
     assert step(here[0], shared)[0] != step(here[0], shared, (), profile_settings)[0]
 
 
+def test_ten_generations_give_equal_bits_twice():
+    assert digest() == digest()
+
+
 # Statistics of a step.
 
 
@@ -117,6 +121,18 @@ def test_random_streams_depend_on_island_and_generation():
             for generation in (0, 1)
         }
         assert len(following) == 4, changes
+
+
+def test_parents_are_elite_and_offspring():
+    evaluator = Evaluator(record(), replace(SMALL, prune=0.0, crossover=0.0, mutation=0.0, distinct=True))
+    island = evolved(0, evaluator.settings, evaluator=evaluator)
+    best, others = island.elite[:1], island.population[1:]
+    only_in_elite = replace(island, elite=best, population=tuple(each for each in others if each != best[0]))
+    following, info = step(only_in_elite, evaluator)
+    assert best[0] in following.population
+    # All offspring are copies of parents.
+    assert info.duplicates == len(following.population)
+    assert len(set(following.population)) > 3
 
 
 def test_hall_of_fame_keeps_models_that_the_population_has_lost():

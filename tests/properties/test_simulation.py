@@ -208,6 +208,18 @@ def test_present_and_future_samples_do_not_affect_predictions(data):
     assert equal_bits(before[: k + 1], after[: k + 1])
 
 
+@given(st.data())
+def test_free_run_does_not_use_outputs_after_the_warm_up(data):
+    chosen, drawn, warm_up = draw_records(data)
+    y = drawn.y.copy()
+    for begin, end in drawn.bounds:
+        y[begin + warm_up : end] = np.nan
+    found = free_run(chosen, replace(drawn, y=y), warm_up)
+    assert found.outcome
+    assert np.isnan(found.mean_squared_error)
+    assert equal_bits(found.y, free_run(chosen, drawn, warm_up).y)
+
+
 @every_model
 @pytest.mark.parametrize("interval", [1, 7, None])
 def test_joined_recordings_are_predicted_independently(name, interval):

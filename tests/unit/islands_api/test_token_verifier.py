@@ -88,6 +88,17 @@ def test_a_new_key_of_the_issuer_is_found_at_once_and_an_old_one_no_more():
     follow(scenario)
 
 
+def test_unknown_ids_do_not_make_requests_at_any_rate():
+    async def scenario(keys, client, now):
+        await keys.find("first")
+        for number in range(100):
+            assert await keys.find(f"unknown-{number}") is None
+            now.time += 0.1
+        assert len(client.requests) <= 2 * 3
+
+    follow(scenario)
+
+
 def test_known_keys_are_used_for_six_hours_while_the_issuer_is_away():
     async def scenario(keys, client, now):
         await keys.find("first")
@@ -165,6 +176,26 @@ def test_documents_that_are_no_keys_of_this_issuer_are_not_used(path, document):
         client.changed[URL + path] = document
         with pytest.raises(IssuerUnavailableError):
             await keys.find("first")
+
+    follow(scenario)
+
+
+def test_a_short_rsa_key_is_not_used():
+    from cryptography.hazmat.primitives.asymmetric import rsa
+
+    def offer(bits):
+        number = rsa.generate_private_key(65537, bits).public_key().public_numbers().n
+        return {
+            "kty": "RSA",
+            "kid": str(bits),
+            "n": encode_part(number.to_bytes(bits // 8, "big")),
+            "e": "AQAB",
+        }
+
+    async def scenario(keys, client, now):
+        client.changed[f"{URL}/keys"] = {"keys": [offer(1024), offer(2048)]}
+        assert await keys.find("1024") is None
+        assert (await keys.find("2048")).kid == "2048"
 
     follow(scenario)
 
@@ -270,11 +301,28 @@ def test_a_token_with_a_wrong_header_is_refused(header, message):
     assert message in refused(sign(make_claims(ISSUER), make_key(), **header))
 
 
+def test_a_token_of_another_key_with_the_same_id_is_refused():
+    text = sign(make_claims(ISSUER), make_key("second"), kid="first")
+    assert "signature of the token is not valid" in refused(text)
+
+
 def test_a_key_of_the_header_is_not_used():
     """A token that brings its key along proves nothing."""
     other = make_key("second")
     text = sign(make_claims(ISSUER), other, kid="first", jwk=other.as_dict(private=False))
     assert "signature of the token is not valid" in refused(text)
+
+
+def test_a_changed_claim_breaks_the_signature():
+    header, _, signature = token().split(".")
+    changed = encode_part(make_claims(ISSUER, sub="mallory"))
+    assert "signature of the token is not valid" in refused(f"{header}.{changed}.{signature}")
+
+
+@pytest.mark.parametrize("algorithm", ["RS256", "Ed25519"])
+def test_the_type_of_the_key_must_fit_the_algorithm(algorithm):
+    header = encode_part({"alg": algorithm, "kid": "first"})
+    assert "signature" in refused(f"{header}.{token().partition('.')[2]}")
 
 
 def test_a_key_for_another_algorithm_is_not_used():
@@ -297,6 +345,12 @@ def test_an_oversize_token_is_refused_before_it_is_parsed():
 )
 def test_a_key_is_no_token(text):
     assert not is_token(text)
+
+
+@pytest.mark.parametrize("text", ["e30.", "e30.e30", "e30.e30.e30.e30.e30"])
+def test_a_malformed_token_is_refused(text):
+    assert is_token(text)
+    assert refused(text)
 
 
 def test_the_leeway_tolerates_the_clock_of_the_issuer():

@@ -169,6 +169,12 @@ def test_a_listed_host_may_have_a_private_address(names, listed):
     assert b"Host: hooks.lan:" in sent
 
 
+def test_a_host_that_is_listed_with_another_port_is_refused(names):
+    names[0]["hooks.lan"] = ("127.0.0.1",)
+    with pytest.raises(OutboundRefusedError, match="ISLANDS_PRIVATE_HOSTS"):
+        exchange(CheckedClient(("hooks.lan:9",), ("hooks.lan",)), OK, "http://hooks.lan:{port}/")
+
+
 def test_the_name_is_resolved_once_and_the_next_address_is_tried(names):
     """The second answer of a name server of an attacker could be a private address."""
     known, asked = names
@@ -176,6 +182,12 @@ def test_the_name_is_resolved_once_and_the_next_address_is_tried(names):
     response, *_ = exchange(CheckedClient(("hooks.lan",), ("hooks.lan",)), OK, "http://hooks.lan:{port}/")
     assert response.status_code == 200
     assert asked == ["hooks.lan"]
+
+
+def test_a_redirect_is_not_followed():
+    answer = b"HTTP/1.1 302 Found\r\nLocation: http://10.0.0.1/\r\nContent-Length: 0\r\n\r\n"
+    response, *_ = exchange(LOCAL, answer)
+    assert response.status_code == 302
 
 
 def test_a_proxy_of_the_environment_is_not_used(monkeypatch):

@@ -287,3 +287,20 @@ def test_data_folder_is_locked_by_one_service(tmp_path: Path) -> None:
             pass
     with folder_lock(folder):
         pass
+
+
+def test_lock_of_a_killed_service_is_released(tmp_path: Path) -> None:
+    script = (
+        "import sys, time; from pathlib import Path; from islands_service.supervisor import folder_lock\n"
+        "with folder_lock(Path(sys.argv[1])): print('mine', flush=True); time.sleep(60)"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as owner:
+        assert owner.stdout is not None
+        assert owner.stdout.readline() == "mine\n"
+        with pytest.raises(DataDirLockedError, match=f"process {owner.pid}"), folder_lock(tmp_path):
+            pass
+        owner.kill()
+        owner.wait()
+        with folder_lock(tmp_path):
+            assert (tmp_path / "lock").read_text() == f"{os.getpid()}\n"

@@ -42,6 +42,15 @@ def test_effect_is_named_and_predicts_whole_recordings(found: Diagnosis) -> None
 
 
 @pytest.mark.ci
+def test_held_out_recordings_do_not_change_the_estimate(stiffened: Dataset, found: Diagnosis) -> None:
+    y = np.array(stiffened.y)
+    y[found.estimation_samples :] *= 1.01
+    other = islands.diagnose(replace(stiffened, y=y), "second-order", effects=FEW[:3])
+    assert other.best.values[:3].tolist() == found.best.values[:3].tolist()
+    assert other.candidates == found.candidates
+
+
+@pytest.mark.ci
 def test_recording_that_is_held_out_as_a_whole_is_no_part_of_an_estimate() -> None:
     parts = oscillator_recordings(1, (400, 300), "cubic-stiffness", 300.0)
     other = replace(parts[1], y=parts[1].y + 0.01)

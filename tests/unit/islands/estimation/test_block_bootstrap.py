@@ -15,6 +15,7 @@ def terms(*texts):
 
 
 LINEAR = terms("y(k-1)", "u(k-1)")
+HYSTERESIS = terms("y(k-1)", "phi1(u(k-1), u(k-2))", "y(k-1)*phi1(u(k-1), u(k-2))", "y(k-1)*u(k-1)")
 
 
 def record(samples=900, noise=0.1, seed=0, scale=1.0):
@@ -51,6 +52,22 @@ def test_a_draw_minimises_the_weighted_squares_of_the_blocks():
     psi = np.column_stack([data.y[:-1], data.u[:-1, 0]])
     expected = np.linalg.solve(psi.T @ (weights * psi), psi.T @ (weights[:, 0] * data.y[1:]))
     assert found == pytest.approx(expected, rel=1e-7)
+
+
+def test_every_draw_meets_the_constraints():
+    data = record()
+    model = estimate(HYSTERESIS[:3], data, "hysteresis").model
+    drawn = draw(model, data, constraints="hysteresis")
+    assert np.ptp(drawn[:, 0]) == 0.0
+    assert drawn[0, 0] == pytest.approx(1.0, abs=1e-15)
+    assert (np.std(drawn[:, 1:], axis=0) > 0.0).all()
+
+
+def test_a_seed_determines_the_draws():
+    data = record(samples=300)
+    model = estimate(LINEAR, data).model
+    assert (draw(model, data) == draw(model, data)).all()
+    assert (draw(model, data) != draw(model, data, seed=4)).all()
 
 
 def test_no_draw_has_an_excluded_sign():

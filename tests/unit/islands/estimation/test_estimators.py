@@ -4,6 +4,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
+from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.estimators import estimate_with, least_squares_bias
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
@@ -37,6 +38,15 @@ def test_intervals_of_least_squares_miss_the_true_pole_under_coloured_noise(nois
     records = [make_noisy_record(noise, seed, 3000) for seed in range(5)]
     assert coverage([start(record).model for record in records])[0] == 0.0
     assert min(least_squares_bias(start(record).model, record) for record in records) > 4.0
+
+
+def test_every_estimator_recovers_the_parameters_of_noise_free_data():
+    record = make_noisy_record("equation", 0, 400, 0.0)
+    first = start(record)
+    for name in ESTIMATORS:
+        found = estimate_with(name, first, record, shooting=50)
+        assert found.model.theta == pytest.approx((0.9, 0.3, -0.1), abs=1e-9), name
+        assert (found.least_squares_bias is None) == (name == "least-squares")
 
 
 def test_extended_least_squares_meets_the_constraints_of_hysteresis():

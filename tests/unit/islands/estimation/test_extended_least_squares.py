@@ -63,6 +63,19 @@ def test_failures_are_those_of_constrained_least_squares():
     assert estimate(psi, y, S, c).verdict is Status.INFEASIBLE
 
 
+def test_segments_are_filtered_separately():
+    """A first recording of one row only shifts the start of the recursion."""
+    psi, y = make_problem()
+    joined = np.hstack([psi[:, :1], psi]), np.append(y[0], y)
+    found = estimate(*joined, segments=[1, y.size])
+    np.testing.assert_allclose(found.estimate.theta, estimate(psi, y).estimate.theta, atol=2e-3)
+    swapped = np.roll(np.arange(y.size), 700)
+    parts = estimate(psi[:, swapped], y[swapped], segments=[700, y.size - 700])
+    np.testing.assert_allclose(
+        parts.estimate.theta, estimate(psi, y, segments=[y.size - 700, 700]).estimate.theta, rtol=1e-6
+    )
+
+
 def test_sensitivities_are_the_derivatives_of_the_prediction():
     psi, y = make_problem(rows=60)
     regression = _NoiseRegression(psi, y, np.array([25, 60]))

@@ -32,6 +32,11 @@ def test_every_row_is_in_one_block(samples):
         assert np.array_equal(final.y[cut:], whole.y[cut : len(final.y)])
 
 
+def test_blocks_do_not_cross_segments():
+    data = make_latent_data(join([spring_record(700), spring_record(300, seed=3)]))
+    assert [len(block.y) for block in whole_blocks(data)] == [699, 299]
+
+
 def fit_bistable(weight, data):
     """Return a fit of a state with the gain 0.5 + 1.2 weight at zero: above 1 it has two equilibria."""
     layout = StateSpaceLayout(1, 1, 1)

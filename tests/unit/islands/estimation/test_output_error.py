@@ -9,9 +9,9 @@ from scipy.signal import lfilter
 from islands.estimation.estimate import estimate
 from islands.estimation.output_error import fit_output_error
 from islands.estimation.refinement import refine
-from islands.records.dataset import Dataset
+from islands.records.dataset import Dataset, join
 from islands.records.input_lead import advance_inputs
-from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, make_battery, make_tank
+from support.slow_processes import BATTERY_NOISE, BATTERY_POLE, TANK_NOISE, make_battery, make_tank
 
 
 def poles(model):
@@ -65,6 +65,14 @@ def test_model_has_a_constant_only_if_the_output_has_an_offset():
         assert dict(zip(found.parameter_names, found.theta, strict=True))["y(k-1)"] == pytest.approx(
             0.9, abs=0.01
         )
+
+
+def test_initial_states_differ_between_segments():
+    parts = [make_tank(seed, 120) for seed in range(4)]
+    record = join(tuple(replace(part, y=part.y + 5.0 * place) for place, part in enumerate(parts)))
+    found = fit_output_error(record)[0]
+    assert found.model.theta == pytest.approx((1.0, 0.02), abs=3e-4)
+    assert found.residual_variance**0.5 == pytest.approx(TANK_NOISE, rel=0.15)
 
 
 def test_models_far_from_zero_do_not_depend_on_the_zero():
@@ -132,6 +140,16 @@ def test_intervals_contain_the_true_parameters():
 
 
 @pytest.mark.ci
+def test_whitened_error_of_coloured_noise_has_the_smaller_variance():
+    true = np.array([1.5, -0.7, 0.1, 0.15])
+    pairs = [pair for pair in (fit_pair(make_coloured_record(seed)) for seed in range(30)) if len(pair) == 2]
+    assert len(pairs) > 25
+    errors = np.array([[np.array(each.model.theta[:4]) - true for each in pair] for pair in pairs])
+    first, second = np.sqrt(np.mean(errors**2, axis=0))
+    assert (second < 0.8 * first).all()
+
+
+@pytest.mark.ci
 def test_intervals_of_the_whitened_error_contain_the_true_parameters():
     true, inside = (1.5, -0.7, 0.1, 0.15), []
     for seed in range(60):
@@ -146,3 +164,9 @@ def test_intervals_of_the_whitened_error_contain_the_true_parameters():
 
 def test_record_that_is_too_short_has_no_model():
     assert fit_output_error(make_tank(0, 10)) == []
+
+
+def test_same_record_gives_the_same_bits():
+    record = make_tank(7, 300)
+    first, second = (fit_output_error(replace(record)) for _ in range(2))
+    assert [each.model for each in first] == [each.model for each in second]

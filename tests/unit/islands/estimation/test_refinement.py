@@ -14,12 +14,13 @@ from islands.estimation.refinement import RefinedModel, begin_refinement, refine
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Apply, Lagged
+from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums
-from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
+from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record
 
 HYSTERESIS = {
     "y(k-1)": 1.0,
@@ -140,6 +141,30 @@ def test_standard_errors_match_a_monte_carlo():
     assert np.all(np.abs(mean - model(HYSTERESIS).parameters) < 4 * predicted / np.sqrt(60))
 
 
+@pytest.mark.parametrize("constraints", ["none", "hysteresis"])
+def test_one_step_ahead_refinement_equals_least_squares(constraints):
+    """The one-step-ahead error is linear in the parameters; the record has only 14 samples."""
+    record = make_record(CLUSTERED, samples=14, noise=0.05)
+    start = estimate(model(CLUSTERED).regressors, record, constraints).model
+    found = refine_model(start, record, 1, constraints)
+    assert found.model.parameters == pytest.approx(start.parameters, rel=1e-6)
+    assert found.model.standard_errors == pytest.approx(start.standard_errors, rel=1e-6)
+
+
+def test_standard_errors_account_for_the_constraint():
+    """Two parameters with a fixed sum have equal standard errors."""
+    record = make_record(CLUSTERED, noise=0.02)
+    found = refine_model(
+        estimate(model(CLUSTERED).regressors, record, "hysteresis").model, record, None, "hysteresis"
+    )
+    errors = dict(
+        zip((item.text for item in found.model.regressors), found.model.standard_errors, strict=True)
+    )
+    assert errors["y(k-1)"] == pytest.approx(errors["y(k-2)"], rel=1e-6)
+    assert errors["y(k-1)*u1(k-1)"] == pytest.approx(errors["y(k-2)*u1(k-2)"], rel=1e-6)
+    assert min(errors.values()) > 0
+
+
 @pytest.mark.parametrize("interval", [30, None])
 def test_jacobian_matches_higher_order_finite_differences(interval):
     record = make_record(HYSTERESIS, noise=0.02)
@@ -220,6 +245,21 @@ def test_the_parameters_of_several_outputs_are_within_their_standard_errors(coup
         found = refine(coupled, record, None, warm_up=2).model
         deviations.append((np.array(found.parameters) - coupled.parameters) / found.standard_errors)
     assert 0.88 < (np.abs(deviations) < 1.96).mean() < 0.99
+
+
+def test_the_equations_of_several_outputs_keep_their_constraint():
+    true = CoupledModel(
+        (
+            equation({"y(k-1)": 0.7, "y(k-2)": 0.3, "phi1(u1(k-1), u1(k-2))": 0.5}, ("u", "y2"), "y1"),
+            equation({"y(k-1)": 0.6, "y(k-2)": 0.4, "phi1(u2(k-1), u2(k-2))": 0.3}, ("u", "y1"), "y2"),
+        )
+    )
+    record = make_coupled_record(true, noise=0.02)
+    start = true.with_parameters((0.6, 0.4, 0.4, 0.5, 0.5, 0.2))
+    found = refine(start, record, None, "hysteresis")
+    assert found.after < 0.1 * found.before
+    for single in found.model.models:
+        assert all(cluster.met for cluster in cluster_sums(single))
 
 
 # Failures and invalid arguments.

@@ -49,6 +49,27 @@ def test_the_error_of_noise_is_reached_and_falls_with_each_step():
     assert errors[-1] == pytest.approx(0.05**2, rel=0.1)
 
 
+def test_missing_outputs_have_no_influence():
+    record = spring_record(600)
+    (whole,), (holes,) = cut(record), cut(record)
+    holes.y[100:140] = np.nan
+    fits = [begin(SegmentLanes([each])) for each in (whole, holes)]
+    for fit in fits:
+        fit.advance(30)
+        assert fit.mean_square < 1e-10
+    whole.y[100:140] = 50.0
+    assert begin(SegmentLanes([whole])).mean_square > 1.0
+
+
+def test_fixed_parameters_do_not_move():
+    free = np.zeros(MODEL.theta.size, bool)
+    free[-1] = True
+    fit = begin(cut(spring_record(600)), MODEL.theta + 0.1 * free, free)
+    fit.advance(10)
+    assert (fit.theta[:-1] == MODEL.theta[:-1]).all()
+    assert fit.theta[-1] == pytest.approx(0.3, abs=1e-6)
+
+
 def begin_under(text, segments, theta=MODEL.theta, free=None):
     known = MODEL.theta != 0.0 if free is None else free
     places = np.where(known, np.cumsum(known) - 1, -1)

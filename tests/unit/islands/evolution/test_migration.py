@@ -62,6 +62,33 @@ def test_named_topologies_are_strongly_connected(name):
         assert strongly_connected(sources(name, islands)), islands
 
 
+def is_symmetric(built):
+    return all(island in built[source] for island, each in enumerate(built) for source in each)
+
+
+def test_ring_islands_receive_from_the_previous_island():
+    assert sources("ring", 4) == ((3,), (0,), (1,), (2,))
+    for islands in NUMBERS[1:]:
+        built = sources("ring", islands)
+        assert built == tuple(((island - 1) % islands,) for island in range(islands))
+        assert out_degrees(built) == [1] * islands
+        assert is_symmetric(built) == (islands == 2)
+
+
+def test_fully_connected_islands_receive_from_all_others():
+    for islands in NUMBERS:
+        every_island = set(range(islands))
+        built = sources("fully-connected", islands)
+        assert [set(each) for each in built] == [every_island - {island} for island in range(islands)]
+
+
+def test_star_connects_island_0_with_all_others():
+    for islands in NUMBERS:
+        hub, *others = sources("star", islands)
+        assert hub == tuple(range(1, islands))
+        assert others == [(0,)] * (islands - 1)
+
+
 # Definitions of the topologies.
 
 

@@ -63,11 +63,28 @@ def test_paper_presets_have_the_printed_numbers(preset, printed):
         assert made[setting] == read(text.strip()), name
 
 
+@pytest.mark.parametrize("preset", ["paper-case1", "paper-case2"])
+def test_paper_cases_are_constrained_and_not_seeded(preset):
+    made = PRESETS[preset]
+    assert (made.structure, made.constraints, made.fitness) == ("phi", "hysteresis", "shooting")
+    assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
+
+
 @pytest.mark.parametrize("preset", ["paper-appendix", "paper-appendix-s2"])
 def test_paper_appendix_minimises_the_one_step_error_of_polynomials(preset):
     made = PRESETS[preset]
     assert (made.structure, made.constraints, made.fitness) == ("free", "none", "one-step")
     assert (made.library, made.from_library, made.refine) == ("", 0.0, False)
+
+
+def test_paper_presets_differ_only_in_the_printed_settings():
+    def difference(one, other):
+        here, there = asdict(PRESETS[one]), asdict(PRESETS[other])
+        return {name for name in here if here[name] != there[name]}
+
+    assert difference("paper-case1", "paper-case2") == {"tolerance", "shooting"}
+    assert difference("paper-case1", "paper-case1-islands") == {"islands", "topology"}
+    assert difference("paper-appendix", "paper-appendix-s2") == {"max_height", "max_terms", "initial_terms"}
 
 
 @pytest.mark.parametrize("preset", PRESETS)

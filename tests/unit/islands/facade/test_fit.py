@@ -10,7 +10,7 @@ import pytest
 import islands
 from islands.errors import RecordError, SettingsError
 from islands.records.dataset import Dataset
-from islands.report.documents.result_folder import result_document, result_json
+from islands.report.documents.result_folder import record_document, result_document, result_json
 from islands.report.figures.names import ALL_FIGURES
 from islands.report.text.statements import describe
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
@@ -121,6 +121,22 @@ def test_equal_arguments_give_equal_bits(result):
     assert [model.export("json") for model in again.models] == [
         model.export("json") for model in result.models
     ]
+
+
+def test_validation_record_does_not_affect_the_parameters_of_a_structure():
+    whole = islands.fit(tank(), validation=tank(150, seed=5), library="polynomial", max_terms=3)
+    other = islands.fit(tank(), validation=tank(150, seed=6), library="polynomial", max_terms=3)
+    described = whole.search_result.settings["validation"]
+    assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
+    assert whole.search_result.split.estimation.samples == 400
+    assert whole.search_result.split.validation.samples == 150
+    by_structure = [{m.model.regressors: m for m in made.models} for made in (whole, other)]
+    common = by_structure[0].keys() & by_structure[1].keys()
+    assert common
+    for structure in common:
+        assert by_structure[0][structure].model == by_structure[1][structure].model
+        errors = [entry[structure].metrics["validation"]["free_run"].rmse for entry in by_structure]
+        assert errors[0] != errors[1]
 
 
 # Validation data.

@@ -69,6 +69,17 @@ def test_a_saturation_of_the_input_is_found():
 
 
 @pytest.mark.ci
+def test_a_search_that_continues_has_the_same_result(result):
+    states = []
+    identify(spring_record(400, noise=0.02), on_epoch=lambda state, _settings: states.append(state))
+    assert [state.archipelago.generation for state in states] == [0, 2, 4]
+    continued = identify(spring_record(400, noise=0.02), start=states[1])
+    assert [each.model for each in continued.models] == [each.model for each in result.models]
+    with pytest.raises(SettingsError, match="another seed"):
+        identify(spring_record(400, noise=0.02), start=states[1], seed=1)
+
+
+@pytest.mark.ci
 @pytest.mark.parametrize(("structure", "absent"), [("wiener", "e"), ("hammerstein", "w"), ("feedback", "f")])
 def test_a_structure_has_its_zeros(structure, absent):
     found = identify(saturated_record(400, 1), structure=structure)

@@ -19,6 +19,8 @@ from islands.report.documents.monitor_json import (
 from islands.report.documents.monitor_state import (
     head_to_json,
     monitor_from_head,
+    monitor_from_json,
+    monitor_to_json,
     record_to_json,
 )
 from lab.diagnosis.monitor import run
@@ -61,6 +63,14 @@ def test_an_unchanged_machine_raises_no_alarm_and_trains_once():
     assert not state.alarms
     tested = [each.statistic is not None for each in state.records]
     assert tested == [index > TRAINING for index in range(ONSET)]
+
+
+@pytest.mark.ci
+def test_a_continued_monitor_has_the_bits_of_an_uninterrupted_one():
+    saved = undisturbed_monitor()
+    for record in make_records(ONSET + 6, k=97.0)[ONSET:]:
+        saved = follow((record,), monitor_from_json(monitor_to_json(saved)))
+    assert saved.state == disturb(k=97.0).state
 
 
 @pytest.mark.nightly

@@ -5,6 +5,8 @@ The tests of `froe` check properties of the selection; this file checks the cont
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from islands.kernels.err_selection import DEPENDENT, prune, prune_increments, select
 from islands.kernels.parameter_reduction import reduce
@@ -60,6 +62,29 @@ def pruned(gram, terms, tolerance):
     count = prune(gram, terms, tolerance, kept)
     assert (kept[count:] == -7).all()
     return kept[:count].tolist()
+
+
+def same(found, expected):
+    assert [position for position, _ in found] == [position for position, _ in expected]
+    assert [err for _, err in found] == pytest.approx([err for _, err in expected], rel=1e-8, abs=1e-13)
+
+
+@given(
+    st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3), st.integers(0, 9)
+)
+def test_selection_equals_gram_schmidt_on_the_columns(seed, terms, spare, tolerance, limit):
+    psi, y = problem(seed, terms)
+    expected = gram_schmidt(psi, y)
+    end = next((rank for rank, (_, err) in enumerate(expected) if err <= tolerance), terms)
+    limit = min(limit, terms)
+    same(selected(gram_of(psi, y, spare), terms, tolerance, limit), expected[: min(end, limit)])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3))
+def test_pruning_keeps_the_terms_of_gram_schmidt_in_their_order(seed, terms, spare, tolerance):
+    psi, y = problem(seed, terms)
+    expected = sorted(position for position, err in gram_schmidt(psi, y) if err > tolerance)
+    assert pruned(gram_of(psi, y, spare), terms, tolerance) == expected
 
 
 @pytest.mark.parametrize(("share", "count"), [(3e-5, 2), (3e-6, 1), (0.0, 1)])

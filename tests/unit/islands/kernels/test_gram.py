@@ -7,7 +7,7 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.expressions.tree import Lagged
-from islands.kernels.gram import gram, gram_of_residual
+from islands.kernels.gram import gram, gram_of_residual, inner_products
 from islands.kernels.regressor_columns import columns
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
@@ -57,6 +57,20 @@ def columns_of(terms, rows):
     out = np.empty((len(terms), rows.count))
     columns(link(terms), rows, out)
     return out
+
+
+def products_of(terms, rows, pairs):
+    out = np.full(len(pairs), np.nan)
+    inner_products(link(terms), rows, np.asarray(pairs), out)
+    return out
+
+
+@pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
+@pytest.mark.parametrize("rows", ROWS)
+def test_inner_products_of_some_pairs_equal_the_gram_matrix(rows, terms):
+    square = np.array([(i, j) for i in range(len(terms)) for j in range(len(terms))])
+    some = products_of(terms, record(rows), square[::-1])[::-1]
+    assert np.array_equal(some.reshape(len(terms), len(terms)), gram_of(terms, record(rows)))
 
 
 @pytest.mark.parametrize("rows", ROWS)

@@ -145,6 +145,15 @@ def test_processors_with_different_features_do_not_share_a_folder(start):
     assert plain != wider
 
 
+def test_change_in_any_kernel_source_gives_another_folder(start, tmp_path):
+    package = tmp_path / "islands" / "kernels"
+    folders = []
+    for text in ("X = 1\n", "X = 2\n", "X = 1\n"):
+        (package / "inlined.py").write_text(text)
+        folders.append(get_output(start(FOLDER)))
+    assert folders[0] == folders[2] != folders[1]
+
+
 def test_checkouts_with_equal_sources_share_their_kernels(start, tmp_path):
     # The toys are a module of the package here: other kernels are stored by the path of their source.
     code = READY.replace("from toys", "from islands.kernels.toys")

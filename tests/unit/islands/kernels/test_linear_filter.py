@@ -33,3 +33,10 @@ def test_every_segment_of_every_series_is_divided_from_rest(series, order):
     for first, last in zip([0, *ends[:-1]], ends, strict=True):
         expected = scipy.signal.lfilter([1.0], np.append(1.0, a), x[:, first:last])
         np.testing.assert_allclose(divided[:, first:last], expected, rtol=0, atol=1e-13)
+
+
+def test_bits_of_a_divided_series_do_not_depend_on_the_others():
+    rng = np.random.default_rng(0)
+    a, x, ends = np.array([-1.5, 0.7]), rng.normal(size=(7, 200)), np.array([80, 200])
+    alone = [divide_rows(a, x[row : row + 1], ends)[0] for row in range(7)]
+    assert np.array_equal(divide_rows(a, x, ends), alone)

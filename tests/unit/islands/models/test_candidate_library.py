@@ -4,6 +4,7 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.expressions.printing import plain
+from islands.expressions.tree import Apply
 from islands.models.candidate_library import candidates, full_set
 from islands.models.clusters import steady_state
 
@@ -36,6 +37,19 @@ def test_phi_polynomial_terms_except_y_vanish_in_the_steady_state(degree, lags, 
     assert plain(first.expression) == "y(k-1)"
     assert {steady_state(item)[0] for item in others} == {0.0}
     assert {lag for item in others for _, lag in item.lags} == set(range(1, lags + 1))
+
+
+def _find_calls(expression):
+    if isinstance(expression, Apply):
+        yield expression
+        for argument in expression.arguments:
+            yield from _find_calls(argument)
+
+
+def test_phi_polynomial_candidates_only_use_the_paper_s_functions():
+    found = candidates("phi-polynomial", 3, 3, 1)
+    used = {node.primitive.name for item in found for node in _find_calls(item.expression)}
+    assert used == {"mul", "sub", "sign"}
 
 
 # Errors.

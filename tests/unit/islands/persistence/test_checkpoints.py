@@ -4,6 +4,7 @@ import json
 import os
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 
 import pytest
 
@@ -127,6 +128,22 @@ def test_an_island_with_a_missing_part_is_refused(document, path, name):
         read_checkpoint(path)
 
 
+def test_a_crash_before_replacing_keeps_the_old_checkpoint(path, monkeypatch):
+    write_checkpoint(EMPTY, path, {"epoch": "old"})
+
+    def crash(self, target):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", crash)
+        with pytest.raises(KeyboardInterrupt):
+            write_checkpoint(archipelago(), path, {"epoch": "new"})
+    assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
+    write_checkpoint(archipelago(), path, {"epoch": "new"})
+    assert read_checkpoint(path) == (archipelago(), {"epoch": "new"})
+    assert [entry.name for entry in path.parent.iterdir()] == ["checkpoint.json"]
+
+
 # Atomic replacement.
 
 
@@ -140,6 +157,15 @@ def test_a_crash_while_writing_keeps_the_old_checkpoint(path, monkeypatch):
     with pytest.raises(OSError, match="No space left"):
         write_checkpoint(archipelago(), path, {"epoch": "new"})
     assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
+
+
+def test_a_checkpoint_is_synced_before_it_replaces_the_old_one(path, monkeypatch):
+    order = []
+    synchronise, put = os.fsync, Path.replace
+    monkeypatch.setattr(os, "fsync", lambda number: (order.append("synchronised"), synchronise(number))[1])
+    monkeypatch.setattr(Path, "replace", lambda self, to: (order.append("replaced"), put(self, to))[1])
+    write_checkpoint(archipelago(), path, {})
+    assert order == ["synchronised", "replaced"]
 
 
 # Hall of fame files.
@@ -166,6 +192,20 @@ def test_equal_halls_are_the_same_bytes_from_any_search(tmp_path):
     write_hall(other, tmp_path / "other.json")
     assert (tmp_path / "one.json").read_bytes() == (tmp_path / "other.json").read_bytes()
     assert {path.name for path in tmp_path.iterdir()} == {"one.json", "other.json"}
+
+
+def test_a_hall_is_replaced_atomically(tmp_path, monkeypatch):
+    path = tmp_path / "hall.json"
+    write_hall(HallOfFame(), path)
+    before = path.read_bytes()
+
+    def crash(self, target):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", crash)
+    with pytest.raises(KeyboardInterrupt):
+        write_hall(halls()[0], path)
+    assert path.read_bytes() == before
 
 
 # Invalid checkpoints are refused with a message that names the file.

@@ -1,5 +1,7 @@
 """The regressor matrix has the value of each expression per row; the Gram matrix its inner products."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -9,6 +11,7 @@ from islands.errors import RecordError, SettingsError
 from islands.expressions.parsing import parse
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Lagged
+from islands.expressions.user_primitive import primitive
 from islands.kernels.summation import CHUNK, dot
 from islands.models.regressor import regressor
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix
@@ -63,6 +66,22 @@ def test_row_reads_nothing_of_another_segment():
     before, after = (regressor_matrix(terms, each, 5) for each in (record, spoiled))
     np.testing.assert_array_equal(before[:, 15:], after[:, 15:])
     assert not np.any(before[:, :15] == after[:, :15])
+
+
+def test_user_defined_primitive_equals_its_python_function():
+    def backlash(a, b):
+        return a - math.tanh(b) if a > b else a * b
+
+    table = {**PRIMITIVES, "backlash": primitive("backlash", backlash)}
+    record = noise(300, inputs=2)
+    found = regressor_matrix([of("backlash(u1(k-1), y(k-2))*u2(k-1)", table)], record, 2)
+    expected = [
+        backlash(u, y) * v
+        for u, y, v in zip(
+            record.u[1:-1, 0].tolist(), record.y[:-2].tolist(), record.u[1:-1, 1].tolist(), strict=True
+        )
+    ]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-15)
 
 
 SEGMENTS = ((1000,), (100, 300, 7, 593), (CHUNK + 3, CHUNK + 3, CHUNK + 3), (3 + CHUNK // 2,) * 4)

@@ -27,6 +27,15 @@ def test_a_mean_has_the_middle_of_its_samples():
     assert means.time.tolist() == [2.5, 4.0, 5.5]
 
 
+def test_no_mean_contains_samples_of_two_segments():
+    record = ramp(segments=(5, 6))
+    means = average_samples(record, 2)
+    assert means.segments == (2, 3)
+    assert means.y.tolist() == [5.0, 25.0, 55.0, 75.0, 95.0]
+    parts = [average_samples(part, 2).y for part in (record[:5], record[5:])]
+    assert means.y.tolist() == np.concatenate(parts).tolist()
+
+
 @pytest.mark.parametrize(
     ("samples", "count", "means"), [(500, 1, 500), (500, 20, 25), (52, 5, 10), (3, 20, 1)]
 )

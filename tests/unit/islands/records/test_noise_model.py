@@ -35,6 +35,13 @@ def draw_recordings() -> list[np.ndarray]:
     ]
 
 
+def test_whitening_of_a_recording_does_not_depend_on_the_others() -> None:
+    noise = NoiseModel(np.array([0.9, -0.2]), 1.0, 600.0)
+    parts = draw_recordings()
+    whitened = noise.whiten(np.concatenate(parts), LENGTHS)
+    assert whitened.tolist() == np.concatenate([noise.whiten(part) for part in parts]).tolist()
+
+
 def test_autoregression_is_the_least_squares_fit_within_the_recordings() -> None:
     parts = draw_recordings()
     equations = np.concatenate(

@@ -9,6 +9,7 @@ from islands.export import export
 from islands.kernels.state_space import simulate_state_space
 from islands.simulation.initial_states import (
     Segment,
+    estimate_initial_states,
     estimate_states,
     simulate_errors,
 )
@@ -25,6 +26,15 @@ def test_states_of_a_record_without_noise_are_found():
     model = make_model()
     found = estimate_states(model.theta, model.codes, Segment(record.u, record.y), model.rest)
     assert found == pytest.approx([0.5, -0.4], abs=1e-3)
+
+
+def test_outputs_after_the_warm_up_have_no_influence():
+    record, model = spring_record(200), make_model()
+    found = estimate_initial_states(model, record, np.array([50]), 50)
+    changed = spring_record(200)
+    changed.y.flags.writeable = True
+    changed.y[50:] = 7.0
+    assert (estimate_initial_states(model, changed, np.array([50]), 50) == found).all()
 
 
 def test_a_model_that_diverges_in_the_warm_up_diverges_at_the_first_prediction():

@@ -5,6 +5,7 @@ import pytest
 
 from islands.expressions.parsing import parse
 from islands.models.narx import make_model
+from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset, join
 from islands.simulation.predictors import multiple_shooting
 from islands.simulation.sensitivities import make_sensitivities
@@ -52,6 +53,12 @@ def test_sensitivities_are_the_derivatives_of_the_predictions(interval):
     found = make_sensitivities(model.regressors, record, model.maximum_lag, interval)(theta, directions)
     for row, direction in zip(found, directions.T, strict=True):
         assert row == pytest.approx(differentiate(model, record, interval, direction), rel=1e-8, abs=1e-8)
+
+
+def test_one_step_ahead_sensitivities_are_the_regressors():
+    model, record = make_model_and_record(60)
+    found = make_sensitivities(model.regressors, record, 3, 1)(np.array(model.parameters), np.eye(len(TERMS)))
+    assert np.array_equal(found, regressor_matrix(model.regressors, record, 3))
 
 
 def test_sensitivity_whose_squares_overflow_is_zero():

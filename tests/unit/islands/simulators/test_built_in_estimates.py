@@ -24,6 +24,8 @@ from islands.simulators.ode.system import OdeEffect
 from islands.simulators.specification.description import describe_extension
 from islands.simulators.specification.factory import make_simulator
 from islands.simulators.specification.table import LocalExtendedSpec, PhysicalSpec
+from islands.systems.bouc_wen import BoucWenPiezo
+from islands.systems.bouc_wen import simulate as simulate_piezo
 from support.built_in_simulators import make_oscillator, make_piezo, make_tanks
 from support.simulated_records import made, recorded, simulate_oscillator, wave
 from support.strategies import part_of_the_examples
@@ -88,6 +90,13 @@ def test_tanks_have_the_levels_of_a_fine_integration() -> None:
     simulation = extend(make_tanks(**TANKS, levels=LEVELS), u, 0.5)
     expected = simulate_tanks(u, 0.5)
     assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-4 * np.ptp(expected))
+
+
+def test_a_piezo_has_the_output_of_equation_11() -> None:
+    u = wave()
+    simulation = extend(make_piezo(), u)
+    expected = simulate_piezo(BoucWenPiezo(), u, 0.01)
+    assert simulation.simulate(simulation.nominal) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_part_of_the_overflow_enters_the_lower_tank() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from islands.errors import RecordError, SettingsError
 from islands.systems import appendix
-from islands.systems.appendix import S1
+from islands.systems.appendix import S1, S2
 
 
 def test_s1_is_the_recursion_of_the_paper():
@@ -23,6 +23,25 @@ def test_s2_is_the_recursion_of_the_paper():
     third = 1.0 * 2.0 * (2.5 + 2.0) / (1 + 1.0 + 4.0)
     fourth = third * 2.0 * (2.5 + third) / (1 + third**2 + 4.0)
     np.testing.assert_allclose(appendix.simulate_s2(u), [0.0] * 11 + [1.0, 2.0, third, fourth], rtol=1e-14)
+
+
+def test_noise_std_is_fixed_for_s1_and_a_fifth_of_the_output_for_s2():
+    output = np.array([-3.0, 3.0])
+    assert S1.noise_std(output) == 0.02
+    assert S2.noise_std(output) == pytest.approx(0.2 * 3.0)
+
+
+def snr_of_variances(signal, noise):
+    """Return the paper's signal-to-noise ratio: 20 log10 of a ratio of variances."""
+    return 20 * np.log10(signal.var() / noise.var())
+
+
+def test_quoted_snr_of_s2_follows_from_its_noise_variance():
+    quoted = 28.05
+    records = [appendix.white_record(S2, seed) for seed in range(50)]
+    clean = [S2.simulate(record.u[:, 0]) for record in records]
+    snr = [snr_of_variances(y, record.y - y) for y, record in zip(clean, records, strict=True)]
+    assert np.mean(snr) == pytest.approx(quoted, abs=0.3)
 
 
 def test_inverse_filter_of_the_unit_gain_input_returns_white_noise():

@@ -36,6 +36,10 @@ def test_runge_kutta_agrees_with_an_adaptive_integrator():
     assert np.ptp(exact) > 60.0
 
 
+def test_default_parameters_are_those_of_the_paper():
+    assert (PIEZO.A, PIEZO.beta, PIEZO.gamma, PIEZO.dp) == (0.9, 0.008, 0.008, 1.6)
+
+
 def test_hysteretic_state_is_linear_in_the_voltage_after_a_reversal():
     # With beta = gamma the loss vanishes while slope and state have opposite signs, so h' = A u'.
     u = np.linspace(0.0, 20.0, 2001)
@@ -50,6 +54,14 @@ def test_hysteretic_state_saturates_at_its_theoretical_level():
     limit = PIEZO.A / (PIEZO.beta + PIEZO.gamma)
     np.testing.assert_allclose(h, limit * (1 - np.exp(-u * (PIEZO.beta + PIEZO.gamma))), atol=1e-8)
     assert h[-1] == pytest.approx(56.25, abs=0.01)
+
+
+def test_loop_does_not_depend_on_the_rate():
+    fine = 1e-4
+    slow = simulate(PIEZO, signals.sine(fine, 8.0, 40.0, 0.25), fine)[::20]
+    fast = simulate(PIEZO, signals.sine(fine, 0.4, 40.0, 5.0), fine)
+    assert np.ptp(fast) > 60.0
+    np.testing.assert_allclose(slow, fast, atol=2e-3)
 
 
 def test_inconsistent_shapes_are_refused():

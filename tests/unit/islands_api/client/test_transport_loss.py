@@ -41,6 +41,19 @@ def test_lost_answer_to_a_submission_creates_no_second_job(
     assert [found.id for found in service.store.jobs.page(me.owner).jobs] == [job.id]
 
 
+@pytest.mark.ci
+def test_lost_answer_to_an_upload_creates_no_second_data_set(
+    connect: Any, me: Any, wire: Any, tmp_path: Any
+) -> None:
+    path = tmp_path / "record.csv"
+    path.write_bytes(b"u_V,y_um\n" + b"".join(b"%d.5,%d.25\n" % (k, k % 7) for k in range(99)))
+    wire.cuts = [0]
+    client = connect(wire.url, me.secret)
+    dataset = client.upload(path)
+    assert wire.connections == 2
+    assert [found.id for found in client.datasets().items] == [dataset.id, me.dataset]
+
+
 def test_lost_answer_to_a_cancellation_is_not_an_error(client: Any, connect: Any, me: Any, wire: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     wire.cuts = [0]

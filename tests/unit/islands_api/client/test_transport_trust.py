@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import trustme
 
+from islands.errors import SettingsError
 from islands_api.client import ServiceError, ServiceUnreachableError
 from islands_api.web.app import create_app
 from islands_service.settings import ServiceSettings
@@ -69,6 +70,15 @@ def test_missing_or_unknown_key_is_rejected(
     assert (caught.value.status, caught.value.type) == (401, "/problems/no-key")
     with pytest.raises(ServiceError, match=message):
         list(connect(guarded.url, key).events("0"))
+
+
+@pytest.mark.parametrize(
+    "key", ["", "  ", f"{SECRET}\nX-Other: 1", f"{SECRET} {SECRET}", f"{SECRET}ü", f"\0{SECRET}"]
+)
+def test_malformed_key_is_rejected_without_showing_the_key(connect: Any, key: str) -> None:
+    with pytest.raises(SettingsError, match="give it as 'islands admin keys' printed it") as caught:
+        connect("http://127.0.0.1:9", key)
+    assert SECRET not in format_error(caught.value)
 
 
 def test_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted: Any) -> None:

@@ -20,6 +20,7 @@ from islands_service.runtime import ClusterError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.buckets import ObjectStoreError
+from islands_service.store.database import CommitUnknownError, StoreUnavailableError
 from islands_service.store.tables import jobs
 from support.job_runs import make_run
 from support.stores import ALICE
@@ -132,6 +133,46 @@ def test_lost_lease_deletes_no_checkpoint_of_its_successor(store: Store, blobs: 
         run_identification_job(make_run(old, store, blobs, lambda: None, 1e-9))
     assert store.jobs.get(ALICE, job.id).checkpoint == kept == new.job.checkpoint
     assert kept in dict(blobs.all())
+
+
+class Doubtful:
+    """Leases of a store that loses the connection during some commits."""
+
+    def __init__(self, store: Store) -> None:
+        self._store, self.reports, self.leases = store, 0, self
+
+    def report(self, *arguments: Any) -> Job:
+        self.reports += 1
+        if self.reports % 3 == 1:
+            raise StoreUnavailableError("the database does not answer")
+        reported = self._store.leases.report(*arguments)
+        if self.reports % 3 == 2:
+            raise CommitUnknownError("the connection was lost")
+        return reported
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._store, name)
+
+
+@pytest.mark.ci
+def test_named_checkpoint_exists_whatever_the_store_acknowledges(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "CHECKPOINT_SHARE", 1e9)
+    before = set(dict(blobs.all()))
+    kept = []
+
+    def look() -> None:
+        named = store.jobs.get(ALICE, job.id).checkpoint
+        found = set(dict(blobs.all())) - before
+        assert named is None or named in found
+        kept.append(len(found))
+
+    flaky: Any = Doubtful(store)
+    outcome = run_identification_job(make_run(claim(store), flaky, blobs, look, 1e-9))
+    assert [json.loads(json.dumps(document)) for document, _ in outcome.models] == undisturbed[0]
+    assert 2 <= max(kept) <= 4
+    assert flaky.reports > 10
 
 
 class LostIslands(tuple[Island, ...]):

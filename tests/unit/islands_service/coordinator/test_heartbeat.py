@@ -22,6 +22,22 @@ from islands_service.store.database import StoreUnavailableError
 from support.processes import alive, eventually
 from support.stores import ALICE, child, claimed, submitted, turn_clock
 
+BROKEN = """
+import sys, time
+from islands_service.liveness import StopRequest
+from islands_service.coordinator import heartbeat
+from islands_service.store import Store
+with Store(sys.argv[1]) as store:
+    lease = store.leases.claim("broken", 60.0)
+    with heartbeat.Heartbeat(store, lease, 0.3, StopRequest()):
+        def fail(*_):
+            raise MemoryError
+        store.leases.renew = store.leases.read_requests = fail
+        time.sleep(10.0)
+        print("went on", flush=True)
+"""
+
+
 #: Seconds of a lease, in which it is renewed ten times.
 SECONDS = 0.3
 
@@ -127,6 +143,15 @@ def test_heartbeat_keeps_the_lease_beyond_its_duration(
     assert store.leases.claim("another", SECONDS) is None
     turn_clock(store, 61.0)
     assert store.leases.claim("another", SECONDS) is not None
+
+
+def test_lost_lease_is_reported_and_nothing_is_written(store: Store, lease: Lease) -> None:
+    take_over(store)
+    before = store.jobs.get(ALICE, lease.job.id)
+    with Heartbeat(store, lease, SECONDS, StopRequest()) as heartbeat:
+        eventually(lambda: raised_by_check(heartbeat) is LeaseLostError, seconds=20.0)
+        heartbeat._thread.join(SECONDS)  # ten more renewals, if it continued
+    assert store.jobs.get(ALICE, lease.job.id) == before
 
 
 def test_lost_lease_precedes_cancellation_and_that_precedes_a_stop(store: Store, lease: Lease) -> None:
@@ -328,6 +353,17 @@ def test_request_to_stop_the_search_is_kept_and_ends_no_check(store: Store, leas
     # A coordinator that takes the job over knows the request from the start.
     with Heartbeat(store, take_over(store), SECONDS, StopRequest()) as heartbeat:
         assert heartbeat.is_search_stopped()
+
+
+@pytest.mark.ci
+def test_heartbeat_that_fails_unexpectedly_ends_the_process(store: Store) -> None:
+    """Otherwise the job would run on without a lease and without a guard."""
+    submitted(store)
+    with child(BROKEN, store.database.url) as broken:
+        said, _ = broken.communicate(timeout=30)
+    assert "MemoryError" in said
+    assert "went on" not in said
+    assert broken.returncode == 1
 
 
 def test_restart_ends_the_computation_and_keeps_the_process_and_its_lifeline(tmp_path):

@@ -11,6 +11,7 @@ import pytest
 import structlog
 
 from islands_service.coordinator import main_loop as coordinator_module
+from islands_service.coordinator import sweeper as sweeper_module
 from islands_service.coordinator.job_run import JobRun
 from islands_service.domain.job import (
     Job,
@@ -171,6 +172,25 @@ def test_unreferenced_blobs_are_swept_after_an_hour(
 
     eventually(swept, seconds=30.0)
     assert {young, named} <= {blob for blob, _ in blobs.all()}
+
+
+def test_blob_referenced_during_a_sweep_is_kept(
+    store: Store, blobs: Blobs, settings: ServiceSettings, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A coordinator may be suspended between two steps of a sweep for longer than the age limit."""
+    monkeypatch.setattr(sweeper_module, "ORPHAN_AGE", 0.1)
+    named_blobs = store.retention.named_blobs
+    written: list[str] = []
+
+    def slow_named_blobs() -> frozenset[str]:
+        named = named_blobs()
+        written.append(blobs.write(b"named meanwhile"))
+        time.sleep(0.3)
+        return named
+
+    monkeypatch.setattr(store.retention, "named_blobs", slow_named_blobs)
+    sweeper_module.Sweeper(settings, store, blobs, -1.0).sweep_if_due()
+    assert blobs.read(written[0]) == b"named meanwhile"
 
 
 def test_wait_for_ray_counts_as_an_attempt_if_it_ends(

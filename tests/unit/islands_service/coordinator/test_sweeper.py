@@ -47,6 +47,19 @@ def listed(store):
     return [job.id for job in store.jobs.page(ALICE).jobs]
 
 
+def test_results_survive_a_jump_of_the_clock_that_is_repaired(store, sweep, advance):
+    job = job_in(store, JobState.SUCCEEDED)
+    sweep()
+    advance(400 * DAY)
+    for _ in range(3):
+        sweep()
+    assert listed(store) == [job.id]
+    turn_clock(store, -400 * DAY)
+    advance(0.0)
+    sweep()
+    assert listed(store) == [job.id]
+
+
 def test_jump_that_is_not_repaired_is_the_time_after_a_pause(store, sweep, advance, monkeypatch):
     job_in(store, JobState.SUCCEEDED)
     sweep()

@@ -56,6 +56,11 @@ def test_missing_blob_raises_an_error_with_advice(blobs, folder):
         blobs.read("0" * 64)
 
 
+def test_folder_is_not_accessible_to_other_users(blobs, folder):
+    blobs.write(b"a")
+    assert {path.stat().st_mode & 0o077 for path in (folder, *folder.rglob("*"))} == {0}
+
+
 def test_received_file_that_is_not_kept_is_deleted(blobs, folder):
     with blobs.receiving() as stream:
         stream.write(b"a")

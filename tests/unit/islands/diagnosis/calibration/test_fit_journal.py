@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.diagnosis.calibration.fit_journal import FitJournal, journal_from_document
+from islands.diagnosis.calibration.fit_journal import FitJournal, RecordedFit, journal_from_document
 from islands.diagnosis.calibration.starts_calibrator import (
     CalibratedStart,
     CalibrationTask,
@@ -107,3 +107,14 @@ def test_digest_depends_on_everything_that_a_fit_depends_on(due: tuple[StartsCal
     assert len(set(digests)) == len(digests) == 10
     again = ExtendedSimulator(simulation.simulator, simulation.effects, simulation.context)
     assert calibrator.make_digest((again, [start.copy() for start in starts])) == digests[0]
+
+
+def test_stored_floats_are_exact() -> None:
+    numbers = np.random.default_rng(1).integers(0, 2**64, 500, dtype=np.uint64).view(np.float64)
+    values = [np.array([-0.0, 5e-324, 0.1, np.inf]), numbers[np.isfinite(numbers)], np.zeros(0)]
+    document = json.loads(json.dumps(FitJournal([RecordedFit("a", values)]).to_document()))
+    ((digest, stored),) = journal_from_document(document).to_document()
+    assert digest == "a"
+    assert [np.array(each, dtype=np.float64).tobytes() for each in stored] == [
+        each.tobytes() for each in values
+    ]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from islands.diagnosis.calibration import levenberg_marquardt
 from islands.diagnosis.calibration.levenberg_marquardt import calibrate
 from islands.diagnosis.calibration.problem import CalibrationProblem, simulate_together
 from islands.diagnosis.calibration.target import Target
@@ -56,6 +57,16 @@ def test_step_without_damping_solves_the_linearised_problem(
     expected = np.linalg.lstsq(point.jacobian, point.residual, rcond=None)[0] * simulation.scales
     np.testing.assert_allclose(steps[0] - point.values, expected, rtol=1e-4)
     assert predicted[0] > predicted[1] > 0.0
+
+
+def test_simulations_in_groups_give_the_same_fit(
+    oscillator: tuple[ExtendedSimulator, Target], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation, target = oscillator
+    one_by_one = calibrate(simulation, target, simulation.nominal)
+    monkeypatch.setattr(levenberg_marquardt, "MIN_BATCHED_SAMPLES", 1)
+    grouped = calibrate(simulation, target, simulation.nominal)
+    assert grouped.values.tobytes() == one_by_one.values.tobytes()
 
 
 @pytest.mark.parametrize(("chi", "g"), [(8.0, 0.0), (1.0, 0.8)])

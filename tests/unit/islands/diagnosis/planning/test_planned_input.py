@@ -26,6 +26,16 @@ def test_an_input_stays_within_its_limits(form: InputForm, frequency: float, rat
     assert np.ptp(u) > 0.0
 
 
+def test_an_input_depends_on_its_seed_alone() -> None:
+    limits = InputLimits(-1.0, 1.0)
+    for form in (InputForm.MULTISINE, InputForm.STEPS):
+        one, again, other = (
+            PlannedInput(form, 0.5, 4.0, 0.4, seed).make(limits, DT, SAMPLES) for seed in (1, 1, 2)
+        )
+        assert np.array_equal(one, again)
+        assert not np.array_equal(one, other)
+
+
 def test_impossible_limits_are_refused() -> None:
     with pytest.raises(SettingsError, match="positive amplitude"):
         find_limits(wave((1.0,)), DT, amplitude=-1.0)

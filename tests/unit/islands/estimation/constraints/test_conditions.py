@@ -19,6 +19,27 @@ def texts(regressors):
     return [plain(item.expression) for item in regressors]
 
 
+def rows(text, *terms):
+    """Return every row as ({text of the term: coefficient}, target)."""
+    found = constraint(text).constrain(make_regressors(*terms))
+    return [
+        ({name: weight for name, weight in zip(texts(found.regressors), row, strict=True) if weight}, target)
+        for row, target in zip(found.S.tolist(), found.c.tolist(), strict=True)
+    ]
+
+
+def test_fixed_point_weighs_every_term_with_its_steady_state():
+    expected = {"y(k-1)": 3.0, "u(k-1)": 2.0, "u(k-2)^2": 4.0, "y(k-2)*u(k-1)": 6.0}
+    assert rows("fixed-point = 2, 3", *TERMS) == [(expected, 3.0)]
+
+
+def test_gain_weighs_every_term_with_the_slope_along_the_characteristic():
+    # d(y u) = y du + u dy, with dy = G du.
+    expected = {"y(k-1)": 0.5, "u(k-1)": 1.0, "u(k-2)^2": 4.0, "y(k-2)*u(k-1)": 3.0 + 2.0 * 0.5}
+    assert rows("gain = 0.5 at 2, 3", *TERMS) == [(expected, 0.5)]
+    assert rows("gain = 0.5", *TERMS) == [({"y(k-1)": 0.5, "u(k-1)": 1.0}, 0.5)]
+
+
 TERMS = ("y(k-1)", "u(k-1)", "u(k-2)^2", "y(k-2)*u(k-1)", "phi2(u(k-1), u(k-2))")
 
 

@@ -8,6 +8,8 @@ from math import inf
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import islands
 from islands.estimation.estimate import FittedStructure, estimate
@@ -71,6 +73,16 @@ def test_bound_is_the_least_error_of_all_subsets(name, degree, constraints, term
             assert certificate.bound == pytest.approx(expected, rel=1e-9)
             assert root_mean_square(certificate.structure, record, constraints) == pytest.approx(expected)
             assert certificate.proves(expected)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 1000), st.integers(1, 6), st.integers(1, 200))
+def test_bound_with_few_nodes_is_below_that_with_many(seed, terms, nodes):
+    problem = make_selection_problem(candidates("polynomial", 2, LAGS, 1), measured(seed, 100))
+    few, many = (SubsetSearch(problem, terms).certify(limit)[-1] for limit in (nodes, 10_000))
+    assert few.bound <= many.bound * (1.0 + 1e-9)
+    assert few.nodes <= nodes
+    assert SubsetSearch(problem, terms).certify(nodes)[-1] == few
 
 
 def test_best_subset_is_found_where_forward_selection_fails():

@@ -9,6 +9,12 @@ import pytest
 import islands
 from islands.errors import SettingsError
 from islands.facade.coupled.identification import StoppedCouplingError, fit_coupled, identify_coupled
+from islands.persistence.checkpoints import (
+    archipelago_from_document,
+    checkpoint_text,
+    state_document,
+    state_from_document,
+)
 from islands.records.coupled import CoupledRecord
 from support.latent_systems import curves_record
 from support.undrawn import undrawn_figures
@@ -36,6 +42,20 @@ def test_a_saved_result_is_read_with_the_same_bands(found, tmp_path):
     assert all(each["ensemble"] for each in document["outputs"])
     assert "parameters, those of separate searches" in (folder / "summary.txt").read_text()
     assert islands.load(folder / "outputs" / "2-y2").best.model.units == found.results[1].best.model.units
+
+
+@pytest.mark.ci
+def test_a_search_that_continues_has_the_same_result(found):
+    states = []
+    again = identify_coupled(
+        curves_record(300, 1), on_epoch=lambda state, _settings: states.append(state), **SHORT
+    )
+    assert again.model == found.model
+    assert [len(state.earlier) for state in states] == [0, 0, 0, 1, 1, 1]
+    for state in (states[1], states[4]):
+        text = checkpoint_text(state.archipelago, state_document(state))
+        stored = state_from_document(*archipelago_from_document(text, "test"))
+        assert identify_coupled(curves_record(300, 1), start=stored, **SHORT).model == found.model
 
 
 @pytest.mark.ci

@@ -6,18 +6,48 @@ import numpy as np
 import pytest
 
 from islands.errors import SettingsError
+from islands.estimation.estimate import estimate
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.search_state import SearchState
 from islands.facade.results.model_simulation import SIMULATION_MODES
 from islands.persistence.checkpoints import read_checkpoint, write_checkpoint
+from islands.records.split import split
 from islands.validation.assessment import MODES
 from islands.validation.metrics import metrics
+from islands.validation.physics import check_physics
 from support.identifications import BUDGET, identify, parameters, record
 
 # Contents of a result.
 
 
 # Seeds and starts.
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.nightly) for each in (1, 3))])
+def test_models_without_property_1_do_not_enter_the_hall_of_fame(data, seed):
+    """With y(k-2) instead of y(k-1) the cluster sums are met, but two undamped solutions interleave."""
+    states = []
+    budget = {"preset": "paper-case1", "population": 30, "generations": 2, "max_terms": 4, "shooting": 100}
+    short = data[:1500]
+    found = identify(short, **budget, seed=seed, on_epoch=lambda state, _settings: states.append(state))
+    assert all(fitted.physics.property_1 for fitted in found.models)
+    estimation = split(short, 0.25).estimation
+    known = [
+        estimate(entry.regressors, estimation, "hysteresis", 26).model
+        for entry in states[-1].archipelago.hall_of_fame.entries
+    ]
+    assert len(known) > 5
+    assert all(check_physics(model, estimation).property_1 for model in known)
+
+
+@pytest.mark.ci
+def test_equal_seeds_give_equal_bits_and_other_seeds_other_results(data, result):
+    again = identify(data, **BUDGET, seed=5)
+    assert parameters(again) == parameters(result)
+    assert again.search_result.search.history == result.search_result.search.history
+    other = identify(data, **BUDGET, seed=6)
+    assert other.search_result.search.history != result.search_result.search.history
 
 
 @pytest.mark.ci

@@ -1,6 +1,6 @@
 """Arguments of `islands.identify`: validation data, presets, constraints, settings."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -8,9 +8,21 @@ import pytest
 from islands.errors import RecordError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.records.dataset import Dataset
-from support.identifications import BUDGET, identify, record
+from islands.records.split import split
+from support.identifications import BUDGET, identify, parameters, record
 
 # Errors before the search starts.
+
+
+@pytest.mark.ci
+def test_validation_data_do_not_affect_the_search(data, result):
+    """Only the selection and order of models may depend on them."""
+    parts = split(data, 0.25)
+    spoilt = replace(parts.validation, y=parts.validation.y[::-1].copy())
+    other = identify(parts.estimation, validation=spoilt, **BUDGET, seed=5)
+    assert other.search_result.search.history == result.search_result.search.history
+    assert other.search_result.search.outcomes == result.search_result.search.outcomes
+    assert parameters(other) != parameters(result)
 
 
 @pytest.mark.parametrize(

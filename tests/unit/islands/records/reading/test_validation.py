@@ -96,6 +96,26 @@ def test_a_decimal_comma_between_commas_is_recognised(tmp_path):
     assert "if it is a decimal comma, save with ';' between the columns" in message
 
 
+def test_an_input_that_ends_early_is_refused_as_of_unequal_length(tmp_path):
+    rows = lines()
+    for line in range(41, len(rows)):
+        cells = rows[line].split(",")
+        cells[1] = ""
+        rows[line] = ",".join(cells)
+    message = refusal(tmp_path, rows)
+    assert "line 42, column u_V and all below, to line 61, are empty" in message
+    assert "unequal lengths" in message
+    assert "select the rows that are complete" in message
+
+
+def test_a_blank_line_between_samples_is_refused(tmp_path):
+    rows = lines()
+    rows.insert(20, "")
+    message = refusal(tmp_path, rows)
+    assert "bad.csv, line 21 is blank" in message
+    assert "islands.join" in message
+
+
 def test_too_few_samples_are_refused_and_just_enough_are_not(tmp_path):
     message = refusal(tmp_path, lines(MIN_SAMPLES - 1))
     assert "29 samples, from line 2 to line 30, are too few: at least 30 are needed" in message
@@ -131,10 +151,39 @@ def test_a_gap_is_refused_at_the_line_after_it(tmp_path):
     assert 'a gap of 0.02 before line 31; give gaps="split"' in message
 
 
+@pytest.mark.parametrize("missing", [2, 30, 59])
+def test_a_gap_of_one_sample_is_found_anywhere_even_in_integers(tmp_path, missing):
+    rows = ["t_s,u_V,y_um", *(f"{k},{k % 7},{k % 11}" for k in range(61) if k != missing)]
+    assert f"line {missing + 2}, column t_s follows a gap" in refusal(tmp_path, rows)
+
+
 def test_a_repeated_time_stamp_is_refused(tmp_path):
     message = refusal(tmp_path, changed(25, 0, "0.22"))
     assert "line 25, column t_s repeats the time stamp 0.22" in message
     assert "resample" in message
+
+
+def test_a_jump_backwards_is_refused_as_the_start_of_another_recording(tmp_path):
+    rows = [*lines(), *lines()[1:]]
+    message = refusal(tmp_path, rows)
+    assert "line 62, column t_s jumps back to 0 from 0.59" in message
+    assert 'give gaps="split" for segments' in message
+
+
+def test_jittered_sampling_is_refused(tmp_path):
+    t = 0.01 * (np.arange(60) + np.random.default_rng(3).uniform(-0.1, 0.1, 60))
+    rows = [HEADER, *(f"{t[k]:.6f},{k % 7},{k % 11}" for k in range(60))]
+    message = refusal(tmp_path, rows)
+    assert "column t_s is off the uniform grid" in message
+    assert "give resample=0.01" in message
+    assert "dt=0.01" in message
+
+
+def test_a_change_of_the_sampling_rate_is_refused_at_its_line(tmp_path):
+    t = [k * 0.01 if k < 30 else 0.3 + (k - 30) * 0.02 for k in range(60)]
+    rows = [HEADER, *(f"{t[k]:.4f},{k % 7},{k % 11}" for k in range(60))]
+    message = refusal(tmp_path, rows)
+    assert "line 32, column t_s" in message
 
 
 def test_a_time_column_and_a_sampling_time_that_disagree_are_refused(tmp_path):

@@ -115,6 +115,15 @@ def test_diverging_free_run_is_nan_from_the_diverged_sample(name):
     assert np.isnan(found.y[sample:]).all()
 
 
+def test_divergence_only_ends_its_own_interval():
+    data = record(spikes(s100=1e9), segments=(90, 60, 150))
+    found = multiple_shooting(model((1.0, "u(k-1)")), data, 20).y
+    # Intervals of the second segment begin at 91 and 111.
+    assert np.isnan(found[101:111]).all()
+    predicted = np.r_[1:90, 91:101, 111:150, 151:300]
+    assert np.array_equal(found[predicted], data.u[predicted - 1, 0])
+
+
 @pytest.mark.parametrize(
     ("y", "scale"),
     [

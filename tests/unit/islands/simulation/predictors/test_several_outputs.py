@@ -19,6 +19,27 @@ from islands.simulation.outcome import Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from support.coupled_systems import PREY, TWO_MASSES, equation, make_coupled_record, simulate_scalar
 
+DECOUPLED = CoupledModel(
+    (
+        equation(
+            {"y(k-1)": 0.8, "tanh(mul(u1(k-1), y(k-3)))": 0.4, "mul(u1(k-1), u1(k-2), y(k-1))": -0.2},
+            ("u", "y2"),
+            "y1",
+        ),
+        equation({"y(k-2)": 0.5, "sign(sub(u1(k-1), u1(k-2)))": 0.3, "1": 0.1}, ("u", "y1"), "y2"),
+    )
+)
+
+
+@pytest.mark.parametrize("segments", [(), (150, 250), (40,) * 10])
+def test_a_decoupled_model_has_the_bits_of_its_single_models(segments) -> None:
+    record = make_coupled_record(DECOUPLED, noise=0.1, segments=segments)
+    coupled = free_run(DECOUPLED, record, warm_up=4)
+    for place, single in enumerate(DECOUPLED.models):
+        alone = free_run(single, record.separate(place), warm_up=4)
+        np.testing.assert_array_equal(coupled.y[:, place], alone.y)
+        assert coupled.mean_squared_errors[place] == pytest.approx(alone.mean_squared_error, rel=1e-12)
+
 
 @pytest.mark.parametrize("model", [TWO_MASSES, PREY])
 def test_a_free_run_equals_a_simulation_with_python_floats(model) -> None:

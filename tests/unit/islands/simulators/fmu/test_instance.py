@@ -78,6 +78,18 @@ def test_the_simulation_is_the_solution_of_the_equations(
     assert np.array_equal(found.y[:, 0], [0.02, -0.3])
 
 
+@pytest.mark.parametrize("macros", [(), pytest.param(("NO_RESET",), marks=pytest.mark.ci)])
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_simulation_does_not_depend_on_earlier_ones(
+    version: int, macros: tuple[str, ...], tmp_path: Path
+) -> None:
+    fmu = load(write_oscillator(tmp_path / "mass.fmu", version, macros=macros))
+    first = run(fmu)
+    run(fmu, m=0.7, c=1.0)
+    run(fmu, x=0.1, start=3.0)
+    assert np.array_equal(run(fmu).y, first.y)
+
+
 def test_a_state_event_rebounds_the_mass(tmp_path: Path) -> None:
     """The mass does not pass the stop at 0.05 m; its velocity there is inverted and halved."""
     fmu = load(write_oscillator(tmp_path / "mass.fmu", events=True))

@@ -1,6 +1,7 @@
 """Simulation of equations: compared with a plain integration, with compiled kernels, and lane by lane."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,19 @@ def test_every_function_has_the_value_of_the_reference() -> None:
     lane = everything()
     found = simulate_lanes(generate_program(system), DT, [lane])[0, 0]
     assert found[:60] == pytest.approx(integrate_plainly(system, lane, 60), abs=1e-11)
+
+
+def test_a_lane_does_not_depend_on_the_others() -> None:
+    """Also not on one that diverges, nor on one with its own signals, nor on the number of lanes."""
+    program = generate_program(make_system(EVERYTHING))
+    lanes = [everything(a=0.4 + 0.01 * i, tau=0.033 + 0.001 * i) for i in range(19)]
+    lanes[3] = replace(lanes[3], initial_states={**lanes[3].initial_states, "p": 1e200})
+    lanes[5] = replace(lanes[5], signals={**lanes[5].signals, "F": interpolate_linearly(2 * FORCE)})
+    together = simulate_lanes(program, DT, lanes)
+    alone = np.concatenate([simulate_lanes(program, DT, [each]) for each in reversed(lanes)])[::-1]
+    assert np.array_equal(together, alone, equal_nan=True)
+    assert np.isnan(together).all(axis=(1, 2)).tolist() == [i == 3 for i in range(19)]
+    assert np.array_equal(together[:, :, ::3], simulate_lanes(program, DT, lanes, every=3), equal_nan=True)
 
 
 def test_halving_the_step_divides_the_error_by_sixteen() -> None:

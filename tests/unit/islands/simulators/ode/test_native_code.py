@@ -136,6 +136,16 @@ def test_program_is_compiled_once_it_has_run_long_enough(monkeypatch: pytest.Mon
     assert len(set(found)) == 1
 
 
+def test_stored_code_is_used_at_once_with_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = generate_program(make_system(ARITHMETIC))
+    interpreted, native = simulate_natively(program, make_lanes(), monkeypatch)
+    forget_programs(monkeypatch)
+    monkeypatch.setattr(native_code, "COMPILED_FROM", 1e12)
+    monkeypatch.setattr(native_code, "generate_code", pytest.fail)
+    monkeypatch.setattr("islands.simulators.ode.lane_simulation.integrate", pytest.fail)
+    assert simulate_lanes(program, DT, make_lanes()).tobytes() == native.tobytes() == interpreted.tobytes()
+
+
 @pytest.mark.parametrize("damage", [lambda code: code[:-100], lambda code: code[:40] + b"?" + code[41:]])
 def test_damaged_code_is_compiled_again(
     damage: Callable[[bytes], bytes], empty_store: Path, monkeypatch: pytest.MonkeyPatch

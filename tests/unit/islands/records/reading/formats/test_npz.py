@@ -6,6 +6,11 @@ import pytest
 from support.bad_records import archived, refusal
 
 
+def test_channels_of_unequal_lengths_in_an_archive_are_refused_by_name(tmp_path):
+    message = archived(tmp_path, y=np.arange(50.0))
+    assert "bad.npz: column u has 60 samples, column y 50" in message
+
+
 @pytest.mark.parametrize("shape", [(), (30, 2), (2, 30), (60, 1, 1)])
 def test_an_array_of_another_shape_is_refused_with_its_shape(tmp_path, shape):
     message = archived(tmp_path, u=np.ones(shape))
@@ -27,6 +32,11 @@ def test_an_array_of_objects_is_refused_without_unpickling(tmp_path):
 )
 def test_an_array_of_text_or_complex_numbers_is_refused_with_its_type(tmp_path, u, kind):
     assert f"column u holds {kind} where real numbers are expected" in archived(tmp_path, u=u)
+
+
+def test_an_archive_that_states_two_sampling_times_is_refused(tmp_path):
+    message = archived(tmp_path, dt=0.01, fs=200.0)
+    assert "0.01 s by array dt and 0.005 s by array fs" in message
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, "fast"])
@@ -51,3 +61,12 @@ def test_a_damaged_archive_is_refused(tmp_path):
     message = refusal(tmp_path, bytes(content), inputs=["u"], output="y", name="bad.npz")
     assert "column u cannot be read" in message
     assert "the file is damaged, write it again" in message
+
+
+def test_a_truncated_archive_is_refused(tmp_path):
+    np.savez(tmp_path / "whole.npz", u=np.arange(500.0), y=np.arange(500.0), dt=0.01)
+    content = (tmp_path / "whole.npz").read_bytes()
+    # The directory at the end is kept, so that the file is still recognised as an archive.
+    message = refusal(tmp_path, content[:200] + content[-230:], inputs=["u"], output="y", name="bad.npz")
+    assert "bad.npz" in message
+    assert "write it again" in message

@@ -42,6 +42,13 @@ def test_a_bomb_is_refused_while_it_unpacks(tmp_path, monkeypatch):
     assert "r.zip unpacks to more than" in refusal(tmp_path / "r.zip")
 
 
+def test_the_folders_of_a_member_are_not_made(tmp_path, folder):
+    with zipfile.ZipFile(tmp_path / "r.zip", "w") as archive:
+        archive.writestr("../../../outside/r.csv", TEXT)
+    assert read_record(tmp_path / "r.zip", ["u_V"], "y_um").samples == 60
+    assert not (tmp_path / "outside").exists()
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [

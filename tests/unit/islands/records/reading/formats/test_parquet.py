@@ -142,6 +142,14 @@ def test_a_file_of_another_format_is_refused(tmp_path, content, words):
     assert words in refusal(tmp_path / "r.parquet")
 
 
+def test_a_file_truncated_at_any_position_is_refused(write):
+    file = write()
+    content = file.read_bytes()
+    for length in range(1, len(content) - 1, 97):
+        file.write_bytes(content[:length])
+        assert "r.parquet is damaged or not a Parquet file" in refusal(file)
+
+
 def varint(number):
     """Encode an integer like the footer: zigzag, seven bits per byte."""
     number *= 2

@@ -93,6 +93,10 @@ def test_stamps_that_are_printed_too_coarsely_are_repeated_and_replaced_by_dt(tm
     assert read(tmp_path, table, dt=DT).dt == DT
 
 
+def test_dt_does_not_hide_a_gap(tmp_path):
+    assert "follows a gap" in refusal(tmp_path, gone(rows(), *range(100, 110)), dt=DT)
+
+
 def test_repeated_rows_are_left_out_and_other_rows_of_equal_time_averaged(tmp_path):
     table = rows()
     doubled = [*table[:31], table[30], *table[31:]]

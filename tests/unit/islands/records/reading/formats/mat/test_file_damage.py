@@ -157,6 +157,12 @@ def test_a_file_with_too_many_variables_is_refused(write, monkeypatch, refusal):
     assert "bad.mat has more than 50 columns" in refusal(write(*many))
 
 
+def test_a_shape_with_too_few_numbers_is_refused(write, refusal):
+    for variable in (numbers("x", U, shape=(2**27, 1)), packed(numbers("x", U, shape=(2**27, 1)))):
+        message = refusal(write(variable))
+        assert "it declares the shape (134217728, 1) but has 60 numbers" in message
+
+
 # Wrong sizes
 
 

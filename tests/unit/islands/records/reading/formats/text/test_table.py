@@ -28,6 +28,14 @@ def test_a_file_with_a_header_only_is_refused(tmp_path, content):
     assert "bad.csv has a header in line 1 but no samples" in message
 
 
+def test_decimal_commas_and_points_in_one_file_are_refused(tmp_path):
+    rows = ["t_s;u_V;y_um", *(f"{k / 100:.2f};{k % 7},5;{k % 11}" for k in range(60))]
+    message = refusal(tmp_path, rows)
+    assert "a decimal comma in bad.csv, line 2, column u_V (0,5)" in message
+    assert "a decimal point in bad.csv, line 2, column t_s (0.00)" in message
+    assert "the same mark" in message
+
+
 def test_a_quote_that_is_never_closed_is_refused(tmp_path):
     message = refusal(tmp_path, changed(40, 1, '"3'))
     assert "is a quote never closed?" in message
