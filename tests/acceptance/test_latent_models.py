@@ -35,12 +35,16 @@ def read(folder):
 
 
 def test_the_cubic_spring_is_found(folder):
-    best = islands.load(folder / "out").best.model
-    assert (best.order, best.units) == (2, ("cube",))
+    found = islands.load(folder / "out").best
+    best = found.model
+    assert (best.order, len(best.units)) == (2, 1)
+    other = read(folder)
+    # The noise of the record is 0.02; the linear model has an error of 0.13.
+    assert np.nanstd(found.simulate(other).y - other.y) < 0.021
     # The unit reads the states, so the system is no Hammerstein system.
     assert any(name.startswith("w1") for name in best.names)
     text = succeed("show", folder / "out")
-    assert "cube(" in text
+    assert f"{best.units[0]}(" in text
     assert "resonance at 5.1" in text
     assert (folder / "out" / "figures").is_dir()
     _, equations = (folder / "out" / "method.txt").read_text().split("Equations by rank", 1)

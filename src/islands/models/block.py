@@ -23,6 +23,7 @@ from islands.expressions.tree import (
     Expression,
     Lagged,
     Primitive,
+    Symbol,
     lags,
     replace_leaves,
     walk,
@@ -191,6 +192,10 @@ class Block:
             for name, lag in self._find_samples(place)
         )
         return bool(self.starts) and reads_states and not any(map(lags, self.starts))
+
+    def start_at(self, states: Mapping[str, float]) -> "Block":
+        """Return the block that starts at given states, which are further parameters, in their order."""
+        return replace(self, starts=tuple(map(Symbol, states)), parameters={**self.parameters, **states})
 
     def start_values(self) -> tuple[float, ...]:
         """Return the value of each past sample of the state of a program, unless others are given."""

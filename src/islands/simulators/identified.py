@@ -15,7 +15,7 @@ from islands.effects.interface.force import sum_output_forces
 from islands.errors import ModelError
 from islands.expressions.primitives import MUL, PRIMITIVES, SUB
 from islands.expressions.printing import plain
-from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift, Symbol
+from islands.expressions.tree import Apply, Constant, Expression, Lagged, Shift
 from islands.models.block import Block, subtract_offsets
 from islands.models.latent import LatentModel
 from islands.models.narx import Model, make_model
@@ -414,12 +414,7 @@ class ParametricSimulator(BatchSimulator):
             first, late = self._estimate_states(self.model)
             states = {f"initial {name}": value for name, value in zip(self.model.states, first, strict=True)}
             found += [Parameter(name, "", value, _SCALE, initial=True) for name, value in states.items()]
-            # The states of a run are among its parameters.
-            starts = tuple(map(Symbol, states))
-            block, warm_up = (
-                replace(block, starts=starts, parameters={**block.parameters, **states}),
-                1 + late,
-            )
+            block, warm_up = block.start_at(states), 1 + late
         else:
             found.append(_make_initial_output(self.record.y[:warm_up]))
         for name, value in (("parameters", tuple(found)), ("_block", block), ("_warm_up", warm_up)):

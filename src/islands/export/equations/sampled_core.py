@@ -1,6 +1,7 @@
 """Simulator in the document of an extended simulation: a system of equations, or one in discrete time."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -97,7 +98,7 @@ def read_core(spec: ExtendedSpec) -> SampledCore | None:
         case LinearSpec():
             return _make_filter(spec.core)
         case ModelSpec():
-            return _make_model(spec.core, spec.output)
+            return _make_model(spec.core, spec.output, spec.start)
         case ColumnSpec(column=name):
             return SampledCore("a column of the record", columns={RECORDED: name})
     return None
@@ -110,9 +111,12 @@ def read_output_system(spec: ExtendedSpec) -> OdeSystem:
     return replace(system, channels=(SIMULATED,), simulated=())
 
 
-def _make_model(spec: ModelSpec, output: str) -> SampledCore:
+def _make_model(spec: ModelSpec, output: str, states: Mapping[str, float]) -> SampledCore:
     block = measured_block(model_from_json(json.dumps(spec.model), spec.name))
     start = "the operating point" if block.is_state_space else f"{block.maximum_lag} measured outputs"
+    if states:
+        block = block.start_at({f"initial {name}": value for name, value in states.items()})
+        start = ", ".join(f"{name} = {value:.6g}" for name, value in states.items())
     return SampledCore(
         f"free run of the model {'; '.join(block.texts)} from {start}",
         block=block,

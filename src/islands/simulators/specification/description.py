@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from islands.effects.interface.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.effects.interface.effect import Effect
+from islands.models.latent import LatentModel
 from islands.persistence.models import model_json
 from islands.simulators.extended import SavedExtension
 from islands.simulators.external import PythonFunctionSimulator, RecordedOutput
@@ -136,14 +137,21 @@ def make_extended_spec(
 
 
 def _find_start(simulator: Simulator, values: Signal) -> dict[str, float]:
-    """Return the states of equations at the first sample by name; empty for other simulators."""
+    """Return the states of equations or of a latent model at the first sample by name; empty for others."""
     core = simulator
     while isinstance(core, SavedExtension | ResampledSimulator | OutputEquation):
         core = core.simulator
-    if not isinstance(core, OdeSimulator) or isinstance(core, FmuSimulator):
-        return {}
+    match core:
+        case FmuSimulator():
+            return {}
+        case OdeSimulator():
+            initial = dict(core.initial)
+        case ParametricSimulator(model=LatentModel()):
+            initial = {}
+        case _:
+            return {}
     prefix = "initial "
-    return dict(core.initial) | {
+    return initial | {
         parameter.name.removeprefix(prefix): float(value)
         for parameter, value in zip(simulator.parameters, values, strict=False)
         if parameter.initial and parameter.name.startswith(prefix)
