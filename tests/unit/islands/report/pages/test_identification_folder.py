@@ -24,7 +24,7 @@ def test_report_of_a_folder_has_its_name_its_day_and_its_figures(folder):
     (folder / "figures/free-run.svg").write_bytes(b"<svg/>")
     page = report_saved_result(folder).decode()
     assert "<title>result</title>" in page
-    assert re.search(r'class="origin">\d{4}-\d\d-\d\d · islands ', page)
+    assert re.search(r'class="origin"><bdi>result</bdi> · \d{4}-\d\d-\d\d · islands ', page)
     assert page.count("<img ") == 1
     assert report_saved_result(folder / "result.json") == report_saved_result(folder)
 
