@@ -262,7 +262,7 @@ class ModelView(ResponseModel):
         default=False, description="Whether this is the recommended model of the job, one of all its models."
     )
     size: int = Field(description="Number of terms, of parameters with names in other classes than NARX.")
-    equation: str
+    equation: str = Field(description="With the names of the columns.")
     latex: str
     signals: str = Field(
         default="",

@@ -196,10 +196,9 @@ def _model_document(
         "rank": rank,
         "recommended": recommended,
         "size": model.size,
-        "equation": written.line,
+        "equation": written.named,
         "latex": written.latex,
         "signals": describe_signals(model),
-        "named_equation": written.named,
         "named_signals": named_signals(model),
         "terms": terms_in_result(model, ensemble),
         **({"quantities": model.list_quantities()} if isinstance(model, LatentModel) else {}),
@@ -241,8 +240,7 @@ def _comparison_document(assessment: Assessment) -> dict[str, Any]:
     written = assessment.model.equation()
     return {
         "size": assessment.model.size,
-        "equation": written.line,
-        "named_equation": written.named,
+        "equation": written.named,
         "model": json.loads(model_json(assessment.model)),
         **_assessment_document(assessment),
     }

@@ -99,7 +99,7 @@ def comparison_report(origin: Origin, models: Sequence[ComparedModel]) -> bytes:
         errors=[_list_errors(letter, each) for letter, each in lettered.items()],
         figures=_draw_groups(groups),
         undrawn=[letter for letter, each in lettered.items() if each.free_run is None],
-        equations=[(letter, each.name, _write_equation(each.model)) for letter, each in lettered.items()],
+        equations=[(letter, each.name, each.model["equation"]) for letter, each in lettered.items()],
         letters=letters,
         terms=_list_terms(models),
         settings=_list_settings(models),
@@ -178,11 +178,6 @@ def _draw_groups(groups: Sequence[Mapping[str, ComparedModel]]) -> list[tuple[st
 
 def _array(values: Sequence[float | None]) -> NDArray[np.float64]:
     return np.array(values, dtype=np.float64)
-
-
-def _write_equation(entry: Document) -> str:
-    written: str = entry.get("named_equation", entry["equation"])
-    return written
 
 
 def _list_terms(models: Sequence[ComparedModel]) -> list[list[str]]:

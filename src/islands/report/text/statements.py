@@ -22,7 +22,7 @@ def describe(document: Document) -> list[str]:
     return [
         *write("result", "essence", f=facts),
         write_one("result", "choice", f=facts),
-        f"    {facts.model['named_equation']}",
+        f"    {facts.model['equation']}",
         f"    {write_one('result', 'units', f=facts)}",
         *write("result", "finding", f=facts),
     ]
