@@ -69,8 +69,8 @@ def test_folder_contains_models_figures_and_a_checkpoint(folder: Path) -> None:
     assert names >= {"models", "figures"}
     figures = {path.stem for path in (folder / "whole/figures").glob("*.svg")}
     assert figures >= {"free-run", "loop", "hold", "residuals", "convergence", "front"}
-    shown = succeed("show", folder / "whole/models/01.json", "--format", "plain")
-    assert shown.strip() == json.loads((folder / "whole/result.json").read_text())["models"][0]["equation"]
+    shown = succeed("show", folder / "whole/models/01.json", "--format", "latex")
+    assert shown.strip() == json.loads((folder / "whole/result.json").read_text())["models"][0]["latex"]
 
 
 @pytest.mark.ci
