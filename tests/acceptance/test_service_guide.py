@@ -133,7 +133,7 @@ def check_best(models: list[dict[str, object]]) -> None:
 @pytest.mark.nightly
 @needs_curl
 def test_commands_with_curl(user: User, jobs: dict[str, str]) -> None:
-    upload, submit, follow, models, exported, figure, report = commands(block("curl"))
+    upload, submit, follow, models, exported, figure, report, _ = commands(block("curl"))
     dataset = json.loads(user.shell(upload))
     # The page shows this answer.
     assert dataset["id"].endswith("-csv")
@@ -168,7 +168,7 @@ def test_python_program(user: User, jobs: dict[str, str]) -> None:
     assert states[0] in ("queued", "running")
     assert states[-1] == "succeeded"
     # Equation, error and physics of the best model, and its source code.
-    best = next(line for line in lines if line.startswith("y(k) = "))
+    best = next(line for line in lines if line.startswith("y_um(k) = "))
     equation, error, physics = best.rsplit(" ", 2)
     models = json.loads(user.service.models(jobs["Python"]))["items"]
     model = next(each for each in models if each["recommended"])
