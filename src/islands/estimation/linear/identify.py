@@ -157,12 +157,10 @@ class Search:
     """Search for fits of increasing order."""
 
     def __init__(self, signals: Signals, longest: int, max_order: int, feedthrough: bool) -> None:
-        self.signals, self.longest, self.max_order, self.feedthrough = (
-            signals,
-            longest,
-            max_order,
-            feedthrough,
-        )
+        self.signals = signals
+        self.longest = longest
+        self.max_order = max_order
+        self.feedthrough = feedthrough
         self.high: HighOrder | None = None
         self.fits: dict[int, Fit] = {}
 

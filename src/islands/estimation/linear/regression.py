@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.linear.sections import (
+    BLOCK,
     INTEGRATOR,
     Section,
     Signal,
@@ -25,9 +26,6 @@ from islands.estimation.linear.sections import (
     pair_poles,
     respond_freely,
 )
-
-#: Samples of a block.
-_BLOCK = 8192
 
 #: Singular value, relative to the largest, up to which a direction is not shown by the samples.
 _DEPENDENT = 1e-10
@@ -224,7 +222,7 @@ def triangulate(rows: Signal, noise: Signal, extra: Signal | None = None) -> Sig
     if extra is not None:
         filtered = np.vstack([filtered[:-1], extra, filtered[-1:]])
     size, samples = filtered.shape
-    parts = [factor_rows(filtered[:, begin : begin + _BLOCK].T) for begin in range(0, samples, _BLOCK)]
+    parts = [factor_rows(filtered[:, begin : begin + BLOCK].T) for begin in range(0, samples, BLOCK)]
     factor = parts[0] if len(parts) == 1 else factor_rows(np.vstack(parts))
     return np.vstack([factor, np.zeros((size - len(factor), size))]) if len(factor) < size else factor
 

@@ -18,6 +18,9 @@ Signal = NDArray[np.float64]
 #: Coefficients of a section after the leading 1, shape (1,) or (2,).
 Section = Signal
 
+#: Samples of a block of a long record.
+BLOCK = 8192
+
 #: The section of a pole at exactly 1.
 INTEGRATOR: Section = np.array([-1.0])
 

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from islands.estimation.linear.sections import Signal, Signals
+from islands.estimation.linear.sections import BLOCK, Signal, Signals
 from islands.kernels.linear_filter import divide_rows
-
-_BLOCK = 8192
 
 #: Lags of the output of the ARX model, samples for each of its parameters, and lags of the impulse response.
 _LAGS, _SAMPLES_PER_PARAMETER, _RESPONSE = 40, 4, 240
@@ -100,8 +98,8 @@ def _triangulate(signals: Signals, output: int, lags: int, reach: int) -> Signal
     """Return the triangular factor of lagged outputs, lagged inputs, a constant and the output."""
     first, parts = max(lags, reach), []
     for begin, end in signals.bounds:
-        for at in range(begin + first, end, _BLOCK):
-            last = min(at + _BLOCK, end)
+        for at in range(begin + first, end, BLOCK):
+            last = min(at + BLOCK, end)
             rows = [sliding_window_view(signals.y[output, at - lags : last - 1], lags)[:, ::-1]]
             rows += [sliding_window_view(u[at - reach : last - 1], reach)[:, ::-1] for u in signals.u]
             rows += [np.ones((last - at, 1)), signals.y[output, at:last, None]]

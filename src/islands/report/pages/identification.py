@@ -101,9 +101,7 @@ def identification_report(
         columns=columns(facts),
         models=rows(facts),
         recommended=rank,
-        others=[
-            (entry["rank"], entry["equation"]) for entry in document["models"] if entry["rank"] != rank
-        ],
+        others=[(entry["rank"], entry["equation"]) for entry in document["models"] if entry["rank"] != rank],
         search_figures=_inline(_SEARCH_FIGURES, figures),
         record=list_record(facts.record),
         settings=[("seed", document["seed"]), *_list_search(document["search"]), *list_settings(document)],
