@@ -174,19 +174,40 @@ def simulate(
     It starts from the first samples of the output if the record has them. For a model
     of a result folder, the errors on the validation data are those of the result.
     """
-    if len(records) > 1 and out is not None:
-        out.mkdir(parents=True, exist_ok=True)
+    files = _name_files(records, out)
     loaded = load(model)
-    for record in records:
+    for record, file in zip(records, files, strict=True):
         if len(records) > 1:
             output.print(f"{record}:", markup=False)
-        file = out if out is None or len(records) == 1 else out / f"{record.stem}.csv"
         request = _Request(
             *(record, mode, file, options.columns(inputs or []), options.columns(output_columns or []), dt),
             *(parse_rows(rows), reading, settings, bands),
             start=options.values(start or [], "--start"),
         )
         _simulate_loaded(loaded, request)
+
+
+def _name_files(records: Sequence[Path], out: Path | None) -> list[Path | None]:
+    """Return the file of the simulation of every record; those of several are in the folder, which is made.
+
+    Raises
+    ------
+    SettingsError
+        Two records would have one file.
+    """
+    if out is None or len(records) == 1:
+        return [out] * len(records)
+    by_file: dict[Path, Path] = {}
+    for record in records:
+        file = out / f"{record.stem}.csv"
+        if file in by_file:
+            raise SettingsError(
+                f"{by_file[file]} and {record} would both be simulated to {file}: rename one, or simulate "
+                "them one by one with other --out"
+            )
+        by_file[file] = record
+    out.mkdir(parents=True, exist_ok=True)
+    return list(by_file)
 
 
 def _simulate_loaded(loaded: Loaded, request: _Request) -> None:

@@ -189,6 +189,15 @@ def test_simulate_takes_records_of_inputs_alone(run, fitted):
     assert (code, "--bands need the measured output" in error) == (2, True)
 
 
+def test_no_simulation_of_several_records_replaces_that_of_another(run, fitted):
+    for folder in ("monday", "tuesday"):
+        Path(folder).mkdir()
+        shutil.copyfile("r.csv", f"{folder}/r.csv")
+    code, _, error = run("simulate", "out", "monday/r.csv", "tuesday/r.csv", "--out", "both")
+    assert (code, Path("both").exists()) == (2, False)
+    assert "monday/r.csv and tuesday/r.csv would both be simulated to both/r.csv" in " ".join(error.split())
+
+
 def test_the_record_of_a_system_is_written_into_a_folder_with_brackets(run):
     Path("[red]").mkdir()
     code, out, _ = run("examples", "[red]/a[b].csv", "--system", "s1")
