@@ -203,3 +203,37 @@ class ProblemType(ResponseModel):
     type: str
     status: int
     title: str
+
+
+class LinearSystemView(ResponseModel):
+    """Linear system of a model about an operating point, whose signals are deviations from it."""
+
+    schema_version: Literal["islands.linear-system/1"] = Field(alias="schema")
+    dt: float | None = Field(description="Sampling time in seconds; null if the model states none.")
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    dead_times: tuple[float, ...] = Field(description="Of every input in seconds.")
+    operating_inputs: tuple[float, ...]
+    operating_outputs: tuple[float, ...]
+    poles: tuple[tuple[float, float], ...] = Field(description="Real and imaginary part of every pole.")
+    natural_frequencies: tuple[float | None, ...] = Field(
+        description="Of every pole in hertz; null of a delay."
+    )
+    damping: tuple[float | None, ...] = Field(
+        description="Damping ratio of every pole; null of an integrator."
+    )
+    static_gain: tuple[tuple[float | None, ...], ...] = Field(
+        description="A row for each output, a column for each input; null with an integrator."
+    )
+    words: tuple[str, ...] = Field(description="Time constants, resonances, dead times and gains.")
+    A: tuple[tuple[float, ...], ...] | None = Field(default=None, description="x(k+1) = A x(k) + B u(k-d)")
+    B: tuple[tuple[float, ...], ...] | None = None
+    C: tuple[tuple[float, ...], ...] | None = Field(default=None, description="y(k) = C x(k) + D u(k-d)")
+    D: tuple[tuple[float, ...], ...] | None = None
+    numerators: tuple[tuple[tuple[float, ...], ...], ...] | None = Field(
+        default=None,
+        description="Of a transfer function, by output and input, the highest power of z first.",
+    )
+    denominator: tuple[float, ...] | None = Field(default=None, description="Common to all of them.")

@@ -22,6 +22,7 @@ from islands.errors import IslandsError, SettingsError
 from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.export import FILE_EXPORTS
 from islands.facade.coupled.result import read_fitted_model
+from islands.facade.results.model_analysis import split_point
 from islands.models.coupled_narx import CoupledModel
 from islands.persistence.checkpoints import history_from_document
 from islands.persistence.ensembles import bands_from_document, ensemble_from_document
@@ -35,12 +36,14 @@ from islands.records.split import Split, average_split, match_split, split_data
 from islands.report.documents.result_folder import result_document
 from islands.report.figures.drawn_numbers import tabulate_lines
 from islands.report.figures.free_run import draw_free_run
+from islands.report.figures.linear_system import LINEAR_FIGURES
 from islands.report.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.report.figures.style import save, write_text_figure
 from islands.report.pages.comparison import ComparedModel, comparison_report
 from islands.report.pages.identification import coupled_report, identification_report
 from islands.report.pages.origin import Origin
 from islands.validation.assessment import Assessment, assess, with_refit
+from islands_service.domain.fitted_models import read_fitted
 from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
 from islands_service.domain.job import FMU, REPORT, Job, name_free_run
 from islands_service.domain.job_spec import Identification, parse_identification
@@ -70,6 +73,13 @@ def main() -> int:
     parser.add_argument("--numbers", action="store_true", help="only the free run of the model as numbers")
     parser.add_argument("--fmu", action="store_true", help="only the model as FMU, which has to be compiled")
     parser.add_argument(
+        "--linear",
+        type=json.loads,
+        metavar="JSON",
+        help="write the figures of the linear system of the model to the standard output, as JSON by name; "
+        "the value has the levels of its operating point by column, or none of them",
+    )
+    parser.add_argument(
         "--compare",
         nargs="+",
         metavar="JOB:RANK",
@@ -83,6 +93,11 @@ def main() -> int:
         with Store(settings.url) as store:
             if arguments.compare:
                 sys.stdout.buffer.write(compare_models(arguments, store, blobs))
+                return 0
+            if arguments.linear is not None:
+                job = store.jobs.get(arguments.owner, arguments.job)
+                drawn = draw_linear_system(job, store, arguments.rank, arguments.linear)
+                print(json.dumps({name: content.decode() for name, content in drawn.items()}))
                 return 0
             made = _make(arguments, store, blobs)
             store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
@@ -275,6 +290,20 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     names = model_figures(found, entry.model)
     drawn = {f"{rank}/{name}": partial(FIGURES[name], entry, found.split) for name in names}
     return _save_all(drawn) | write_free_run(entry, found.split.validation, rank)
+
+
+def draw_linear_system(job: Job, store: Store, rank: int, levels: Mapping[str, float]) -> dict[str, bytes]:
+    """Return all figures of the linear system of a model about an operating point, by name.
+
+    Raises
+    ------
+    IslandsError
+        The model no longer exists, or it has no linear system there.
+    """
+    _, document, (stored, *_) = _read_result(job, store, rank)
+    fitted = read_fitted(job.id, stored.file, stored.document, document)
+    system = fitted.linearise(*split_point(fitted.model, levels))
+    return _save_all({name: partial(draw, system) for name, draw in LINEAR_FIGURES.items()})
 
 
 def compile_fmu(job: Job, store: Store, rank: int) -> dict[str, bytes]:

@@ -14,10 +14,11 @@ import numpy as np
 
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
+from islands.models.state_space import FORMS
 from islands.persistence.models import NARX
 from islands_api.client.responses import read_as, read_mapping
 from islands_api.dataset_schemas import DatasetPage, DatasetSummary, DatasetView, FmuSummary
-from islands_api.result_schemas import SearchFreeRunView
+from islands_api.result_schemas import LinearSystemView, SearchFreeRunView
 from islands_api.schemas import (
     CallerView,
     HistoryPage,
@@ -304,6 +305,60 @@ def figure(which: JobRef, name: str, rank: int | None = 1, form: str = "svg") ->
         f"/v1/jobs/{quote_id(which)}{of}/figures/{quote_id(name)}.{quote_id(form)}",
         lambda response: response.content,
     )
+
+
+def linear_system(
+    which: JobRef,
+    rank: int = 1,
+    at: Mapping[str, float] | None = None,
+    form: str = FORMS[0],
+) -> RequestSpec[LinearSystemView]:
+    """Return the linear system of a model about an operating point.
+
+    Parameters
+    ----------
+    which : str or JobView
+    rank : int
+    at : mapping, optional
+        Levels of inputs by column, and of the outputs if the model rests at several; by default the operating
+        point of a latent model, and the middle of the ranges of the data of others.
+    form : str
+        ``state-space`` or ``transfer-function``.
+    """
+    params = {"at": _write_levels(at), "form": form}
+    return RequestSpec("GET", _linear_path(which, rank), read_as(LinearSystemView), params=params)
+
+
+def export_linear_system(
+    which: JobRef,
+    rank: int = 1,
+    at: Mapping[str, float] | None = None,
+    form: str = FORMS[0],
+    notation: str = "matlab",
+) -> RequestSpec[str]:
+    """Return a linear system as ``matlab``, ``json`` or ``text``; see `linear_system`."""
+    params = {"at": _write_levels(at), "form": form, "notation": notation}
+    return RequestSpec("GET", _linear_path(which, rank), lambda response: response.text, params=params)
+
+
+def linear_figure(
+    which: JobRef,
+    name: str = "bode",
+    rank: int = 1,
+    at: Mapping[str, float] | None = None,
+    form: str = "svg",
+) -> RequestSpec[bytes]:
+    """Return bode, nyquist, pole-map or unit-step of a linear system: svg, or csv with its lines."""
+    path = f"{_linear_path(which, rank)}/{quote_id(name)}.{quote_id(form)}"
+    return RequestSpec("GET", path, lambda response: response.content, params={"at": _write_levels(at)})
+
+
+def _linear_path(which: JobRef, rank: int) -> str:
+    return f"/v1/jobs/{quote_id(which)}/models/{rank}/linear-system"
+
+
+def _write_levels(at: Mapping[str, float] | None) -> list[str]:
+    return [f"{name}={float(level)!r}" for name, level in (at or {}).items()]
 
 
 def figure_names(which: JobRef, rank: int | None) -> RequestSpec[tuple[str, ...]]:

@@ -1,7 +1,7 @@
 """State shared by the routes of one application, and the dependency that injects it."""
 
 from collections import OrderedDict, defaultdict
-from collections.abc import AsyncIterator, Callable, Hashable
+from collections.abc import AsyncIterator, Callable, Hashable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from logging import ERROR
@@ -97,6 +97,12 @@ ColumnsKey: TypeAlias = tuple[str, str, tuple[str, ...]]
 #: A job, its version, which changes with its result, and the rank of a model.
 ModelKey: TypeAlias = tuple[str, int, int]
 
+#: A model, and its operating point: levels by column.
+LinearKey: TypeAlias = tuple[str, int, int, tuple[tuple[str, float], ...]]
+
+#: Largest number of characters of figures of linear systems in memory: some hundred thousand for each model.
+MAX_LINEAR_CHARACTERS = 16_000_000
+
 #: Maximum number of figure processes at once; each takes a core.
 MAX_CONCURRENT_DRAWINGS = 1
 
@@ -127,6 +133,11 @@ class AppState:
     )
     simulated_records: RecentValues[ModelKey, Dataset] = field(
         default_factory=lambda: RecentValues(MAX_KEPT_RECORDS)
+    )
+    linear_figures: RecentValues[LinearKey, Mapping[str, str]] = field(
+        default_factory=lambda: RecentValues(
+            MAX_LINEAR_CHARACTERS, lambda drawn: sum(map(len, drawn.values()))
+        )
     )
     plotted_columns: RecentValues[ColumnsKey, NDArray[np.float64]] = field(
         default_factory=lambda: RecentValues(MAX_COLUMN_BYTES, lambda values: values.nbytes)

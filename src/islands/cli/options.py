@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from islands.errors import SettingsError
 from islands.evolution.presets import PRESET_NAMES
 from islands.report.figures.names import ALL_FIGURES
 
@@ -89,21 +88,3 @@ def columns(texts: list[str]) -> list[str]:
 def _split_names(text: str) -> list[str]:
     is_quoted = len(text) > 1 and text.startswith('"') and text.endswith('"')
     return [text[1:-1]] if is_quoted else re.split(r",(?!\s)", text)
-
-
-def values(texts: list[str], option: str) -> dict[str, float]:
-    """Return the numbers of an option ``NAME=VALUE`` by name.
-
-    Raises
-    ------
-    SettingsError
-        A text is not a name and a number.
-    """
-    found = {}
-    for text in columns(texts):
-        name, _, value = text.rpartition("=")
-        try:
-            found[name] = float(value)
-        except ValueError:
-            raise SettingsError(f"{option} {text}: write NAME=VALUE, for example u_V=0.5") from None
-    return found

@@ -31,7 +31,7 @@ def write_linear_system(system: StateSpace, form: str, notation: str = "text") -
         The form or the notation is unknown.
     """
     lookup(dict.fromkeys(FORMS), form, "form")
-    return lookup(_NOTATIONS, notation, "notation")(system, form)
+    return lookup(NOTATIONS, notation, "notation")(system, form)
 
 
 def find_notation(path: Path | None) -> str:
@@ -40,7 +40,10 @@ def find_notation(path: Path | None) -> str:
 
 
 def list_linear_system(system: StateSpace, form: str = FORMS[0]) -> dict[str, Any]:
-    """Return a system as JSON values: matrices or coefficients, names, poles, zeros and gains."""
+    """Return a system as JSON values: matrices or coefficients, names, modes and gains.
+
+    A value that is not finite, such as the gain of an integrator, is null.
+    """
     document: dict[str, Any] = {
         "schema": "islands.linear-system/1",
         "dt": system.dt,
@@ -52,14 +55,19 @@ def list_linear_system(system: StateSpace, form: str = FORMS[0]) -> dict[str, An
         "operating_inputs": list(system.operating_inputs),
         "operating_outputs": list(system.operating_outputs),
         "poles": [[pole.real, pole.imag] for pole in system.poles.tolist()],
-        "static_gain": [
-            [gain if isfinite(gain) else None for gain in row] for row in system.static_gain.tolist()
-        ],
+        "natural_frequencies": _list_finite(system.natural_frequencies),
+        "damping": _list_finite(system.damping),
+        "static_gain": [_list_finite(row) for row in system.static_gain],
+        "words": list(system.describe()),
     }
     if form == FORMS[0]:
         return document | {name: getattr(system, name).tolist() for name in "ABCD"}
     numerators, denominator = system.transfer_functions()
     return document | {"numerators": numerators.tolist(), "denominator": denominator.tolist()}
+
+
+def _list_finite(values: NDArray[np.float64]) -> list[float | None]:
+    return [value if isfinite(value) else None for value in values.tolist()]
 
 
 def _write_json(system: StateSpace, form: str) -> str:
@@ -149,6 +157,7 @@ def _comment(text: str) -> str:
     return " ".join(text.split())
 
 
-_NOTATIONS: Mapping[str, Callable[[StateSpace, str], str]] = MappingProxyType(
+#: Functions that write a linear system, by notation.
+NOTATIONS: Mapping[str, Callable[[StateSpace, str], str]] = MappingProxyType(
     {"text": _write_text, "matlab": _write_matlab, "json": _write_json}
 )

@@ -57,8 +57,10 @@ _MAX_FAILURES = 1000
 #: Options of the process that makes an artefact without all figures, by the end of its name.
 _PARTS = {FREE_RUN: "--numbers", FMU: "--fmu"}
 
-_SVG_RESPONSES: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}
+SVG_TYPE = "image/svg+xml"
+
+SVG_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {SVG_TYPE: {"schema": {"type": "string"}}}}
 }
 
 _FMU_TYPE = "application/octet-stream"
@@ -67,9 +69,9 @@ _FMU_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {_FMU_TYPE: {"schema": {"type": "string", "format": "binary"}}}}
 }
 
-_CSV = "text/csv; charset=utf-8"
+CSV_TYPE = "text/csv; charset=utf-8"
 
-_CSV_RESPONSES: dict[int | str, dict[str, Any]] = {
+CSV_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
 }
 
@@ -152,18 +154,18 @@ async def search_figures(job: Id, caller: Reader, state: AppStateDep) -> Any:
     return {"items": await _list_search_figures(state, caller, job)}
 
 
-@router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG_RESPONSES)
+@router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=SVG_RESPONSES)
 async def search_figure(job: Id, figure: SearchFigure, caller: Reader, state: AppStateDep) -> Response:
     """Return a figure of the search: record, error against size, convergence, or error of each island."""
     _check_figure(figure, await _list_search_figures(state, caller, job))
     return await _figure_response(state, caller, job, f"{figure}.svg", None)
 
 
-@router.get("/{job}/figures/{figure}.csv", response_class=Response, responses=_CSV_RESPONSES)
+@router.get("/{job}/figures/{figure}.csv", response_class=Response, responses=CSV_RESPONSES)
 async def search_figure_table(job: Id, figure: SearchFigure, caller: Reader, state: AppStateDep) -> Response:
     """Return the points of the lines of a figure of the search."""
     _check_figure(figure, await _list_search_figures(state, caller, job))
-    return await _figure_response(state, caller, job, f"{figure}.csv", None, _CSV)
+    return await _figure_response(state, caller, job, f"{figure}.csv", None, CSV_TYPE)
 
 
 @router.get("/{job}/models/{rank}/figures", response_model=Names)
@@ -172,7 +174,7 @@ async def model_figures(job: Id, rank: Rank, caller: Reader, state: AppStateDep)
     return {"items": await _list_model_figures(state, job, await get_model(state, caller, job, rank))}
 
 
-@router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG_RESPONSES)
+@router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=SVG_RESPONSES)
 async def model_figure(
     job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
 ) -> Response:
@@ -182,14 +184,14 @@ async def model_figure(
     return await _figure_response(state, caller, job, f"{rank}/{figure}.svg", rank)
 
 
-@router.get("/{job}/models/{rank}/figures/{figure}.csv", response_class=Response, responses=_CSV_RESPONSES)
+@router.get("/{job}/models/{rank}/figures/{figure}.csv", response_class=Response, responses=CSV_RESPONSES)
 async def model_figure_table(
     job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
 ) -> Response:
     """Return the points of the lines of a figure of a model."""
     found = await get_model(state, caller, job, rank)
     _check_figure(figure, await _list_model_figures(state, job, found))
-    return await _figure_response(state, caller, job, f"{rank}/{figure}.csv", rank, _CSV)
+    return await _figure_response(state, caller, job, f"{rank}/{figure}.csv", rank, CSV_TYPE)
 
 
 @router.get("/{job}/models/{rank}/simulation", response_model=FreeRun)
@@ -269,7 +271,7 @@ def _check_figure(figure: str, figures: tuple[str, ...]) -> None:
 
 
 async def _figure_response(
-    state: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
+    state: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = SVG_TYPE
 ) -> Response:
     blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:

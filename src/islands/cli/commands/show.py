@@ -14,6 +14,7 @@ from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
 from islands.export.linear_system import find_notation, write_linear_system
 from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
+from islands.models.operating_point import parse_levels
 from islands.models.state_space import FORMS
 from islands.persistence.saved_documents import open_document, read_saved_model
 from islands.records.reading import read_dataset
@@ -80,7 +81,7 @@ def show(
     The report of a result folder is one HTML file, which prints on A4, with its figures.
     """
     if kind in FORMS or (figure in LINEAR_FIGURES and record is None):
-        _show_linear(model, kind, figure, out, options.values(at or [], "--at"))
+        _show_linear(model, kind, figure, out, parse_levels(options.columns(at or []), "--at"))
         return
     if at:
         raise SettingsError(f"--at is for the formats {', '.join(FORMS)} and for figures of linear systems")
@@ -128,20 +129,22 @@ def _show_linear(
     name: str, form: str | None, figure: str | None, out: Path | None, values: dict[str, float]
 ) -> None:
     """Write the linear system of a model, or draw it."""
+    # The classes of results take a second to import, as `load` does.
+    from islands.facade.results.model_analysis import split_point  # noqa: PLC0415
+
     loaded = islands.load(name)
     if not isinstance(loaded, islands.Result | islands.FittedModel | islands.FittedCoupledModel):
         raise SettingsError(f"a linear system is that of a model, and {name} is none")
     model = loaded.best.model if isinstance(loaded, islands.Result) else loaded.model
-    outputs = model.output_names if isinstance(model, CoupledModel) else (model.output_name,)
-    y = [values.pop(each) for each in outputs] if set(outputs) <= set(values) else None
+    at = split_point(model, values)
     if form is None:
         if out is None:
             raise SettingsError(f"--figure {figure} is an SVG file: give --out FILE")
         from islands.report.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
 
-        save(loaded.plot_linear(figure or LINEAR_FIGURES[0], values or None, y), out)
+        save(loaded.plot_linear(figure or LINEAR_FIGURES[0], *at), out)
         return
-    text = write_linear_system(loaded.linearise(values or None, y), form, find_notation(out))
+    text = write_linear_system(loaded.linearise(*at), form, find_notation(out))
     _print(text if out is None else None)
     if out is not None:
         out.write_text(f"{text}\n", encoding="utf-8")

@@ -24,6 +24,7 @@ from islands.facade.results.model_simulation import SHOOTING
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.models.coupled_narx import AnyModel, coupled_signals
 from islands.models.equations import named_signals
+from islands.models.operating_point import parse_levels
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_values
 from islands.records.coupled import AnyRecord, CoupledRecord, match_coupled
@@ -182,7 +183,7 @@ def simulate(
         request = _Request(
             *(record, mode, file, options.columns(inputs or []), options.columns(output_columns or []), dt),
             *(parse_rows(rows), reading, settings, bands),
-            start=options.values(start or [], "--start"),
+            start=parse_levels(options.columns(start or []), "--start"),
         )
         _simulate_loaded(loaded, request)
 

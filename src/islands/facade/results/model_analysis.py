@@ -1,5 +1,6 @@
 """`linearise`: a model about an operating point as a linear system, with its uncertainty."""
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 
@@ -70,3 +71,23 @@ def find_rest_of_data(
     with suppress(ModelError):
         return find_rest(block, read_levels(block, operating_point), within)
     return None
+
+
+def split_point(
+    model: AnyModel, levels: Mapping[str, float]
+) -> tuple[dict[str, float] | None, list[float] | None]:
+    """Return the inputs and the outputs of an operating point by column; None for those not given.
+
+    Raises
+    ------
+    ModelError
+        Some outputs are given, but not all.
+    """
+    outputs = model.output_names if isinstance(model, CoupledModel) else (model.output_name,)
+    inputs = {name: level for name, level in levels.items() if name not in outputs}
+    given = [name for name in outputs if name in levels]
+    if given and len(given) < len(outputs):
+        raise ModelError(
+            f"the model has the outputs {', '.join(outputs)}: give the level of each, or of none"
+        )
+    return inputs or None, [levels[name] for name in given] or None

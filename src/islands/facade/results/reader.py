@@ -12,6 +12,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
+from islands.models.protocol import DynamicModel
 from islands.persistence.ensembles import bands_from_document, ensemble_from_document
 from islands.persistence.saved_documents import (
     check_single_output,
@@ -19,6 +20,7 @@ from islands.persistence.saved_documents import (
     read_listed_model,
     read_shooting_interval,
 )
+from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.recommendation import Exclusion, Recommendation
 
@@ -55,19 +57,8 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
         entries = document["models"]
         models = [read_listed_model(folder, entry, primitives) for entry in entries]
         ensemble = ensemble_from_document(document["ensemble"], models[0], primitives)
-        shooting = read_shooting_interval(document)
         stored = tuple(
-            FittedModel(
-                model,
-                entry["rank"],
-                _read_metrics(entry["metrics"]),
-                entry["warm_up"],
-                shooting,
-                bands_from_document(entry["bands"], ensemble),
-                document["record"]["units"]["output"],
-                MappingProxyType(entry),
-            )
-            for entry, model in zip(entries, models, strict=True)
+            read_entry(model, entry, document, ensemble) for entry, model in zip(entries, models, strict=True)
         )
         chosen = document["recommended"]
         recommendation = Recommendation(
@@ -79,6 +70,38 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error
     return Result(stored, recommendation, document["settings"], folder, MappingProxyType(document))
+
+
+def read_entry(
+    model: DynamicModel, entry: Mapping[str, Any], document: Mapping[str, Any], ensemble: Ensemble | None
+) -> FittedModel:
+    """Return a model with its errors and prediction bands.
+
+    Parameters
+    ----------
+    model : DynamicModel
+    entry : mapping
+        Entry of the model in ``result.json``.
+    document : mapping
+        Content of ``result.json``.
+    ensemble : Ensemble or None
+        Ensemble of the result.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, ModelError
+        The document is damaged.
+    """
+    return FittedModel(
+        model,
+        entry["rank"],
+        _read_metrics(entry["metrics"]),
+        entry["warm_up"],
+        read_shooting_interval(document),
+        bands_from_document(entry["bands"], ensemble),
+        document["record"]["units"]["output"],
+        MappingProxyType(entry),
+    )
 
 
 def _read_metrics(document: Mapping[str, Any]) -> dict[str, dict[str, Metrics]]:
