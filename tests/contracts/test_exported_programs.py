@@ -55,12 +55,15 @@ def test_a_program_computes_the_free_run(build, name, starts, tmp_path):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", ["state space", "state space at once", "state spaces of deviations"])
+@pytest.mark.parametrize(
+    "name",
+    ["state space", "state space at once", "state space with dead times", "state spaces of deviations"],
+)
 def test_a_program_repeats_the_free_run_from_the_estimated_states(name):
     model = OF_BLOCKS[name]
     u, _, record = record_of_class(model)
     sample, states = find_first_states(model, record, model.maximum_lag)
-    run = Run(None, u, u[sample:], 0, u[:0], tuple(states.tolist()))
+    run = Run(None, u, u[sample:], 0, u[:0], tuple(states.values()))
     found = BUILDERS["python"][0](model, None)(run)
     expected = free_run(model, record).y.reshape(len(u), -1)
     np.testing.assert_allclose(

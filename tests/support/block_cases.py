@@ -11,7 +11,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
-from islands.models.measured_signals import measured_block
+from islands.models.measured_signals import measured_block, program_block
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 from islands.records.preprocessing_steps import Preprocessing, PreprocessingSteps
@@ -72,6 +72,9 @@ _AT_ONCE = {
     "level": 0.3,
 }
 
+#: A second-order lag, which the first input reaches also within a sample of its dead time.
+_LATE = {"a1_1": 0.9, "a1_2": 0.1, "a2_2": 0.8, "b1_1": 0.1, "b2_2": 0.3, "c1": 1.0, "d1": 0.2, "level": 0.4}
+
 #: A state that no constant input holds, except for zero.
 _INTEGRATOR = {"a1_1": 1.0, "a1_2": 0.1, "a2_2": 0.8, "b2": 0.1, "c1": 1.0}
 
@@ -106,6 +109,13 @@ OF_BLOCKS = {
         _AT_ONCE, input_names=("u_V+1", "v_V+1"), operating_inputs=(0.2, -0.3), memory=45
     ),
     "state space of deviations": with_offsets(make_model(operating_inputs=(0.1,), memory=45), 3.7, (20.0,)),
+    "state space with dead times": with_offsets(
+        make_model(
+            _LATE, (), input_names=("u_V", "v_V+1"), operating_inputs=(0.2, 20.0), delays=(3, 1), memory=45
+        ),
+        3.7,
+        (0.0, 20.0),
+    ),
     "integrator": make_model(_INTEGRATOR, (), operating_inputs=(0.4,)),
     "state spaces": make_coupled_latent_model(),
     "state spaces of deviations": CoupledLatentModel(
@@ -194,6 +204,9 @@ def start_from_record(name):
     if block.is_state_space:
         mapped = map_coupled_signals if isinstance(exported, CoupledModel) else map_signals
         states = make_simulator(exported, mapped(exported, data)[0], None, first).states[0].tolist()
+        names = block.signals[block.computed :]
+        states += [float(u[first - 1 - lag, names.index(input)]) for input, lag in block.late_inputs]
+        block = block.expand_delays()
     elif block.starts:
         states = [
             value(each, lambda channel, _lag: y[first - 1, channel], block.parameters)
@@ -212,7 +225,7 @@ def start_from_record(name):
 def start_by_default(name):
     """Return the run without a given start, and the outputs of the equations of the block."""
     exported = OF_BLOCKS[name]
-    u, block = record_of_class(exported)[0], measured_block(exported)
+    u, block = record_of_class(exported)[0], program_block(exported)
     given = 0 if block.is_state_space else exported.maximum_lag
     newest = [block.levels.get(signal, 0.0) for signal in block.signals]
     values = dict(zip(block.samples, block.start_values(), strict=True))

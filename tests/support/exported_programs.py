@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 
 from islands.export import export, write_export
 from islands.export.fmu import find_compiler
-from islands.models.measured_signals import measured_block
+from islands.models.measured_signals import program_block
 from lab.speed.compiled_c import compile_model
 from support.equation_programs import OCTAVE_FILES
 
@@ -145,7 +145,7 @@ def build_s_function(exported, folder):
     flags = (*strict, "-DMATLAB_MEX_FILE", f"-I{folder}")
     library = compile_model((folder / "model.c").read_text(), flags, folder)
     library.run.restype = ctypes.c_char_p
-    outputs = measured_block(exported).computed
+    outputs = program_block(exported).computed
 
     def simulate(run, is_double=True):
         given = ([] if run.past is None else run.past, run.inputs, np.empty((len(run.inputs), outputs)))
@@ -186,7 +186,7 @@ file = fopen('outputs', 'w'); fwrite(file, cell2mat(y)', 'double'); fclose(file)
 
 def build_matlab_system(exported, folder):
     """Write the class; return a function of a `Run` that runs it in Octave."""
-    block, package = measured_block(exported), folder / "+matlab"
+    block, package = program_block(exported), folder / "+matlab"
     package.mkdir()
     (package / "System.m").write_text(_SYSTEM)
     write_export(exported, "matlab-system", folder / "narx_system.m")
@@ -218,7 +218,7 @@ def build_fmu(kind):
     def build(exported, folder):
         write_export(exported, kind, folder / "model.fmu")
         assert validate_fmu(str(folder / "model.fmu")) == []
-        block = measured_block(exported)
+        block = program_block(exported)
         columns, outputs = block.columns, block.columns[: block.computed]
 
         def simulate(run):
@@ -263,7 +263,7 @@ def build_python(exported, _folder):
 
 def build_c(exported, folder):
     """Compile the file; return a function of a `Run` that calls ``simulate``."""
-    block = measured_block(exported)
+    block = program_block(exported)
     library = compile_model(export(exported, "c"), FLAGS, folder)
     library.simulate.restype = None
 
@@ -288,7 +288,7 @@ def build_matlab(exported, folder):
     text = export(exported, "matlab")
     name = re.match(r"function .* = (\w+)\(", text)[1]
     (folder / f"{name}.m").write_text(text, encoding="ascii")
-    outputs = measured_block(exported).outputs
+    outputs = program_block(exported).outputs
 
     def simulate(run):
         arguments = [*run.u.T, *map(np.array, _list_starts(exported, run))]
@@ -304,7 +304,7 @@ def build_matlab(exported, folder):
 
 def build_modelica(exported, _folder):
     """Translate the block to Python; return a function of a `Run` that evaluates its equations in order."""
-    block, text = measured_block(exported), export(exported, "modelica")
+    block, text = program_block(exported), export(exported, "modelica")
     known = {name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tanh")}
     for name, arguments, right in _MODELICA_FUNCTION.findall(text):
         inputs = ", ".join(re.findall(r"input Real (\w);", arguments))
@@ -342,7 +342,7 @@ def _translate(text):
 
 def _list_starts(exported, run):
     """Return the further arguments of ``simulate`` of a program of whole records."""
-    if measured_block(exported).is_state_space:
+    if program_block(exported).is_state_space:
         return [] if run.states is None else [run.states]
     return run.first.T.tolist()
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
 from islands.estimation.latent_data import LatentData, measure_held_out
 from islands.estimation.state_space_fit import StateSpaceFit
-from islands.models.latent import StateSpaceLayout, read_at_once
+from islands.models.latent import StateSpaceLayout, find_direct
 from islands.models.unit_functions import find_codes, parse_unit
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes
@@ -79,7 +79,7 @@ class FittedStateSpace:
     def reads_at_once(self) -> bool:
         """Whether the output reads an input at the same row."""
         named = zip(self.layout.names, self.theta, strict=True)
-        return read_at_once([name for name, value in named if value != 0.0])
+        return bool(find_direct(name for name, value in named if value != 0.0))
 
     def draft(self) -> "Draft":
         """Return a draft with this structure and these parameters."""

@@ -21,7 +21,7 @@ from islands.estimation.fitted_state_space import number
 from islands.kernels.state_space import trace_states
 from islands.kernels.state_space_products import accumulate_products
 from islands.models.latent import LatentModel
-from islands.models.state_space import Quantity, list_modes, measure_gains, measure_mode
+from islands.models.state_space import Quantity, list_modes
 from islands.records.dataset import Dataset
 from islands.simulation.initial_states import estimate_initial_states, read_inputs
 from islands.simulation.layout import find_intervals
@@ -111,7 +111,7 @@ def _differentiate_errors(
     found = []
     for first, length, start in zip(starts.tolist(), lengths.tolist(), states, strict=True):
         # The states are those at the last sample before the prediction, the output of which is no error.
-        begin, end = first - 1 - max(model.leads[1 + model.order :]), first + length
+        begin, end = first - 1 - max(model.input_lags), first + length
         u, _ = read_inputs(record, model, begin, end)
         y = np.append(np.nan, record.y[first:end])
         rows = np.zeros((len(products), len(y)))
@@ -161,5 +161,4 @@ def _measure(model: LatentModel, poles: Sequence[complex]) -> list[Quantity]:
         nearest = min(left, key=lambda each: abs(each - pole))
         left.remove(nearest)
         ordered.append(nearest)
-    modes = (each for pole in ordered for each in measure_mode(pole, model.dt or 1.0))
-    return [*modes, *measure_gains(system)]
+    return list(system.list_quantities(ordered))

@@ -18,7 +18,7 @@ from islands.export.languages.modelica import modelica_source
 from islands.export.languages.python import python_source
 from islands.models.block import Block
 from islands.models.coupled_narx import CoupledModel
-from islands.models.measured_signals import measured_block
+from islands.models.measured_signals import program_block
 from islands.models.protocol import DynamicModel
 from islands.persistence.models import model_json
 from islands.progress import explain_failure
@@ -49,7 +49,7 @@ def _of_block(write: Callable[[Block], Text]) -> Callable[[Exported], Text]:
 
     @wraps(write)
     def write_model(model: Exported) -> Text:
-        return write(measured_block(model))
+        return write(program_block(model))
 
     return write_model
 

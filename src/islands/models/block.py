@@ -11,7 +11,7 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 from islands.errors import ModelError
 from islands.expressions.evaluation import value
@@ -180,18 +180,74 @@ class Block:
 
     @cached_property
     def is_state_space(self) -> bool:
-        """Whether the states at one sample, and the inputs from there, determine all outputs.
+        """Whether the states at one sample, and the inputs, determine all outputs.
 
-        An equation of a state reads one sample back, that of an output reads sample k, and no measured output
-        determines a state.
+        An equation of a state reads the states one sample back, that of an output reads those of sample k, and
+        no measured output determines a state.
         """
         channels = {name: channel for channel, name in enumerate(self.signals)}
         reads_states = all(
-            lag == int(place >= self.outputs) and channels[name] >= self.outputs
+            channels[name] >= (self.outputs if lag == int(place >= self.outputs) else self.computed)
             for place in range(self.computed)
             for name, lag in self._find_samples(place)
         )
         return bool(self.starts) and reads_states and not any(map(lags, self.starts))
+
+    @cached_property
+    def late_inputs(self) -> tuple[tuple[str, int], ...]:
+        """Past inputs that are part of the state of a state space: name and lag; none of other blocks."""
+        if not self.is_state_space:
+            return ()
+        late = dict.fromkeys(self.signals[self.computed :], 0)
+        for place in range(self.computed):
+            for name, lag in self._find_samples(place):
+                if name in late:
+                    late[name] = max(late[name], lag - (place >= self.outputs))
+        return tuple((name, lag) for name, deepest in late.items() for lag in range(1, deepest + 1))
+
+    def expand_delays(self) -> "Block":
+        """Return the block of a state space with the inputs that it reads late as further states.
+
+        Programs of it need no inputs before their first sample. The state ``u_2`` is the input u(k-2).
+        """
+        if not self.late_inputs:
+            return self
+        names = [f"{name}_{lag}" for name, lag in self.late_inputs]
+        signals = (*self.signals[: self.computed], *names, *self.signals[self.computed :])
+        channels = {name: channel for channel, name in enumerate(signals)}
+        leads = dict(zip(self.signals, self.leads, strict=True))
+
+        def move(leaf: Lagged, now: int) -> Expression:
+            name = self.signals[leaf.channel]
+            late = f"{name}_{leaf.lag - leads[name] - now}"
+            return Lagged(channels[late], now) if late in names else Lagged(channels[name], leaf.lag)
+
+        def delay(name: str, lag: int) -> BlockTerm:
+            before = f"{name}_{lag - 1}"
+            return BlockTerm(
+                Lagged(channels[name], 1 + leads[name]) if lag == 1 else Lagged(channels[before], 1)
+            )
+
+        moved = [
+            tuple(
+                replace(
+                    term,
+                    expression=replace_leaves(term.expression, partial(move, now=int(place >= self.outputs))),
+                )
+                for term in equation
+            )
+            for place, equation in enumerate(self.equations)
+        ]
+        levels = [Constant(self.levels.get(name, 0.0)) for name, _ in self.late_inputs]
+        return replace(
+            self,
+            equations=(*moved, *((delay(*each),) for each in self.late_inputs)),
+            columns=(*self.columns[: self.computed], *names, *self.columns[self.computed :]),
+            signals=signals,
+            starts=(*self.starts, *levels),
+            leads=tuple(leads.get(name, 0) for name in signals),
+            texts=(*self.texts, f"where {names[0]}(k) = {self.late_inputs[0][0]}(k-1)"),
+        )
 
     def start_at(self, states: Mapping[str, float]) -> "Block":
         """Return the block that starts at given states, which are further parameters, in their order."""

@@ -11,7 +11,7 @@ representation: Schoukens and Toth, Automatica 113 (2020) 108731).
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from math import isfinite, prod
+from math import isfinite, nan, prod
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -149,16 +149,19 @@ class LatentModel(ParametricModel):
         Number of samples from which the initial states of a free run are estimated.
     operating_inputs : tuple of float
         Inputs of the operating point: those of a stated gain, or the means of the estimation data.
+    delays : tuple of int
+        Dead time of each input in samples; none if empty.
     limits : SensorLimits
         Least and greatest output that the sensor shows.
     quantity_errors : tuple of float or None
         Standard errors of ``quantities``. The parameters have none: a change of the coordinates of the states
-        alters them without an effect on the output. None if unknown.
+        alters them without an effect on the output. NaN of a quantity without one. None if unknown.
 
     Raises
     ------
     ModelError
-        A unit or a name is unknown, or the output reads an input that is not read one sample early.
+        A unit or a name is unknown, the output reads an input at sample k that is not read one sample early,
+        or the memory is shorter than a dead time.
     """
 
     kind: ClassVar[str] = "latent"
@@ -169,6 +172,7 @@ class LatentModel(ParametricModel):
     wiring: tuple[str, ...]
     memory: int
     operating_inputs: tuple[float, ...]
+    delays: tuple[int, ...] = ()
     limits: SensorLimits = NO_LIMITS
     quantity_errors: tuple[float, ...] | None = None
 
@@ -179,9 +183,12 @@ class LatentModel(ParametricModel):
         if tuple(name for name in self.layout.names if name in self.names) != self.names:
             known = ", ".join(self.layout.names)
             raise ModelError(f"the parameters of a model {self.kind} are some of {known}, in this order")
-        early = [parse_channel_name(name).at_once for name in self.input_names]
-        if self.reads_at_once and not all(early):
+        if len(self.delays) not in (0, self.inputs):
+            raise ModelError(f"{len(self.delays)} dead times for {self.inputs} inputs")
+        if not all(self.input_lags[place] for place in find_direct(self.names)):
             raise ModelError("the output reads the inputs at sample k: read them one sample early (u+1)")
+        if self.memory <= max(self.input_lags):
+            raise ModelError(f"a memory of {self.memory} samples is shorter than a dead time of the model")
 
     @property
     def layout(self) -> StateSpaceLayout:
@@ -197,6 +204,14 @@ class LatentModel(ParametricModel):
     def maximum_lag(self) -> int:
         """Number of samples before the first prediction."""
         return self.memory
+
+    @property
+    def input_lags(self) -> tuple[int, ...]:
+        """Number of samples by which the output and the states read each column of the inputs late."""
+        return tuple(
+            delay + parse_channel_name(name).at_once
+            for delay, name in zip(self.delays or (0,) * self.inputs, self.input_names, strict=True)
+        )
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -267,6 +282,7 @@ class LatentModel(ParametricModel):
         return replace(
             at.system,
             dt=self.dt,
+            dead_times=tuple(delay * (1.0 if self.dt is None else self.dt) for delay in self.delays),
             input_names=self.column_names,
             output_names=(self.output_name,),
             input_units=tuple(parse_channel_name(name).unit for name in self.column_names),
@@ -278,7 +294,7 @@ class LatentModel(ParametricModel):
     @property
     def reads_at_once(self) -> bool:
         """Whether the output reads an input at sample k, itself or through a unit."""
-        return read_at_once(self.names)
+        return bool(find_direct(self.names))
 
     @property
     def theta(self) -> NDArray[np.float64]:
@@ -324,14 +340,16 @@ class LatentModel(ParametricModel):
     def _describe_modes(self, names: Sequence[str]) -> tuple[str, ...]:
         if self.dt is None:
             return ()
-        errors = self.known_errors
-        modes = describe_poles(self.linearise().poles, self.dt, errors)
+        errors, system = self.known_errors, self.linearise()
+        modes = describe_poles(system.poles, self.dt, errors)
         if errors is None:
             return modes
-        gains = zip(names, self.quantities[-self.inputs :], errors[-self.inputs :], strict=True)
-        written = (
-            f"static gain of {name} {gain.value:.4g}{write_error(error)}" for name, gain, error in gains
-        )
+        written = [
+            f"{each.name} of {names[each.input - 1]} {each.value:.4g}{write_error(error)}"
+            + f" {each.unit}".rstrip()
+            for each, error in zip(self.quantities, errors, strict=True)
+            if each.input is not None
+        ]
         return (*modes, *written)
 
     @property
@@ -360,12 +378,12 @@ class LatentModel(ParametricModel):
     def list_quantities(self) -> list[dict[str, Any]]:
         """Return the quantities and standard errors as JSON values; the gain of an integrator is null."""
         found = self.quantities
-        errors = self.known_errors or (None,) * len(found)
+        errors = self.known_errors or (nan,) * len(found)
         return [
             {
                 **asdict(each),
                 "value": each.value if isfinite(each.value) else None,
-                "standard_error": error,
+                "standard_error": error if isfinite(error) else None,
             }
             for each, error in zip(found, errors, strict=True)
         ]
@@ -417,9 +435,9 @@ class LatentModel(ParametricModel):
     def _read_inputs(self, only: str, prefix: str, lag: int) -> list[tuple[str, str]]:
         """Return the parameter and the text of every input at sample k - lag."""
         found = []
-        names, leads = symbols(self.inputs)[1:], self.leads[1 + self.order :]
-        for place, (name, lead) in enumerate(zip(names, leads, strict=True), start=1):
-            sample = f"{name}(k-{lag + lead})" if lag + lead else f"{name}(k)"
+        names = symbols(self.inputs)[1:]
+        for place, (name, late) in enumerate(zip(names, self.input_lags, strict=True), start=1):
+            sample = f"{name}(k-{lag + late})" if lag + late else f"{name}(k)"
             found.append((only if self.inputs == 1 else f"{prefix}{place}", sample))
         return found
 
@@ -432,6 +450,7 @@ class LatentModel(ParametricModel):
         """Return the model as JSON values."""
         structure: dict[str, Any] = {"order": self.order, "units": list(self.units), "memory": self.memory}
         structure |= {"operating_inputs": list(self.operating_inputs), "limits": list(self.limits)}
+        structure |= {"delays": list(self.delays)}
         return {**structure, **super().document(), "quantities": self.list_quantities()}
 
     @classmethod
@@ -440,20 +459,27 @@ class LatentModel(ParametricModel):
         errors = [entry.get("standard_error") for entry in document.get("quantities", ())]
         limits = document.get("limits", ())
         return {
-            "quantity_errors": None if None in errors or not errors else tuple(map(float, errors)),
+            "quantity_errors": None
+            if errors == [None] * len(errors)
+            else tuple(nan if each is None else float(each) for each in errors),
             "order": int(document["order"]),
             "units": tuple(map(str, document["units"])),
             "memory": int(document["memory"]),
             "operating_inputs": tuple(map(float, document["operating_inputs"])),
+            "delays": tuple(map(int, document.get("delays", ()))),
             "limits": SensorLimits(*(None if each is None else float(each) for each in limits)),
             "wiring": tuple(str(entry["name"]) for entry in document["parameters"]),
         }
 
 
-def read_at_once(names: Sequence[str]) -> bool:
-    """Return whether the output reads an input at sample k if these parameters are not zero."""
+def find_direct(names: Iterable[str]) -> set[int]:
+    """Return the places of the inputs that the output reads at sample k if these parameters are not zero."""
+    names = tuple(names)
     units = {name[1:] for name in names if name[0] == "f"}
-    return any(name[0] == "d" or (name[0] == "v" and name[1:].split("_")[0] in units) for name in names)
+    direct = [name for name in names if name[0] == "d"]
+    through = [name for name in names if name[0] == "v" and name[1:].split("_")[0] in units]
+    numbers = [*(name[1:] for name in direct), *(name.partition("_")[2] for name in through)]
+    return {int(number or 1) - 1 for number in numbers}
 
 
 def _round(value: float) -> str:

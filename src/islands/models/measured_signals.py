@@ -31,3 +31,14 @@ def measured_block(model: DynamicModel | CoupledModel) -> Block:
     return (
         block if found is block else replace(found, texts=(*block.texts, f"where {describe_signals(model)}"))
     )
+
+
+def program_block(model: DynamicModel | CoupledModel) -> Block:
+    """Return the block of an exported program: that of the measured signals, without late inputs.
+
+    Raises
+    ------
+    ModelError
+        The model has no parameters.
+    """
+    return measured_block(model).expand_delays()

@@ -7,7 +7,7 @@ chapters 2 and 3.
 from cmath import log
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import log10, pi
+from math import isnan, log10, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -546,14 +546,18 @@ class StateSpace:
 
     @property
     def quantities(self) -> "tuple[Quantity, ...]":
-        """Quantities of the modes, slowest first, and the static gains of the first output.
+        """Quantities of the modes, slowest first, and the gains and dead times of the first output.
 
         Empty without a time.
         """
+        return self.list_quantities(list_modes(self.poles))
+
+    def list_quantities(self, modes: Iterable[complex]) -> "tuple[Quantity, ...]":
+        """Return the quantities with the modes in a given order."""
         if not self.dt:
             return ()
-        modes = (each for pole in list_modes(self.poles) for each in measure_mode(pole, self.step))
-        return (*modes, *measure_gains(self))
+        of_modes = (each for pole in modes for each in measure_mode(pole, self.step))
+        return (*of_modes, *_measure_gains(self), *_measure_dead_times(self))
 
 
 #: Forms of a system in which it is handed over.
@@ -582,7 +586,8 @@ class Quantity:
     Attributes
     ----------
     name : str
-        ``time constant``, ``frequency``, ``damping ratio``, ``pole`` or ``static gain``.
+        ``time constant``, ``frequency``, ``damping ratio``, ``pole``, ``static gain``, ``integrator gain`` or
+        ``dead time``.
     value : float
     unit : str
         ``s`` or ``Hz``; empty for a number, and for a gain, whose unit is that of the output by that of the
@@ -615,10 +620,25 @@ def measure_mode(pole: complex, dt: float) -> tuple[Quantity, ...]:
     return (Quantity("time constant", -dt / log(pole).real, "s"),)
 
 
-def measure_gains(system: StateSpace) -> tuple[Quantity, ...]:
-    """Return the static gain of every input to the first output."""
-    gains = enumerate(system.static_gain[0].tolist(), start=1)
-    return tuple(Quantity("static gain", gain, input=place) for place, gain in gains)
+def _measure_gains(system: StateSpace) -> Iterable[Quantity]:
+    """Yield the gain of every input to the first output, of an integrator that to the slope of the output."""
+    values, vectors = np.linalg.eig(system.A)
+    place = int(np.abs(values - 1.0).argmin()) if system.order else 0
+    if system.order and abs(values[place] - 1.0) <= ROUNDING:
+        weights = np.linalg.solve(vectors, system.B.astype(complex))[place]
+        slopes = np.real(system.C[0] @ vectors[:, place] * weights) / system.step
+        for number, slope in enumerate(slopes.tolist(), start=1):
+            yield Quantity("integrator gain", slope, input=number)
+    else:
+        for number, gain in enumerate(system.static_gain[0].tolist(), start=1):
+            yield Quantity("static gain", gain, input=number)
+
+
+def _measure_dead_times(system: StateSpace) -> Iterable[Quantity]:
+    """Yield the dead times of the inputs that have one."""
+    for number, delay in enumerate(system.dead_times, start=1):
+        if delay:
+            yield Quantity("dead time", delay, "s", number)
 
 
 def describe_poles(
@@ -643,8 +663,8 @@ def describe_poles(
 
 
 def write_error(error: float) -> str:
-    """Write a standard error after its value."""
-    return f" +- {error:.2g}"
+    """Write a standard error after its value; nothing if it is NaN."""
+    return "" if isnan(error) else f" +- {error:.2g}"
 
 
 def _describe_pole(pole: complex, dt: float, errors: Sequence[str]) -> str:

@@ -151,9 +151,9 @@ def _minimise(
 
 
 def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tuple[NDArray[np.float64], int]:
-    """Return the inputs at the samples of a part of a segment, and the number of samples that lack one.
+    """Return the inputs that act at the samples of a part of a segment, and how many samples lack one.
 
-    An input that is read one sample early is not known at the first sample of a segment.
+    An input that is read one sample early, or after a dead time, is not known at the first samples.
 
     Parameters
     ----------
@@ -167,9 +167,8 @@ def read_inputs(record: Dataset, model: LatentModel, begin: int, end: int) -> tu
     ndarray, shape (end - begin - late, inputs)
     int
     """
-    leads = model.leads[1 + model.order :]
-    late = max(leads)
-    columns = [record.u[begin + late - lead : end - lead, place] for place, lead in enumerate(leads)]
+    late = max(model.input_lags)
+    columns = [record.u[begin + late - lag : end - lag, place] for place, lag in enumerate(model.input_lags)]
     return np.column_stack(columns), late
 
 
@@ -230,7 +229,7 @@ def estimate_initial_states(
 
 def find_first_states(
     model: AnyModel, record: AnyRecord, warm_up: int
-) -> tuple[int, NDArray[np.float64]] | None:
+) -> tuple[int, dict[str, float]] | None:
     """Return the states from which an exported program repeats a free run of the first recording.
 
     Parameters
@@ -243,8 +242,9 @@ def find_first_states(
 
     Returns
     -------
-    (int, ndarray of shape (states,)) or None
-        Sample, and the states there. None for a model whose first outputs are given.
+    (int, dict of float) or None
+        Sample, and the states there by name in the order of the program: after those of the model, the inputs
+        as measured that it reads after a dead time. None for a model whose first outputs are given.
     """
     if isinstance(model, LatentModel) and isinstance(record, Dataset):
         pairs = [(model, map_signals(model, record)[0])]
@@ -253,6 +253,23 @@ def find_first_states(
     else:
         return None
     begin = next(begin for begin, end in record.bounds if end - begin > warm_up)
-    found = [estimate_first_states(*pair, begin, begin + warm_up) for pair in pairs]
-    late = warm_up - len(found[0][1])
-    return begin + late, np.concatenate([states for states, _ in found])
+    late = max(max(single.input_lags) for single, _ in pairs)
+    states: list[float] = []
+    for single, signals in pairs:
+        x, u = estimate_first_states(single, signals, begin, begin + warm_up)
+        rows = late - max(single.input_lags)
+        simulate_state_space(single.theta, single.codes, u[:rows], x, np.empty(rows))
+        states += x.tolist()
+    block, (single, signals) = model.block(), pairs[0]
+    columns = dict(zip(block.signals[block.computed :], _measure_inputs(single, signals).T, strict=True))
+    leads = dict(zip(block.signals, block.leads, strict=True))
+    states += [columns[name][begin + late - lag - leads[name]] for name, lag in block.late_inputs]
+    expanded = block.expand_delays()
+    names = expanded.signals[expanded.outputs : expanded.computed]
+    return begin + late, dict(zip(names, map(float, states), strict=True))
+
+
+def _measure_inputs(model: LatentModel, signals: Dataset) -> NDArray[np.float64]:
+    """Return the inputs of the signals of a model, as measured."""
+    done = model.preprocessing
+    return signals.u + np.array(done.input_offsets) if done else signals.u

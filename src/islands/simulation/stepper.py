@@ -35,7 +35,8 @@ class Stepper:
         Outputs before the first sample; by default the stable equilibrium at the inputs. The states of a
         state space are then those that explain the constant output best.
     states : sequence of float, optional
-        States of a state space at the first sample, in the order of its equations.
+        States of a state space at the first sample, in the order of its equations. With dead times, the
+        inputs before it follow: u(k-1), u(k-2), .. of each input, as measured.
 
     Raises
     ------
@@ -68,7 +69,7 @@ class Stepper:
                     "states are those of a state space, in place of its output: give the output before the "
                     "first sample of other models"
                 )
-            self._given = read_numbers(states, len(block.starts), "states")
+            self._given = self._read_states(states, depth)
         elif y is None:
             at_rest = np.array(find_rest(measured, inputs.tolist()))
             at_rest[: block.outputs] -= self._output_offsets
@@ -101,18 +102,35 @@ class Stepper:
 
         Empty for a model whose past outputs are its state.
         """
-        block = self._block
-        now = self._past[block.outputs : block.computed, -1] if self._given is None else self._given
-        return np.array(now)
+        block, row = self._block, self._past.shape[1] - (self._given is None)
+        own = self._past[block.outputs : block.computed, -1] if self._given is None else self._given
+        return np.array([*own, *(self._past[place] + offset for place, offset in self._find_late(row))])
 
     @states.setter
     def states(self, values: ArrayLike) -> None:
-        block = self._block
-        found = read_numbers(values, len(block.starts), "states")
+        block, row = self._block, self._past.shape[1] - (self._given is None)
+        found = self._read_states(values, row)
         if self._given is None:
             self._past[block.outputs : block.computed, -1] = found
         else:
             self._given = found
+
+    def _read_states(self, values: ArrayLike, row: int) -> NDArray[np.float64]:
+        """Write the inputs before a row; return the other states."""
+        late, own = self._find_late(row), len(self._block.starts)
+        found = read_numbers(values, own + len(late), "states")
+        for (place, offset), measured in zip(late, found[own:], strict=True):
+            self._past[place] = measured - offset
+        return found[:own]
+
+    def _find_late(self, row: int) -> list[tuple[tuple[int, int], float]]:
+        """Return the place in the past and the offset of every late input at the sample of a row."""
+        block, found = self._block, []
+        for name, lag in block.late_inputs:
+            channel = block.signals.index(name)
+            place = channel, row - lag - block.leads[channel]
+            found.append((place, float(self._input_offsets[channel - block.computed])))
+        return found
 
     def step(self, u: ArrayLike) -> float | NDArray[np.float64]:
         """Return the output at the next sample, of which the inputs are given.

@@ -360,7 +360,7 @@ def _print_first_states(model: AnyModel, data: AnyRecord, warm_up: int) -> None:
     """State the states from which an exported program repeats the simulation."""
     if found := find_first_states(model, data, warm_up):
         sample, states = found
-        listed = ", ".join(f"x{place} = {state!r}" for place, state in enumerate(states.tolist(), start=1))
+        listed = ", ".join(f"{name} = {state!r}" for name, state in states.items())
         output.print(
             f"states at sample {sample}, estimated from the first {warm_up} samples: {listed}", markup=False
         )
