@@ -14,6 +14,7 @@ import numpy as np
 from islands.available_cpus import count_cpus
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
+from islands.estimation.linear.identify import identify_linear
 from islands.estimation.output_error import fit_output_error
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution.evaluation import Evaluator, Limits
@@ -83,6 +84,7 @@ def _use_all_kernels() -> None:
             identify_record(record, preset="hysteresis", constraints=constraints, **SMALL)
     fit_record(record, library="phi-polynomial", max_terms=3)
     fit_output_error(record)
+    identify_linear(record.u, record.y, max_order=1)
     _simulate_two_outputs(record)
 
 
@@ -106,6 +108,7 @@ def use_other_kernels() -> None:
     free_run(model, record)
     estimate(model.regressors, record)
     fit_output_error(record)
+    identify_linear(record.u, record.y, max_order=1)
     _simulate_two_outputs(record)
 
 

@@ -88,7 +88,7 @@ def identify_linear(
     # On small matrices, several threads take a hundred times as long, and sums have other bits.
     with threadpool_limits(1, user_api="blas"):
         fits = _search(signals, longest, max_order, feedthrough)
-        best = min(fits, key=attrgetter("criterion"))
+        best = minimise(signals, min(fits, key=attrgetter("criterion")), 20, 1e-9)
         return make_model(signals, best, scales, list(map(_describe, fits)))
 
 

@@ -9,32 +9,34 @@ samples.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.linear.sections import (
-    BLOCK,
     INTEGRATOR,
     Section,
     Signal,
     Signals,
-    divide,
     find_poles,
     is_stable,
     pair_poles,
-    respond_freely,
 )
+from islands.kernels.parallel_sections import factor_sections, solve_rows
 
-#: Singular value, relative to the largest, up to which a direction is not shown by the samples.
+#: A column that keeps at most this part of its norm depends on the columns before it.
 _DEPENDENT = 1e-10
+
+#: Reduction of the deviance for which no step is taken: it is no reason to prefer a model.
+_NEGLIGIBLE = 1e-3
 
 #: Halvings of a step.
 _MAX_HALVINGS = 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Structure:
     """What the numerators and the noise belong to.
 
@@ -75,12 +77,24 @@ class Structure:
         skipped = self.count_skipped(signals)
         return [(begin + skipped, end) for begin, end in signals.bounds]
 
-    @property
+    def count_coefficients(self, output: int) -> int:
+        """Return the number of the coefficients of an output."""
+        return len(self.leads[output]) * self.order + int(np.count_nonzero(self.leads[output])) + 1
+
+    @cached_property
+    def filters(self) -> tuple[Signal, NDArray[np.int64]]:
+        """Coefficients of all sections, shape (sections, 2), and how many each one has."""
+        padded = np.zeros((len(self.parts), 2))
+        for row, section in zip(padded, self.parts, strict=True):
+            row[: section.size] = section
+        return padded, np.array([section.size for section in self.parts], np.int64)
+
+    @cached_property
     def parts(self) -> tuple[Section, ...]:
         """All sections, that of an integrator last."""
         return self.sections + (INTEGRATOR,) * self.integrators
 
-    @property
+    @cached_property
     def order(self) -> int:
         """Number of poles."""
         return sum(section.size for section in self.parts)
@@ -91,20 +105,19 @@ class Structure:
         return self.order - self.integrators
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A structure with the best numerators.
 
     Attributes
     ----------
+    signals : Signals
     structure : Structure
     coefficients : tuple of ndarray
         Coefficients of every output: of every input those of the sections and, if it leads, of the direct
         term; last the constant.
     starts : tuple of ndarray
         States of every output at the first sample that is counted, shape (recordings, order).
-    residual : ndarray, shape (outputs, samples)
-        Error of the free run; zero where it is not counted.
     squares : ndarray, shape (outputs,)
         Sum of squares of the whitened error.
     counts : ndarray, shape (outputs,)
@@ -113,15 +126,25 @@ class Fit:
         Samples of every recording that are not counted.
     """
 
+    signals: Signals
     structure: Structure
     coefficients: tuple[Signal, ...]
     starts: tuple[Signal, ...]
-    residual: Signal
     squares: Signal
     counts: Signal
     skipped: int
 
-    @property
+    @cached_property
+    def residual(self) -> Signal:
+        """Error of the free run, shape (outputs, samples); zero where it is not counted."""
+        residual, nothing = np.zeros(self.signals.y.shape), np.empty((0, 0))
+        for output, (coefficients, starts) in enumerate(zip(self.coefficients, self.starts, strict=True)):
+            own = np.empty((*starts.shape, starts.shape[1]))
+            rest = coefficients, starts, False, residual[output], nothing, own
+            _run(self.signals, self.structure, output, *rest)
+        return residual
+
+    @cached_property
     def deviance(self) -> float:
         """Minus twice the logarithm of the likelihood of all samples, up to a constant.
 
@@ -130,203 +153,164 @@ class Fit:
         input before a recording does not grow with the number of samples.
         """
         mean_squares = np.maximum(self.squares, np.finfo(float).tiny) / self.counts
-        outputs, samples = self.residual.shape
+        outputs, samples = self.signals.y.shape
         free = outputs * self.skipped * len(self.starts[0])
         return float(samples * np.log(mean_squares).sum() + 2.0 * free)
 
     @property
     def criterion(self) -> float:
         """Information criterion of Schwarz, with the initial states and a dead time as parameters."""
-        structure, samples = self.structure, self.residual.shape[1]
+        structure, samples = self.structure, self.signals.samples
         sizes = [each.size for each in (*self.coefficients, *structure.noise, *self.starts)]
         count = structure.free + sum(sizes) + int(np.count_nonzero(structure.delays))
         return self.deviance + float(np.log(samples)) * count
 
 
-def make_columns(signals: Signals, structure: Structure, output: int) -> Signal:
-    """Return the responses of an output to the inputs and to a constant, shape (coefficients, samples)."""
-    columns = []
-    for place, (delay, leads) in enumerate(
-        zip(structure.delays[output].tolist(), structure.leads[output].tolist(), strict=True)
-    ):
-        late = signals.late(place, delay)[None]
-        columns += [divide(section, late, signals.ends)[0] for section in structure.parts]
-        if leads:
-            columns.append(late)
-    constant = np.ones((1, signals.samples))
-    if structure.integrators:
-        constant = divide(INTEGRATOR, constant, signals.ends)[0] / signals.samples
-    return np.concatenate([*columns, constant])
-
-
-class _Projection(NamedTuple):
-    """Best numerators of one output, its initial states, its error, and the sum of the whitened squares."""
-
-    coefficients: Signal
-    starts: Signal
-    residual: Signal
-    squares: float
-
-
 def project(signals: Signals, structure: Structure) -> Fit | None:
     """Return the fit with the best numerators; None if it is not finite."""
-    found = [_project(signals, structure, output) for output in range(len(structure.noise))]
-    squares = np.array([each.squares for each in found])
+    skipped, recordings = structure.count_skipped(signals), signals.ends.size
+    coefficients, starts = [], []
+    squares, counts = np.empty(len(structure.noise)), np.empty(len(structure.noise))
+    for output, noise in enumerate(structure.noise):
+        zero = np.zeros(structure.count_coefficients(output)), np.zeros((recordings, structure.order))
+        factor, own = _factor(signals, structure, output, *zero)
+        found = solve(factor[:, :-1], factor[:, -1], _measure_columns(factor, own)[:-1])
+        squares[output] = found.squares
+        coefficients.append(found.values)
+        starts.append(np.array([_solve_start(rows, found.values) for rows in own]))
+        counts[output] = signals.samples - (skipped + noise.size) * recordings
     if not np.isfinite(squares).all():
         return None
-    skipped = structure.count_skipped(signals)
-    lost = [(skipped + noise.size) * signals.ends.size for noise in structure.noise]
-    return Fit(
-        structure,
-        tuple([each.coefficients for each in found]),
-        tuple([each.starts for each in found]),
-        np.array([each.residual for each in found]),
-        squares,
-        signals.samples - np.array(lost, np.float64),
-        skipped,
+    return Fit(signals, structure, tuple(coefficients), tuple(starts), squares, counts, skipped)
+
+
+def _factor(
+    signals: Signals,
+    structure: Structure,
+    output: int,
+    coefficients: Signal,
+    starts: Signal,
+    derivatives: bool = False,
+) -> tuple[Signal, Signal]:
+    """Return the factor of an output, and of every recording the rows of its initial states.
+
+    Columns of the factor are those of the coefficients, of the noise and the poles if they are requested, and
+    the residual. Rows of the initial states begin with their own columns.
+    """
+    noise = structure.noise[output]
+    size = coefficients.size + (noise.size + structure.free if derivatives else 0) + 1
+    factor, own = np.empty((size, size)), np.empty((*starts.shape, starts.shape[1] + size))
+    _run(signals, structure, output, coefficients, starts, derivatives, np.empty(0), factor, own)
+    return factor, own
+
+
+def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> None:
+    """Call the kernel for an output."""
+    factor_sections(
+        signals.u,
+        signals.y[output],
+        signals.ends,
+        structure.count_skipped(signals),
+        *structure.filters,
+        structure.integrators,
+        structure.delays[output],
+        structure.leads[output],
+        structure.noise[output],
+        *rest,
     )
 
 
-def _project(signals: Signals, structure: Structure, output: int) -> _Projection:
-    columns, noise, order = make_columns(signals, structure, output), structure.noise[output], structure.order
-    rows, intervals = np.vstack([columns, signals.y[output]]), structure.find_intervals(signals)
-    responses = respond_freely(structure.parts, max(end - begin for begin, end in intervals))
-    factors = [
-        triangulate(np.vstack([responses[:, : end - begin], rows[:, begin:end]]), noise)
-        for begin, end in intervals
-    ]
-    whole, count = factor_rows(np.vstack([factor[order:, order:] for factor in factors])), len(columns)
-    coefficients = solve(whole[:count, :count], whole[:count, count])
-    rest = whole[:, count] - whole[:, :count] @ coefficients
-    error, starts = signals.y[output] - coefficients @ columns, np.zeros((len(factors), order))
-    residual = np.zeros(signals.samples)
-    for (begin, end), factor, start in zip(intervals, factors, starts, strict=True):
-        moment = factor[:order, -1] - factor[:order, order:-1] @ coefficients
-        start[:] = solve(factor[:order, :order], moment)
-        residual[begin:end] = error[begin:end] - start @ responses[:, : end - begin]
-    return _Projection(coefficients, starts, residual, float(rest @ rest))
+def _measure_columns(factor: Signal, own: Signal) -> Signal:
+    """Return the norms of the columns over all samples."""
+    order = own.shape[1]
+    norms: Signal = np.sqrt(np.square(factor).sum(axis=0) + np.square(own[:, :, order:]).sum(axis=(0, 1)))
+    return norms
 
 
-def whiten(rows: Signal, noise: Signal) -> Signal:
-    """Return rows of one recording filtered by the inverse of the noise, without the first samples."""
-    size = noise.size
-    filtered = rows[:, size:]
-    for lag, coefficient in enumerate(noise, start=1):
-        filtered = filtered - coefficient * rows[:, size - lag : rows.shape[1] - lag]
-    return filtered
+def _solve_start(rows: Signal, coefficients: Signal) -> Signal:
+    """Return the initial states of a recording."""
+    order = len(rows)
+    moment = rows[:, -1] - rows[:, order : order + coefficients.size] @ coefficients
+    return solve(rows[:, :order], moment).values
 
 
-def triangulate(rows: Signal, noise: Signal, extra: Signal | None = None) -> Signal:
-    """Return the triangular factor of whitened rows as columns, square, of blocks of samples."""
-    filtered = whiten(rows, noise)
-    if extra is not None:
-        filtered = np.vstack([filtered[:-1], extra, filtered[-1:]])
-    size, samples = filtered.shape
-    parts = [factor_rows(filtered[:, begin : begin + BLOCK].T) for begin in range(0, samples, BLOCK)]
-    factor = parts[0] if len(parts) == 1 else factor_rows(np.vstack(parts))
-    return np.vstack([factor, np.zeros((size - len(factor), size))]) if len(factor) < size else factor
+class Solution(NamedTuple):
+    """Solution of linear equations, and the sum of squares that it leaves."""
+
+    values: Signal
+    squares: float
 
 
-def factor_rows(rows: Signal) -> Signal:
-    """Return the triangular factor of a matrix."""
-    return np.asarray(np.linalg.qr(rows, mode="r"))
+def solve(rows: Signal, moment: Signal, units: Signal | None = None) -> Solution:
+    """Return the least-squares solution; columns that depend on those before them have the value 0.
 
-
-def solve(factor: Signal, moment: Signal) -> Signal:
-    """Return the least-squares solution; directions that the samples do not show stay at zero."""
-    norms = np.linalg.norm(factor, axis=0)
-    norms[norms == 0.0] = 1.0
-    solution: Signal = np.linalg.lstsq(factor / norms, moment, rcond=_DEPENDENT)[0] / norms
-    return solution
+    Parameters
+    ----------
+    rows : ndarray, shape (equations, unknowns)
+    moment : ndarray, shape (equations,)
+    units : ndarray, shape (unknowns,), optional
+        Norms of the columns in the equations that the rows come from; by default those of the rows.
+    """
+    values = np.empty(rows.shape[1])
+    norms = np.sqrt(np.square(rows).sum(axis=0)) if units is None else units
+    return Solution(values, solve_rows(np.column_stack([rows, moment]), norms, _DEPENDENT, values))
 
 
 class OutputFactor(NamedTuple):
-    """Triangular factor of one output: its own parameters first, then the poles, then the error."""
+    """Triangular factor of one output: its own parameters first, then the poles, then the error.
+
+    The coordinates of a section of two coefficients are ``a1 + a2`` and ``-a2``.
+    """
 
     factor: Signal
     own: int
 
 
-def differentiate(signals: Signals, fit: Fit, output: int) -> Signal:
-    """Return the derivatives of an output with respect to the poles, shape (free poles, samples).
-
-    Those of a section of two coefficients are with respect to ``a1 + a2`` and ``-a2``.
-    """
-    structure = fit.structure
-    parts = _simulate_parts(signals, fit, output)
-    found = [
-        -divide(section, part[None], signals.ends)[0]
-        for section, part in zip(structure.sections, parts, strict=False)
-    ]
-    return np.concatenate([np.zeros((0, signals.samples)), *found])
-
-
-def _simulate_parts(signals: Signals, fit: Fit, output: int) -> Signal:
-    """Return the part of every free section in the output, shape (sections, samples)."""
-    structure, own = fit.structure, fit.coefficients[output]
-    columns = make_columns(signals, structure, output)
-    parts, at = np.zeros((len(structure.sections), signals.samples)), 0
-    for leads in structure.leads[output]:
-        for place, section in enumerate(structure.parts):
-            if place < len(parts):
-                parts[place] += own[at : at + section.size] @ columns[at : at + section.size]
-            at += section.size
-        at += int(leads)
-    intervals = structure.find_intervals(signals)
-    responses = respond_freely(structure.sections, max(end - begin for begin, end in intervals))
-    for (begin, end), start in zip(intervals, fit.starts[output], strict=True):
-        at = 0
-        for place, section in enumerate(structure.sections):
-            rows = slice(at, at + section.size)
-            parts[place, begin:end] += start[rows] @ responses[rows, : end - begin]
-            at += section.size
-    return parts
-
-
 def linearise(signals: Signals, fit: Fit) -> list[OutputFactor]:
     """Return the factors of every output at a fit."""
-    structure, found = fit.structure, []
-    intervals = structure.find_intervals(signals)
-    for output, noise in enumerate(structure.noise):
-        columns = make_columns(signals, structure, output)
-        rows = np.vstack([columns, differentiate(signals, fit, output), fit.residual[output]])
-        responses = respond_freely(structure.parts, max(end - begin for begin, end in intervals))
-        order, count, size = structure.order, len(columns), noise.size
-        factors = []
-        for begin, end in intervals:
-            late = [fit.residual[output, begin + size - lag : end - lag] for lag in range(1, size + 1)]
-            part = np.vstack([responses[:, : end - begin], rows[:, begin:end]])
-            extra = np.array(late).reshape(size, end - begin - size)
-            factors.append(triangulate(part, noise, extra)[order:, order:])
-        factor = factor_rows(np.vstack(factors))
-        # The noise follows the columns.
-        places = [*range(count), *range(count + structure.free, count + structure.free + size)]
-        places += [*range(count, count + structure.free), factor.shape[1] - 1]
-        found.append(OutputFactor(factor_rows(factor[:, places]), count + size))
-    return found
+    return [
+        OutputFactor(
+            _factor(signals, fit.structure, output, coefficients, starts, derivatives=True)[0],
+            coefficients.size + fit.structure.noise[output].size,
+        )
+        for output, (coefficients, starts) in enumerate(zip(fit.coefficients, fit.starts, strict=True))
+    ]
 
 
-def step(signals: Signals, fit: Fit) -> Fit | None:
-    """Return the fit after a Gauss-Newton step of poles and noise; None if no step reduces the deviance."""
-    factors = linearise(signals, fit)
-    structure = fit.structure
-    free = structure.free
+class _Step(NamedTuple):
+    """Changes of the poles and of the noise of every output, and the deviance that they lead to if linear."""
+
+    poles: Signal
+    noise: list[Signal]
+    deviance: float
+
+
+def _find_step(signals: Signals, fit: Fit) -> _Step:
+    """Return the Gauss-Newton step."""
+    factors, free = linearise(signals, fit), fit.structure.free
     deviations = np.sqrt(np.maximum(fit.squares / fit.counts, np.finfo(float).tiny))
     shared = np.vstack(
         [each.factor[each.own :, each.own :] / s for each, s in zip(factors, deviations, strict=True)]
     )
-    moved = solve(shared[:, :free], shared[:, free]) if free else np.zeros(0)
-    changes = []
-    for each, before in zip(factors, structure.noise, strict=True):
-        own = each.own
-        target = each.factor[:own, -1] - each.factor[:own, own : own + free] @ moved
-        changes.append(solve(each.factor[:own, :own], target)[own - before.size :])
+    poles = solve(shared[:, :free], shared[:, free]).values
+    noise, squares = [], []
+    for each, before in zip(factors, fit.structure.noise, strict=True):
+        moment = each.factor[:, -1] - each.factor[:, each.own : -1] @ poles
+        own = solve(each.factor[: each.own, : each.own], moment[: each.own])
+        noise.append(own.values[each.own - before.size :])
+        squares.append(own.squares + float(moment[each.own :] @ moment[each.own :]))
+    return _Step(poles, noise, replace(fit, squares=np.array(squares)).deviance)
+
+
+def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
+    """Return the fit after the longest step that reduces the deviance; None if there is none."""
+    structure = fit.structure
     for halving in range(_MAX_HALVINGS):
         scale = 0.5**halving
-        sections = _join_neighbours(move(structure.sections, scale * moved))
-        noise = tuple([old + scale * new for old, new in zip(structure.noise, changes, strict=True)])
+        sections = _join_neighbours(move(structure.sections, scale * step.poles))
         if not all(map(is_stable, sections)):
             continue
+        noise = tuple([old + scale * new for old, new in zip(structure.noise, step.noise, strict=True)])
         found = project(signals, replace(structure, sections=sections, noise=noise))
         if found is not None and found.deviance < fit.deviance:
             return found
@@ -354,7 +338,10 @@ def _join_neighbours(sections: Sequence[Section]) -> tuple[Section, ...]:
 def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3) -> Fit:
     """Return the fit after steps that each reduce the deviance by at least a given amount."""
     for _ in range(steps):
-        found = step(signals, fit)
+        step = _find_step(signals, fit)
+        if fit.deviance - step.deviance < min(least, _NEGLIGIBLE):
+            break
+        found = _take_step(signals, fit, step)
         if found is None:
             break
         gain, fit = fit.deviance - found.deviance, found

@@ -7,11 +7,10 @@ orders, where those of one polynomial do not.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-
-from islands.kernels.linear_filter import divide_rows
 
 Signal = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ BLOCK = 8192
 INTEGRATOR: Section = np.array([-1.0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Signals:
     """Scaled inputs and outputs of consecutive recordings.
 
@@ -52,7 +51,7 @@ class Signals:
         """Number of samples."""
         return int(self.y.shape[1])
 
-    @property
+    @cached_property
     def rest(self) -> NDArray[np.int64]:
         """Samples for which every input keeps the first value of a recording, at least, shape (inputs,)."""
         kept = [
@@ -65,16 +64,8 @@ class Signals:
     def keep(self, begin: int, end: int) -> "Signals":
         """Return the samples of an interval."""
         ends = np.clip(self.ends, begin, end) - begin
-        return Signals(self.u[:, begin:end], self.y[:, begin:end], np.unique(ends[ends > 0]))
-
-    def late(self, place: int, delay: int) -> Signal:
-        """Return an input a number of samples later; before a recording it has its first value."""
-        late = np.empty(self.samples)
-        for begin, end in self.bounds:
-            middle = min(begin + delay, end)
-            late[begin:middle] = self.u[place, begin]
-            late[middle:end] = self.u[place, begin : begin + end - middle]
-        return late
+        u, y = (np.ascontiguousarray(each[:, begin:end]) for each in (self.u, self.y))
+        return Signals(u, y, np.unique(ends[ends > 0]))
 
 
 def pair_poles(poles: Iterable[complex]) -> list[Section]:
@@ -97,34 +88,3 @@ def is_stable(section: Section) -> bool:
     """Return whether the poles of a section are inside of the unit circle."""
     last = section[-1] if section.size == 2 else 0.0
     return bool(abs(last) < 1.0 and abs(section[0]) < 1.0 + last)
-
-
-def divide(section: Section, rows: Signal, ends: NDArray[np.int64]) -> Signal:
-    """Return rows divided by a section, one sample late and, of two coefficients, the difference to the next.
-
-    Returns
-    -------
-    ndarray, shape (rows, coefficients, samples)
-        Values at sample k are ``v(k-1)`` and ``v(k-1) - v(k-2)``, from rest at the start of a recording.
-    """
-    divided = divide_rows(section, rows, ends)
-    found = np.zeros((len(rows), section.size, rows.shape[1]))
-    found[:, 0, 1:] = divided[:, :-1]
-    found[:, 0, _starts(ends)] = 0.0
-    if section.size == 2:
-        found[:, 1, 1:] = found[:, 0, 1:] - found[:, 0, :-1]
-        found[:, 1, _starts(ends)] = 0.0
-    return found
-
-
-def respond_freely(sections: Sequence[Section], length: int) -> Signal:
-    """Return the responses to initial states, shape (order, samples)."""
-    pulse = np.zeros((1, length + 1))
-    pulse[0, 0] = 1.0
-    ends = np.array([length + 1])
-    found = [divide(section, pulse, ends)[0, :, 1:] for section in sections]
-    return np.concatenate([np.zeros((0, length)), *found])
-
-
-def _starts(ends: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.concatenate([[0], ends[:-1]])

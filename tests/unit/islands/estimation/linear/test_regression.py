@@ -1,16 +1,8 @@
 import numpy as np
 import pytest
 
-from islands.estimation.linear.regression import (
-    Structure,
-    differentiate,
-    make_columns,
-    minimise,
-    move,
-    project,
-    triangulate,
-)
-from islands.estimation.linear.sections import Signals, respond_freely
+from islands.estimation.linear.regression import Structure, linearise, minimise, move, project
+from islands.estimation.linear.sections import Signals
 
 
 @pytest.fixture
@@ -29,27 +21,23 @@ def structure():
     return Structure(sections, 1, np.array([[2, 0]]), leads, (np.array([0.5]),))
 
 
-def simulate(signals, structure, fit):
-    y = fit.coefficients[0] @ make_columns(signals, structure, 0)
-    for (begin, end), start in zip(signals.bounds, fit.starts[0], strict=True):
-        y[begin:end] += start @ respond_freely(structure.parts, end - begin)
-    return y
+def whiten(signals, fit):
+    parts = [fit.residual[0, begin:end] for begin, end in fit.structure.find_intervals(signals)]
+    return np.concatenate([part[1:] - fit.structure.noise[0] * part[:-1] for part in parts])
 
 
-def test_sensitivities_are_derivatives_of_the_free_run(signals, structure):
+def test_squares_are_those_of_the_whitened_residual(signals, structure):
     fit = project(signals, structure)
-    for place, exact in enumerate(differentiate(signals, fit, 0)):
-        change = 1e-6 * np.eye(structure.free)[place]
-        sides = [
-            simulate(signals, Structure(move(structure.sections, sign * change), 1, *rest), fit)
-            for sign, rest in ((s, (structure.delays, structure.leads, structure.noise)) for s in (1.0, -1.0))
-        ]
-        np.testing.assert_allclose((sides[0] - sides[1]) / 2e-6, exact, atol=1e-6 * np.abs(exact).max())
+    error = whiten(signals, fit)
+    assert error @ error == pytest.approx(fit.squares[0])
+    assert error.size == fit.counts[0]
 
 
-def test_residual_is_the_output_less_the_free_run(signals, structure):
-    fit = project(signals, structure)
-    np.testing.assert_allclose(fit.residual[0], signals.y[0] - simulate(signals, structure, fit), atol=1e-10)
+def test_error_is_orthogonal_to_the_coefficients_of_the_best_fit(signals, structure):
+    (found,) = linearise(signals, project(signals, structure))
+    columns, count = found.factor, found.own - 1
+    moments = columns[:, :count].T @ columns[:, -1]
+    np.testing.assert_allclose(moments / np.linalg.norm(columns[:, :count], axis=0), 0.0, atol=1e-10)
 
 
 def test_outputs_that_read_inputs_before_a_recording_are_not_counted(signals, structure):
@@ -59,12 +47,6 @@ def test_outputs_that_read_inputs_before_a_recording_are_not_counted(signals, st
     assert (fit.residual[0, [0, 1, 140, 141]] == 0.0).all()
     signals.y[0, [0, 1, 140, 141]] = 1e3
     assert project(signals, structure).squares == pytest.approx(fit.squares)
-
-
-def test_blocks_have_the_products_of_all_samples():
-    rows = np.random.default_rng(2).normal(size=(3, 20_000))
-    factor = triangulate(rows, np.zeros(0))
-    np.testing.assert_allclose(factor.T @ factor, rows @ rows.T, atol=1e-8)
 
 
 def test_steps_never_raise_the_deviance_and_end_at_a_minimum(signals, structure):

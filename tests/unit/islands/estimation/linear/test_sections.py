@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from islands.estimation.linear.sections import Signals, find_poles, is_stable, pair_poles
+from islands.estimation.linear.sections import find_poles, is_stable, pair_poles
 
 
 @pytest.mark.parametrize("poles", [[], [0.5], [0.9, 0.9, -0.2], [0.5 + 0.5j, 0.5 - 0.5j, 0.1, 0.99, 0.3]])
@@ -16,9 +16,3 @@ def test_sections_are_stable_inside_of_the_unit_circle_only():
         assert is_stable(pair_poles([one, -other])[0]) == (max(one, other) < 1.0)
         pole = one * np.exp(1j * other)
         assert is_stable(pair_poles([pole, pole.conjugate()])[0]) == (one < 1.0)
-
-
-def test_late_input_has_its_first_value_before_a_recording():
-    signals = Signals(np.array([[1.0, 2.0, 3.0, 7.0, 8.0]]), np.zeros((1, 5)), np.array([3, 5]))
-    assert signals.late(0, 1).tolist() == [1.0, 1.0, 2.0, 7.0, 7.0]
-    assert signals.late(0, 9).tolist() == [1.0, 1.0, 1.0, 7.0, 7.0]

@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from islands.kernels.parallel_sections import BLOCK, factor_sections, solve_rows
+
+SECTIONS = np.array([[-1.5, 0.8], [-0.9, 0.0], [-1.0, 0.0]])  # the last one is an integrator
+SIZES = np.array([2, 1, 1])
+ENDS = np.array([BLOCK + 17, 3 * BLOCK])
+DELAYS, LEADS = np.array([2, 0]), np.array([True, False])
+NOISE = np.array([0.5, -0.2])
+
+
+@pytest.fixture
+def record():
+    random = np.random.default_rng(1)
+    return random.normal(size=(2, ENDS[-1])), random.normal(size=ENDS[-1])
+
+
+def respond(section, size, x):
+    """Return the quotient one sample before and the difference to the one before, by another filter."""
+    late = lfilter([0.0, 1.0], [1.0, *section], x)
+    return [late, np.diff(late, prepend=0.0)][:size]
+
+
+def make_columns(u, sections, skipped, begin, end):
+    """Return the responses to initial states and the columns of the coefficients of one recording."""
+    samples = end - begin - skipped
+    pulse = np.eye(1, samples + 1)[0]
+    free = [c[1:] for each in zip(sections, SIZES, strict=True) for c in respond(*each, pulse)]
+    columns = []
+    for place, delay in enumerate(DELAYS):
+        late = u[place, np.maximum(np.arange(begin, end) - delay, begin)]
+        columns += [c for each in zip(sections, SIZES, strict=True) for c in respond(*each, late)]
+        columns += [late] if LEADS[place] else []
+    columns.append(np.arange(end - begin) / u.shape[1])
+    return np.array(free), np.array(columns)[:, skipped:]
+
+
+def factor(u, y, skipped, coefficients, starts, derivatives):
+    size = coefficients.size + derivatives * (NOISE.size + 3) + 1
+    residual, found = np.zeros(y.size), np.zeros((size, size))
+    own = np.zeros((2, 4, 4 + size))
+    factor_sections(
+        u, y, ENDS, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE, coefficients, starts, derivatives,
+        residual, found, own,
+    )  # fmt: skip
+    return residual, found, own
+
+
+def whiten(rows):
+    return lfilter(np.r_[1.0, -NOISE], [1.0], rows)[..., NOISE.size :]
+
+
+@pytest.mark.parametrize("skipped", [0, 2])
+def test_factor_has_the_products_of_whitened_derivatives_without_the_initial_states(record, skipped):
+    u, y = record
+    random = np.random.default_rng(2)
+    coefficients, starts = random.normal(size=10), random.normal(size=(2, 4))
+    residual, found, _ = factor(u, y, skipped, coefficients, starts, True)
+    products = np.zeros_like(found)
+    for begin, end, start in zip([0, ENDS[0]], ENDS, starts, strict=True):
+
+        def err(sections, begin=begin, end=end, start=start):
+            free, columns = make_columns(u, sections, skipped, begin, end)
+            return y[begin + skipped : end] - coefficients @ columns - start @ free
+
+        error = err(SECTIONS)
+        np.testing.assert_allclose(residual[begin + skipped : end], error, atol=1e-9)
+        free, columns = make_columns(u, SECTIONS, skipped, begin, end)
+        poles = []
+        # The coordinates of two coefficients are a1 + a2 and -a2.
+        for row, change in ((0, [1.0, 0.0]), (0, [1.0, -1.0]), (1, [1.0, 0.0])):
+            step = np.zeros_like(SECTIONS)
+            step[row] = 1e-6 * np.array(change)
+            poles.append((err(SECTIONS - step) - err(SECTIONS + step)) / 2e-6)
+        size, samples = NOISE.size, error.size
+        lagged = [error[size - lag : samples - lag] for lag in (1, 2)]
+        rows = np.vstack([whiten(columns), *lagged, whiten(np.array(poles)), whiten(error)])
+        basis = np.linalg.qr(whiten(free).T)[0]
+        rows -= (rows @ basis) @ basis.T
+        products += rows @ rows.T
+    units = np.sqrt(np.diag(products))
+    np.testing.assert_allclose(
+        found.T @ found / np.outer(units, units), products / np.outer(units, units), atol=1e-6
+    )
+
+
+def test_rows_of_initial_states_have_the_states_of_a_recording(record):
+    u, _ = record
+    random = np.random.default_rng(3)
+    coefficients, starts = random.normal(size=10), random.normal(size=(2, 4))
+    y = -factor(u, np.zeros(u.shape[1]), 0, coefficients, starts, False)[0]
+    _, found, own = factor(u, y, 0, np.zeros(10), np.zeros((2, 4)), False)
+    np.testing.assert_allclose(np.linalg.solve(found[:10, :10], found[:10, 10]), coefficients, 1e-6)
+    for rows, start in zip(own, starts, strict=True):
+        moment = rows[:, -1] - rows[:, 4:-1] @ coefficients
+        np.testing.assert_allclose(np.linalg.solve(rows[:, :4], moment), start, 1e-6)
+
+
+def test_equations_are_solved_with_the_least_squares():
+    random = np.random.default_rng(4)
+    a, b = random.normal(size=(9, 4)), random.normal(size=9)
+    solution = np.empty(4)
+    left = solve_rows(np.column_stack([a, b]), np.linalg.norm(a, axis=0), 1e-10, solution)
+    exact, squares, *_ = np.linalg.lstsq(a, b)
+    np.testing.assert_allclose(solution, exact)
+    assert left == pytest.approx(squares[0])
+
+
+def test_column_that_depends_on_those_before_has_the_value_zero():
+    random = np.random.default_rng(5)
+    a, b = random.normal(size=(9, 4)), random.normal(size=9)
+    a[:, 2] = a[:, 0] - 3.0 * a[:, 1]
+    solution = np.empty(4)
+    left = solve_rows(np.column_stack([a, b]), np.linalg.norm(a, axis=0), 1e-10, solution)
+    exact, squares, *_ = np.linalg.lstsq(a[:, [0, 1, 3]], b)
+    np.testing.assert_allclose(solution, np.insert(exact, 2, 0.0))
+    assert left == pytest.approx(squares[0])
