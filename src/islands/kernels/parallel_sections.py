@@ -39,72 +39,83 @@ def factor_sections(
     integrators,  # 1 if the last section is an integrator, whose constant is a ramp; else 0
     delays,  # int64 [input]: samples
     leads,  # bool [input]: the input itself is a response as well
-    noise,  # float64 [order of the noise]: the autoregression
+    noise,  # float64 [1 or 2, state]: autoregression of the noise, and its moving average if it has one
+    prior,  # float64 [state, state]: equations, with the right-hand side 0, of the noise before a recording
     coefficients,  # float64 [coefficient]: of every input the sections and the lead; the constant
-    starts,  # float64 [recording, state]: initial states
+    starts,  # float64 [recording, state]: initial states of the noise and of the sections
     derivatives,  # whether the columns of the noise and of the poles follow those of the coefficients
     residual,  # out, float64 [sample] or empty: the output less the free run
     factor,  # out, float64 [column, column] or empty: columns of the coefficients and so on; the residual
     own,  # out, float64 [recording, state, state + column]: the rows of the initial states
 ):
     """Compute the factor of all recordings, and the rows of the initial states of each one."""
-    inputs, order, count = u.shape[0], own.shape[1], coefficients.size
-    free = sections.shape[0] - integrators
-    target = order + count
-    if derivatives:
-        target += noise.size + sizes[:free].sum()
-    columns = target + 1
-    history = noise.size + 1  # a difference needs one sample more
+    inputs, number, history, order = u.shape[0], sections.shape[0], noise.shape[1], starts.shape[1]
+    free, after = number - integrators, order + coefficients.size
+    columns = after + (noise.size + sizes[:free].sum() if derivatives else 0) + 1
+    places, quotients = _place_filters(
+        sections, sizes, integrators, leads, history, after, derivatives, noise.size
+    )
+    last = places.shape[0] - (free if derivatives else 0)
+    states = np.empty((places.shape[0], 2))
     # The second response of a first-order section is in a row that nothing reads.
-    x = np.zeros((columns + 1, history + BLOCK))
+    x = np.empty((columns + 1, history + BLOCK))
     sources = np.zeros((inputs + 2 + free, BLOCK))
-    sources[inputs + 1] = 1.0
-    places, quotients = _place_filters(sections, sizes, integrators, inputs, leads, order, count, derivatives,
-                                       noise.size, columns)  # fmt: skip
-    first_derived = places.shape[0] - free if derivatives else places.shape[0]
-    states = np.zeros((places.shape[0], 2))
-    stride = BLOCK
-    w = padded_size((columns + 4) * stride)
-    w[:] = 0.0
-    triangle = np.zeros((columns, columns + 4))
+    # After the columns: the responses of the noise to a pulse, to the residual and to the error.
+    whitened = np.empty((columns + 3, history + BLOCK))
+    w = padded_size((columns + 3) * BLOCK)
+    w[columns * BLOCK :] = 0.0
+    triangle = np.zeros((columns, columns + 3))
     begin = 0
     for recording in range(ends.size):
         end, counted = ends[recording], min(begin + skipped, ends[recording])
-        x[:] = 0.0
         states[:] = 0.0
         triangle[:order] = 0.0
+        triangle[:history, :history] = prior
         at = begin
         while at < end:
             if at == counted:
-                for f in range(inputs * sections.shape[0], inputs * sections.shape[0] + sections.shape[0]):
-                    states[f, 0] = 1.0
+                states[inputs * number : (inputs + 1) * number, 0] = 1.0
+                x[:, :history] = 0.0
+                whitened[:, :history] = 0.0
             rows = min(BLOCK, (counted if at < counted else end) - at)
             for place in range(inputs):
                 for k in range(rows):
                     sources[place, k] = u[place, max(at + k - delays[place], begin)]
-            _divide(places, quotients, states, sources, x, history, rows, 0, first_derived)
+            sources[inputs + 1] = 1.0
+            _divide(places, quotients, states, sources, x, history, rows, 0, last)
+            x[columns - 1, history : history + rows] = y[at : at + rows]
             _run_freely(
-                sources, x, y, at, rows, history, sizes, integrators, leads, coefficients, starts[recording],
-                target, inputs, y.size,
-            )  # fmt: skip
-            if derivatives:
-                _divide(places, quotients, states, sources, x, history, rows, first_derived, places.shape[0])
-            if residual.size and at >= counted:
-                residual[at : at + rows] = x[target, history : history + rows]
-            if factor.size and at >= counted:
-                _whiten(
-                    x,
-                    noise,
-                    order + count if derivatives else -1,
-                    rows,
-                    counted + noise.size - at,
-                    w,
-                    columns,
-                )
-                _reflect(w, -(-rows // VECTOR) * VECTOR, columns, triangle)
-            for row in range(columns):
+                sources,
+                x,
+                rows,
+                history,
+                sizes,
+                integrators,
+                leads,
+                coefficients,
+                starts[recording],
+                columns - 1,
+                y.size,
+            )
+            _divide(places, quotients, states, sources, x, history, rows, last, places.shape[0])
+            if at >= counted:
+                if residual.size:
+                    residual[at : at + rows] = x[columns - 1, history : history + rows]
+                if factor.size:
+                    _whiten(
+                        x,
+                        noise,
+                        starts[recording],
+                        after if derivatives else columns,
+                        rows,
+                        at == counted,
+                        whitened,
+                    )
+                    _fill(whitened, history, after, noise.size if derivatives else 0, columns, rows, w)
+                    _reflect(w, -(-rows // VECTOR) * VECTOR, columns, triangle)
                 for k in range(history):
-                    x[row, k] = x[row, rows + k]
+                    x[:, k] = x[:, rows + k]
+                    whitened[:, k] = whitened[:, rows + k]
             at += rows
         if factor.size:
             own[recording] = triangle[:order, :columns]
@@ -114,33 +125,33 @@ def factor_sections(
 
 
 @kernel
-def _place_filters(sections, sizes, integrators, inputs, leads, order, count, derivatives, noises, columns):
-    """Return the source and the rows of every filter, and its coefficients."""
-    number, free = sections.shape[0], sections.shape[0] - integrators
+def _place_filters(sections, sizes, integrators, leads, history, after, derivatives, noises):
+    """Return the source and the two rows of every filter, and its coefficients."""
+    inputs, number, free = leads.size, sections.shape[0], sections.shape[0] - integrators
     filters = number * (inputs + 1) + integrators + (free if derivatives else 0)
-    places, quotients = np.empty((filters, 3), np.int64), np.empty((filters, 2))
-    row, f = order, 0
-    for place in range(inputs + 1):  # the initial states follow the inputs
-        at = row if place < inputs else 0
-        for section in range(number):
-            places[f, 0], places[f, 1] = place, at
-            places[f, 2] = at + 1 if sizes[section] == 2 else columns
+    places, quotients = np.zeros((filters, 3), np.int64), np.empty((filters, 2))
+    row, f, unread = history + sizes.sum(), 0, after + 1
+    if derivatives:
+        unread += noises + sizes[:free].sum()
+    for place in range(inputs + 2):  # the inputs, the initial states, and the derivatives
+        at = row
+        if place == inputs:
+            at = history
+            constant = row
+        elif place == inputs + 1:
+            at = after + noises
+        for section in range(number if place <= inputs else free if derivatives else 0):
+            places[f, 0] = place if place <= inputs else inputs + 2 + section
+            places[f, 1] = at
+            places[f, 2] = at + 1 if sizes[section] == 2 else unread
             quotients[f] = sections[section]
             at += sizes[section]
             f += 1
         if place < inputs:
             row = at + leads[place]
-    if integrators:
-        places[f, 0], places[f, 1], places[f, 2] = inputs + 1, row, columns
-        quotients[f] = sections[number - 1]
-        f += 1
-    if derivatives:
-        row = order + count + noises
-        for section in range(free):
-            places[f, 0], places[f, 1] = inputs + 2 + section, row
-            places[f, 2] = row + 1 if sizes[section] == 2 else columns
-            quotients[f] = sections[section]
-            row += sizes[section]
+        if place == inputs and integrators:
+            places[f, 0], places[f, 1], places[f, 2] = inputs + 1, constant, unread
+            quotients[f] = sections[number - 1]
             f += 1
     return places, quotients
 
@@ -153,6 +164,7 @@ def _divide(places, quotients, states, sources, x, history, rows, first, last):
         f1, f2, f3 = min(f + 1, last - 1), min(f + 2, last - 1), min(f + 3, last - 1)
         s0, s1, s2, s3 = places[f, 0], places[f1, 0], places[f2, 0], places[f3, 0]
         i0, i1, i2, i3 = places[f, 1], places[f1, 1], places[f2, 1], places[f3, 1]
+        j0, j1, j2, j3 = places[f, 2], places[f1, 2], places[f2, 2], places[f3, 2]
         a0, a1, a2, a3 = quotients[f, 0], quotients[f1, 0], quotients[f2, 0], quotients[f3, 0]
         b0, b1, b2, b3 = quotients[f, 1], quotients[f1, 1], quotients[f2, 1], quotients[f3, 1]
         v0, v1, v2, v3 = states[f, 0], states[f1, 0], states[f2, 0], states[f3, 0]
@@ -160,6 +172,7 @@ def _divide(places, quotients, states, sources, x, history, rows, first, last):
         for k in range(rows):
             at = history + k
             x[i0, at], x[i1, at], x[i2, at], x[i3, at] = v0, v1, v2, v3
+            x[j0, at], x[j1, at], x[j2, at], x[j3, at] = v0 - z0, v1 - z1, v2 - z2, v3 - z3
             v0, z0 = sources[s0, k] - b0 * z0 - a0 * v0, v0
             v1, z1 = sources[s1, k] - b1 * z1 - a1 * v1, v1
             v2, z2 = sources[s2, k] - b2 * z2 - a2 * v2, v2
@@ -168,69 +181,110 @@ def _divide(places, quotients, states, sources, x, history, rows, first, last):
         states[f1, 0], states[f1, 1] = v1, z1
         states[f2, 0], states[f2, 1] = v2, z2
         states[f3, 0], states[f3, 1] = v3, z3
-        for g in range(f, min(f + 4, last)):
+        for g in range(f, f3 + 1):
             if abs(states[g, 0]) < _LEAST and abs(states[g, 1]) < _LEAST:
                 states[g] = 0.0
-            one, other = places[g, 1], places[g, 2]
-            for k in range(history, history + rows):
-                x[other, k] = x[one, k] - x[one, k - 1]
 
 
 @kernel
-def _run_freely(
-    sources, x, y, at, rows, history, sizes, integrators, leads, coefficients, start, target, inputs, samples
-):  # fmt: skip
-    """Compute a block of the part of every section and of the residual."""
-    first, last = history, history + rows
-    free, order = sizes.size - integrators, start.size
+def _run_freely(sources, x, rows, history, sizes, integrators, leads, coefficients, start, target, samples):
+    """Subtract the free run from a block of the output; write minus the part of every section."""
+    first, inputs, free, order = history, leads.size, sizes.size - integrators, start.size
     parts = sources[inputs + 2 :]
-    for k in range(rows):
-        x[target, first + k] = y[at + k]
     parts[:] = 0.0
     row = order
-    for place in range(inputs + 1):
-        state = 0
+    for place in range(inputs + 1):  # the inputs, and the initial states
+        source = row if place < inputs else history
         for section in range(sizes.size):
             for _ in range(sizes[section]):
-                weight = start[state] if place == inputs else coefficients[row - order]
-                source = state if place == inputs else row
-                state += 1
-                row += place < inputs
+                weight = coefficients[source - order] if place < inputs else start[source]
                 if weight != 0.0:
                     for k in range(rows):
                         x[target, first + k] -= weight * x[source, first + k]
-                    if section < free:  # the derivative with respect to a denominator is negative
+                    if section < free:
                         for k in range(rows):
                             parts[section, k] -= weight * x[source, first + k]
-        if place < inputs and leads[place]:
-            for k in range(rows):
-                x[row, first + k] = sources[place, k]
-                x[target, first + k] -= coefficients[row - order] * sources[place, k]
-            row += 1
-    for k in range(first, last):
+                source += 1
+        if place < inputs:
+            row = source
+            if leads[place]:
+                for k in range(rows):
+                    x[row, first + k] = sources[place, k]
+                    x[target, first + k] -= coefficients[row - order] * sources[place, k]
+                row += 1
+    for k in range(first, first + rows):
         x[row, k] = x[row, k] / samples if integrators else 1.0
         x[target, k] -= coefficients[row - order] * x[row, k]
 
 
 @kernel
-def _whiten(x, noise, derived, rows, first, w, columns):
-    """Filter a block by the inverse of the noise; rows before ``first`` are zero."""
-    history, target = noise.size + 1, columns - 1
-    for row in range(columns):
-        at = row * BLOCK
-        lag = row - derived
-        if derived >= 0 and 0 <= lag < noise.size:
-            for k in range(rows):
-                w[at + k] = x[target, history + k - lag - 1]
-        else:
-            for k in range(rows):
-                w[at + k] = x[row, history + k]
-            for before in range(noise.size):
-                coefficient, behind = noise[before], history - before - 1
-                for k in range(rows):
-                    w[at + k] -= coefficient * x[row, behind + k]
-        for k in range(min(first, rows)):
-            w[at + k] = 0.0
+def _whiten(x, noise, start, derived, rows, begins, whitened):
+    """Filter a block by the inverse of the noise, and a pulse, the residual and the error by the moving average."""
+    history, columns = noise.shape[1], x.shape[0] - 1
+    target, pulse = columns - 1, columns
+    last = history + rows
+    for row in range(history, columns):
+        if derived <= row < derived + noise.size:
+            continue
+        for k in range(history, last):
+            whitened[row, k] = x[row, k]
+        for lag in range(1, history + 1):
+            coefficient = noise[0, lag - 1]
+            for k in range(history, last):
+                whitened[row, k] -= coefficient * x[row, k - lag]
+    if history == 0:
+        return
+    for k in range(history, last):
+        whitened[pulse, k] = 0.0
+        whitened[pulse + 1, k] = x[target, k]
+    if begins:
+        whitened[pulse, history] = 1.0
+    if noise.shape[0] == 2:
+        _divide_by_average(noise[1], whitened, history, rows, history, pulse + 2)
+    for k in range(history, last):
+        whitened[pulse + 2, k] = whitened[target, k]
+    for lag in range(history):
+        for k in range(history, last):
+            whitened[pulse + 2, k] -= start[lag] * whitened[pulse, k - lag]
+    if noise.shape[0] == 2:
+        _divide_by_average(noise[1], whitened, history, rows, pulse + 2, pulse + 3)
+
+
+@kernel
+def _divide_by_average(average, whitened, history, rows, first, last):
+    """Divide rows by ``1 + c1 q^-1 + c2 q^-2 + ...`` in place."""
+    for r0 in range(first, last, 4):
+        # A row that is divided twice at the same time has the same values.
+        r1, r2, r3 = min(r0 + 1, last - 1), min(r0 + 2, last - 1), min(r0 + 3, last - 1)
+        for k in range(history, history + rows):
+            y0, y1, y2, y3 = whitened[r0, k], whitened[r1, k], whitened[r2, k], whitened[r3, k]
+            for lag in range(average.size, 0, -1):
+                c = average[lag - 1]
+                y0 -= c * whitened[r0, k - lag]
+                y1 -= c * whitened[r1, k - lag]
+                y2 -= c * whitened[r2, k - lag]
+                y3 -= c * whitened[r3, k - lag]
+            whitened[r0, k], whitened[r1, k], whitened[r2, k], whitened[r3, k] = y0, y1, y2, y3
+        for r in range(r0, r3 + 1):
+            least = 0.0
+            for k in range(rows, rows + history):
+                least = max(least, abs(whitened[r, k]))
+            if least < _LEAST:
+                whitened[r, rows : rows + history] = 0.0
+
+
+@kernel
+def _fill(whitened, history, derived, noises, columns, rows, w):
+    """Copy a block of all columns, those of the noise from the lags of three rows."""
+    for column in range(columns):
+        row, lag = column, 0
+        if column < history:
+            row, lag = columns, column
+        elif derived <= column < derived + noises:
+            row, lag = columns + 1 + (column - derived) // history, (column - derived) % history + 1
+        at, first = column * BLOCK, history - lag
+        for k in range(rows):
+            w[at + k] = whitened[row, first + k]
         for k in range(rows, -(-rows // VECTOR) * VECTOR):
             w[at + k] = 0.0
 

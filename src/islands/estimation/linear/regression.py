@@ -116,8 +116,9 @@ class Fit:
     coefficients : tuple of ndarray
         Coefficients of every output: of every input those of the sections and, if it leads, of the direct
         term; last the constant.
-    starts : tuple of ndarray
-        States of every output at the first sample that is counted, shape (recordings, order).
+    states : tuple of ndarray
+        States of the noise and of the sections of every output at the first sample that is counted, shape
+        (recordings, states).
     squares : ndarray, shape (outputs,)
         Sum of squares of the whitened error.
     counts : ndarray, shape (outputs,)
@@ -129,7 +130,7 @@ class Fit:
     signals: Signals
     structure: Structure
     coefficients: tuple[Signal, ...]
-    starts: tuple[Signal, ...]
+    states: tuple[Signal, ...]
     squares: Signal
     counts: Signal
     skipped: int
@@ -138,11 +139,15 @@ class Fit:
     def residual(self) -> Signal:
         """Error of the free run, shape (outputs, samples); zero where it is not counted."""
         residual, nothing = np.zeros(self.signals.y.shape), np.empty((0, 0))
-        for output, (coefficients, starts) in enumerate(zip(self.coefficients, self.starts, strict=True)):
-            own = np.empty((*starts.shape, starts.shape[1]))
-            rest = coefficients, starts, False, residual[output], nothing, own
+        for output, (coefficients, states) in enumerate(zip(self.coefficients, self.states, strict=True)):
+            rest = coefficients, states, False, residual[output], nothing, np.empty((0, 0, 0))
             _run(self.signals, self.structure, output, *rest)
         return residual
+
+    @property
+    def starts(self) -> tuple[Signal, ...]:
+        """States of the sections of every output at the first counted sample, shape (recordings, order)."""
+        return tuple([states[:, states.shape[1] - self.structure.order :] for states in self.states])
 
     @cached_property
     def deviance(self) -> float:
@@ -169,19 +174,21 @@ class Fit:
 def project(signals: Signals, structure: Structure) -> Fit | None:
     """Return the fit with the best numerators; None if it is not finite."""
     skipped, recordings = structure.count_skipped(signals), signals.ends.size
-    coefficients, starts = [], []
+    coefficients, states = [], []
     squares, counts = np.empty(len(structure.noise)), np.empty(len(structure.noise))
     for output, noise in enumerate(structure.noise):
-        zero = np.zeros(structure.count_coefficients(output)), np.zeros((recordings, structure.order))
-        factor, own = _factor(signals, structure, output, *zero)
+        zero = np.zeros(structure.count_coefficients(output))
+        factor, own = _factor(
+            signals, structure, output, zero, np.zeros((recordings, noise.size + structure.order))
+        )
         found = solve(factor[:, :-1], factor[:, -1], _measure_columns(factor, own)[:-1])
         squares[output] = found.squares
         coefficients.append(found.values)
-        starts.append(np.array([_solve_start(rows, found.values) for rows in own]))
+        states.append(np.array([_solve_states(rows, found.values) for rows in own]))
         counts[output] = signals.samples - (skipped + noise.size) * recordings
     if not np.isfinite(squares).all():
         return None
-    return Fit(signals, structure, tuple(coefficients), tuple(starts), squares, counts, skipped)
+    return Fit(signals, structure, tuple(coefficients), tuple(states), squares, counts, skipped)
 
 
 def _factor(
@@ -189,7 +196,7 @@ def _factor(
     structure: Structure,
     output: int,
     coefficients: Signal,
-    starts: Signal,
+    states: Signal,
     derivatives: bool = False,
 ) -> tuple[Signal, Signal]:
     """Return the factor of an output, and of every recording the rows of its initial states.
@@ -199,13 +206,14 @@ def _factor(
     """
     noise = structure.noise[output]
     size = coefficients.size + (noise.size + structure.free if derivatives else 0) + 1
-    factor, own = np.empty((size, size)), np.empty((*starts.shape, starts.shape[1] + size))
-    _run(signals, structure, output, coefficients, starts, derivatives, np.empty(0), factor, own)
+    factor, own = np.empty((size, size)), np.empty((*states.shape, states.shape[1] + size))
+    _run(signals, structure, output, coefficients, states, derivatives, np.empty(0), factor, own)
     return factor, own
 
 
 def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> None:
     """Call the kernel for an output."""
+    noise = structure.noise[output]
     factor_sections(
         signals.u,
         signals.y[output],
@@ -215,7 +223,8 @@ def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> Non
         structure.integrators,
         structure.delays[output],
         structure.leads[output],
-        structure.noise[output],
+        noise[None],
+        np.zeros((noise.size, noise.size)),
         *rest,
     )
 
@@ -227,7 +236,7 @@ def _measure_columns(factor: Signal, own: Signal) -> Signal:
     return norms
 
 
-def _solve_start(rows: Signal, coefficients: Signal) -> Signal:
+def _solve_states(rows: Signal, coefficients: Signal) -> Signal:
     """Return the initial states of a recording."""
     order = len(rows)
     moment = rows[:, -1] - rows[:, order : order + coefficients.size] @ coefficients
@@ -270,10 +279,10 @@ def linearise(signals: Signals, fit: Fit) -> list[OutputFactor]:
     """Return the factors of every output at a fit."""
     return [
         OutputFactor(
-            _factor(signals, fit.structure, output, coefficients, starts, derivatives=True)[0],
+            _factor(signals, fit.structure, output, coefficients, states, derivatives=True)[0],
             coefficients.size + fit.structure.noise[output].size,
         )
-        for output, (coefficients, starts) in enumerate(zip(fit.coefficients, fit.starts, strict=True))
+        for output, (coefficients, states) in enumerate(zip(fit.coefficients, fit.states, strict=True))
     ]
 
 

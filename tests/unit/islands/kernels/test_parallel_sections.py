@@ -8,7 +8,8 @@ SECTIONS = np.array([[-1.5, 0.8], [-0.9, 0.0], [-1.0, 0.0]])  # the last one is 
 SIZES = np.array([2, 1, 1])
 ENDS = np.array([BLOCK + 17, 3 * BLOCK])
 DELAYS, LEADS = np.array([2, 0]), np.array([True, False])
-NOISE = np.array([0.5, -0.2])
+NOISE = np.array([[0.5, -0.2], [0.6, 0.1]])
+PRIOR = np.array([[1.0, 0.3], [0.0, 2.0]])
 
 
 @pytest.fixture
@@ -37,65 +38,80 @@ def make_columns(u, sections, skipped, begin, end):
     return np.array(free), np.array(columns)[:, skipped:]
 
 
-def factor(u, y, skipped, coefficients, starts, derivatives):
+def factor(u, y, skipped, coefficients, starts, derivatives=False):
     size = coefficients.size + derivatives * (NOISE.size + 3) + 1
     residual, found = np.zeros(y.size), np.zeros((size, size))
-    own = np.zeros((2, 4, 4 + size))
+    own = np.zeros((2, 6, 6 + size))
     factor_sections(
-        u, y, ENDS, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE, coefficients, starts, derivatives,
-        residual, found, own,
-    )  # fmt: skip
+        *(u, y, ENDS, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE, PRIOR),
+        *(coefficients, starts, derivatives, residual, found, own),
+    )
     return residual, found, own
 
 
-def whiten(rows):
-    return lfilter(np.r_[1.0, -NOISE], [1.0], rows)[..., NOISE.size :]
+def whiten(rows, noise=NOISE):
+    return lfilter(np.r_[1.0, -noise[0]], np.r_[1.0, noise[1]], rows)
+
+
+def make_rows(error, free, columns, poles, past):
+    """Return equations as columns: the initial states, the columns, the derivatives, and the error."""
+    pulses = lfilter([1.0], np.r_[1.0, NOISE[1]], np.eye(2, error.size))
+
+    def find_innovations(noise):
+        """Return the white noise for given states of the noise before the recording."""
+        return whiten(error, noise) - lfilter([1.0], np.r_[1.0, noise[1]], past @ np.eye(2, error.size))
+
+    noises = []
+    for place in np.ndindex(NOISE.shape):
+        change = np.zeros_like(NOISE)
+        change[place] = 1e-6
+        noises.append((find_innovations(NOISE - change) - find_innovations(NOISE + change)) / 2e-6)
+    rows = np.vstack([pulses, whiten(free), whiten(columns), noises, whiten(poles), whiten(error)])
+    before = np.zeros((len(rows), 2))
+    before[:2] = PRIOR.T
+    return np.hstack([before, rows])
 
 
 @pytest.mark.parametrize("skipped", [0, 2])
 def test_factor_has_the_products_of_whitened_derivatives_without_the_initial_states(record, skipped):
     u, y = record
     random = np.random.default_rng(2)
-    coefficients, starts = random.normal(size=10), random.normal(size=(2, 4))
+    coefficients, starts = random.normal(size=10), random.normal(size=(2, 6))
     residual, found, _ = factor(u, y, skipped, coefficients, starts, True)
     products = np.zeros_like(found)
     for begin, end, start in zip([0, ENDS[0]], ENDS, starts, strict=True):
 
-        def err(sections, begin=begin, end=end, start=start):
+        def find_error(sections, begin=begin, end=end, start=start):
             free, columns = make_columns(u, sections, skipped, begin, end)
-            return y[begin + skipped : end] - coefficients @ columns - start @ free
+            return y[begin + skipped : end] - coefficients @ columns - start[2:] @ free
 
-        error = err(SECTIONS)
+        error = find_error(SECTIONS)
         np.testing.assert_allclose(residual[begin + skipped : end], error, atol=1e-9)
-        free, columns = make_columns(u, SECTIONS, skipped, begin, end)
         poles = []
         # The coordinates of two coefficients are a1 + a2 and -a2.
         for row, change in ((0, [1.0, 0.0]), (0, [1.0, -1.0]), (1, [1.0, 0.0])):
             step = np.zeros_like(SECTIONS)
             step[row] = 1e-6 * np.array(change)
-            poles.append((err(SECTIONS - step) - err(SECTIONS + step)) / 2e-6)
-        size, samples = NOISE.size, error.size
-        lagged = [error[size - lag : samples - lag] for lag in (1, 2)]
-        rows = np.vstack([whiten(columns), *lagged, whiten(np.array(poles)), whiten(error)])
-        basis = np.linalg.qr(whiten(free).T)[0]
-        rows -= (rows @ basis) @ basis.T
+            poles.append((find_error(SECTIONS - step) - find_error(SECTIONS + step)) / 2e-6)
+        rows = make_rows(error, *make_columns(u, SECTIONS, skipped, begin, end), np.array(poles), start[:2])
+        basis = np.linalg.qr(rows[:6].T)[0]
+        rows = rows[6:] - (rows[6:] @ basis) @ basis.T
         products += rows @ rows.T
-    units = np.sqrt(np.diag(products))
-    np.testing.assert_allclose(
-        found.T @ found / np.outer(units, units), products / np.outer(units, units), atol=1e-6
-    )
+    units = np.sqrt(np.outer(np.diag(products), np.diag(products)))
+    np.testing.assert_allclose(found.T @ found / units, products / units, atol=1e-6)
 
 
 def test_rows_of_initial_states_have_the_states_of_a_recording(record):
     u, _ = record
     random = np.random.default_rng(3)
-    coefficients, starts = random.normal(size=10), random.normal(size=(2, 4))
-    y = -factor(u, np.zeros(u.shape[1]), 0, coefficients, starts, False)[0]
-    _, found, own = factor(u, y, 0, np.zeros(10), np.zeros((2, 4)), False)
+    coefficients, starts = random.normal(size=10), random.normal(size=(2, 6))
+    starts[:, :2] = 0.0
+    y = -factor(u, np.zeros(u.shape[1]), 0, coefficients, starts)[0]
+    _, found, own = factor(u, y, 0, np.zeros(10), np.zeros((2, 6)))
     np.testing.assert_allclose(np.linalg.solve(found[:10, :10], found[:10, 10]), coefficients, 1e-6)
     for rows, start in zip(own, starts, strict=True):
-        moment = rows[:, -1] - rows[:, 4:-1] @ coefficients
-        np.testing.assert_allclose(np.linalg.solve(rows[:, :4], moment), start, 1e-6)
+        moment = rows[:, -1] - rows[:, 6:-1] @ coefficients
+        np.testing.assert_allclose(np.linalg.solve(rows[:, :6], moment), start, 1e-6, atol=1e-7)
 
 
 def test_equations_are_solved_with_the_least_squares():
