@@ -10,7 +10,7 @@ representation: Schoukens and Toth, Automatica 113 (2020) 108731).
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import isfinite, nan, prod
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar
@@ -309,6 +309,10 @@ class LatentModel(ParametricModel):
 
     def block(self) -> Block:
         """Return the difference equations; the inputs are those of the operating point before a start."""
+        return _make_block(self)
+
+    def make_block(self) -> Block:
+        """Return a new block; `block` returns that of recent models again, since many states take long."""
         found = super().block()
         levels = zip(found.signals[found.computed :], self.operating_inputs, strict=True)
         return replace(found, levels=dict(levels))
@@ -470,6 +474,11 @@ class LatentModel(ParametricModel):
             "limits": SensorLimits(*(None if each is None else float(each) for each in limits)),
             "wiring": tuple(str(entry["name"]) for entry in document["parameters"]),
         }
+
+
+@lru_cache(maxsize=16)
+def _make_block(model: LatentModel) -> Block:
+    return model.make_block()
 
 
 def find_direct(names: Iterable[str]) -> set[int]:

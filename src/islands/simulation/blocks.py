@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -269,6 +270,8 @@ def _make_groups(runs: Sequence[tuple[int, int]]) -> Iterator[Sequence[tuple[int
         yield runs[begin : begin + lanes]
 
 
+# A result simulates one model many times, and a block of many states takes seconds.
+@lru_cache(maxsize=16)
 def _link(block: Block) -> tuple[Program, list[int | None]]:
     """Return the program of all terms, and the place of the parameter that multiplies each term."""
     names = list(block.parameters)
