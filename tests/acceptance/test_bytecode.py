@@ -42,7 +42,7 @@ def test_commands_compile_almost_no_module_after_the_set_up(tmp_path):
 
     run(ROOT / "deploy/packages/compile_modules.py")
     for command in (
-        ("examples",),
+        ("examples", "."),
         ("fit", "motor.csv", "--input", "drive_V", "--output", "speed_rad_s", "--out", "motor"),
         ("simulate", "motor", "motor.csv"),
         ("show", "motor"),
