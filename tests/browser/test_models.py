@@ -3,8 +3,10 @@
 import io
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -137,3 +139,31 @@ def test_a_figure_is_saved_as_svg_png_and_csv(
     assert picture.width == 2100  # 7 inches at 300 per inch
     assert picture.getpixel((2, 2)) == (255, 255, 255)
     assert picture.getcolors(maxcolors=1) is None
+
+
+@pytest.mark.ci
+def test_the_linear_system_of_a_model_is_shown_about_any_operating_point(
+    opened: Callable[..., Any], service: ServiceClient, expect: Any, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(0)
+    u, y = rng.normal(size=400), np.zeros(400)
+    for k in range(1, 400):
+        y[k] = 0.9 * y[k - 1] + 0.1 * u[k - 1] - 0.02 * y[k - 1] ** 2
+    content = "u_V,y_um\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in zip(u, y, strict=True))
+    answer = service.ask("POST", "/v1/datasets", files={"file": ("slow.csv", content.encode())})
+    job = service.submit(5, dataset=answer.json()["id"], dt=0.1, preset="narx", name="slow")
+    page = opened(f"#/jobs/{run_submitted(service, job)}")
+    page.get_by_text("Linear system: Bode").click()
+    expect(page.locator(".modes li").first).to_contain_text("time constant", timeout=DRAWN)
+    first = page.locator(".modes").inner_text()
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="State space, MATLAB").click()
+    assert "sys = ss(A, B, C, D, 0.1);" in Path(saved.value.path()).read_text()
+    page.get_by_label("u_V").fill("1")
+    page.get_by_role("button", name="Linearise there").click()
+    expect(page.locator(".modes li").first).to_be_visible(timeout=DRAWN)
+    eventually(lambda: page.locator(".modes").inner_text() != first)
+    picture = page.get_by_role("img", name="Nyquist plot, drawn by the service")
+    page.locator(".linear .rendered").nth(1).scroll_into_view_if_needed()
+    expect(picture).to_be_visible(timeout=DRAWN)
+    assert unreadable(page) == []

@@ -251,17 +251,17 @@ class StateSpace:
             In hertz; without a sampling time in cycles per sample, 0.5 is the Nyquist frequency.
         """
         points = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
-        found = np.empty((*self.D.shape, len(points)), np.complex128)
-        for place, frequency in enumerate(points):
-            s = 2j * pi * frequency
-            z = s if self.is_continuous else np.exp(s * self.step)
-            try:
-                states = np.linalg.solve(z * np.eye(self.order) - self.A, self.B)
-            except np.linalg.LinAlgError:
-                found[..., place] = np.nan
-                continue
-            found[..., place] = (self.C @ states + self.D) * np.exp(-s * self.delays)
-        return found
+        s = 2j * pi * points
+        z = s if self.is_continuous else np.exp(s * self.step)
+        try:
+            states = np.linalg.solve(z[:, None, None] * np.eye(self.order) - self.A, self.B[None])
+        except np.linalg.LinAlgError:
+            # One of the points is an undamped mode.
+            if len(points) == 1:
+                return np.full((*self.D.shape, 1), np.nan, np.complex128)
+            return np.concatenate([self.respond(half) for half in np.array_split(points, 2)], axis=-1)
+        found = (self.C @ states + self.D) * np.exp(-s[:, None, None] * self.delays)
+        return np.moveaxis(found, 0, -1)
 
     def frequency_response(self, frequencies: ArrayLike | None = None) -> LinearResponse:
         """Return the frequency response with the responses of the members.
@@ -323,10 +323,14 @@ class StateSpace:
     def _respond_to_step(self, count: int) -> NDArray[np.float64]:
         y = np.zeros((*self.D.shape, count))
         for channel, delay in enumerate(np.rint(self.delays / self.step).astype(int)):
-            x = np.zeros(self.order)
-            for k in range(delay, count):
-                y[:, channel, k] = self.C @ x + self.D[:, channel]
-                x = self.A @ x + self.B[:, channel]
+            # The state and the constant input at sample k, from those of the first half by a power of the
+            # transition.
+            transition = self._hold_inputs(self.A, self.B[:, [channel]], np.eye(1))
+            signals = np.eye(1 + self.order)[:, -1:]
+            while signals.shape[1] < count - delay:
+                signals = np.hstack([signals, transition @ signals])
+                transition = transition @ transition
+            y[:, channel, delay:] = (np.hstack([self.C, self.D[:, [channel]]]) @ signals)[:, : count - delay]
         return y
 
     def _count_samples(self) -> int:

@@ -4,6 +4,7 @@ import { getJobPath, getJson } from "../lib/api.js";
 import { el, makeScrollable, makeTable } from "../lib/dom.js";
 import { formatNumber } from "../lib/numbers.js";
 import { poll } from "../lib/polling.js";
+import { makeLinearSystem } from "./linear_system.js";
 import {
   formatR2,
   makeEquation,
@@ -47,7 +48,7 @@ function getHalfWidth(bands) {
 
 /** Make the model of several outputs: equations, errors, terms and the free run of every output. */
 function makeCoupledDetail(job, model, outputs, signal) {
-  const path = `${getJobPath(job)}/models/${model.rank}`;
+  const path = `${getJobPath(job.id)}/models/${model.rank}`;
   return [
     el("h3", { id: "model" }, "Equations"),
     makeEquation(path, model, signal),
@@ -56,6 +57,7 @@ function makeCoupledDetail(job, model, outputs, signal) {
     makeScrollable("Errors of the outputs", makeOutputTable(outputs)),
     makeTermPanel(model),
     makeGallery(path, signal),
+    makeLinearSystem(path, job.spec, signal),
   ];
 }
 
@@ -66,7 +68,7 @@ export function makeCoupledPanel(job, signal) {
   poll(async () => {
     const path = `${getJobPath(job.id)}/result`;
     const { models: [model], outputs } = await getJson(path, { signal });
-    article.replaceChildren(...makeCoupledDetail(job.id, model, outputs, signal));
+    article.replaceChildren(...makeCoupledDetail(job, model, outputs, signal));
     const note = el(
       "p",
       { class: "soft small" },

@@ -8,7 +8,10 @@ const TITLES = {
   "free-run": "Free run",
   structure: "Structure",
   curves: "Curves of the units",
-  bode: "Frequency response at rest",
+  bode: "Frequency response",
+  nyquist: "Nyquist plot",
+  "pole-map": "Poles and zeros",
+  "unit-step": "Response to a unit step",
   loop: "Output over input",
   hold: "Held input",
   residuals: "Residual correlations",
@@ -33,8 +36,8 @@ function enqueue(task) {
   return result;
 }
 
-/** Make the figure at a path. */
-export function makeFigure(path, name, signal) {
+/** Make the figure at a path, with the query of its address. */
+export function makeFigure(path, name, signal, query = "") {
   const title = TITLES[name] ?? name.replace(/^free-run-(\d)$/, "Free run of output $1");
   const files = el("span", { class: "files", hidden: true });
   const paper = el("div", { class: "paper" });
@@ -43,11 +46,11 @@ export function makeFigure(path, name, signal) {
   async function load() {
     paper.replaceChildren(el("p", { class: "drawing", role: "status" }, "Drawing…"));
     try {
-      const image = await enqueue(() => getBlob(`${path}/${name}.svg`, { signal }));
+      const image = await enqueue(() => getBlob(`${path}/${name}.svg${query}`, { signal }));
       const url = URL.createObjectURL(image);
       signal.addEventListener("abort", () => URL.revokeObjectURL(url), { once: true });
       const picture = el("img", { src: url, alt: `${title}, drawn by the service` });
-      const table = DIAGRAMS.has(name) ? null : `${path}/${name}.csv`;
+      const table = DIAGRAMS.has(name) ? null : `${path}/${name}.csv${query}`;
       files.replaceChildren(...makeFileLinks(table, name, title, picture));
       files.hidden = false;
       paper.replaceChildren(picture);

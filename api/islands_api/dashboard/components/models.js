@@ -8,6 +8,7 @@ import { showProblem } from "./banner.js";
 import { makeCompareChoice } from "./compare_choice.js";
 import { loadEquations } from "./equation.js";
 import { makeFigure } from "./figures.js";
+import { makeLinearSystem } from "./linear_system.js";
 import { listRefits } from "./refit.js";
 import { makeReportButtons } from "./report.js";
 import { makeModelFront } from "./size_front.js";
@@ -189,8 +190,11 @@ export function makeGallery(path, signal, skip = () => false) {
   return host;
 }
 
+/** The section of the linear system has this figure of latent models. */
+const isLinear = (name) => name === "bode";
+
 function makeDetail(job, model, hysteresis, signal) {
-  const path = `${getJobPath(job)}/models/${model.rank}`;
+  const path = `${getJobPath(job.id)}/models/${model.rank}`;
   const { physics, information } = model;
   return [
     el("h3", { id: "model" }, `Model ${model.rank}`),
@@ -215,7 +219,8 @@ function makeDetail(job, model, hysteresis, signal) {
       ["AIC", formatNumber(information.aic, 6)],
       ["BIC", formatNumber(information.bic, 6)],
     ]),
-    makeGallery(path, signal),
+    makeGallery(path, signal, isLinear),
+    makeLinearSystem(path, job.spec, signal),
   ];
 }
 
@@ -258,7 +263,7 @@ export function makeModelsPanel(job, rank, unit, signal) {
     article.dataset.rank = model.rank;
     front.show(model);
     const shown = AbortSignal.any([signal, controller.signal]);
-    article.replaceChildren(...makeDetail(job.id, model, claimHysteresis(models), shown));
+    article.replaceChildren(...makeDetail(job, model, claimHysteresis(models), shown));
     for (const link of body.querySelectorAll("table.models a")) {
       const current = link.textContent === String(model.rank);
       link.closest("tr").classList.toggle("current", current);

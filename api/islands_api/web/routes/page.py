@@ -68,6 +68,7 @@ FILES = {
     "components/job_request.js": _SCRIPT,
     "components/job_row.js": _SCRIPT,
     "components/job_selection.js": _SCRIPT,
+    "components/linear_system.js": _SCRIPT,
     "components/job_state.js": _SCRIPT,
     "components/job_words.js": _SCRIPT,
     "components/loop_plot.js": _SCRIPT,

@@ -33,6 +33,10 @@ _NEAR = 0.2
 #: Opacity of bands and members.
 _SHADE = 0.25
 
+#: Largest magnitude of a drawn zero relative to the poles and the limit of stability: that of a sampled
+#: system may be any number, and leave no room for them.
+_FAR = 2.0
+
 #: Largest magnitude of a Nyquist plot relative to the distance 1 of the critical point; the rest of an
 #: integrator is cut off.
 _LARGEST = 10.0
@@ -60,7 +64,7 @@ def draw_bode(system: StateSpace) -> Figure:
     """
     response = system.frequency_response()
     frequencies = response.points
-    figure = blank(4.2, _write_title(system))
+    figure = blank(4.2, _write_title(system, has_bands=True))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1))
     set_log_scale(above)
     above.set_xscale("log")
@@ -143,9 +147,14 @@ def draw_pole_map(system: StateSpace) -> Figure:
         axes.plot(poles.real, poles.imag, ".", color=_COLOURS[1], alpha=_SHADE, label="poles of the ensemble")
     poles = system.poles
     axes.plot(poles.real, poles.imag, "x", color=_COLOURS[0], label="poles")
-    if system.D.shape[0] == system.D.shape[1]:
-        zeros = system.zeros
-        axes.plot(zeros.real, zeros.imag, "o", mfc="none", color=_COLOURS[2], label="zeros")
+    zeros = system.zeros if system.D.shape[0] == system.D.shape[1] else np.empty(0)
+    if zeros.size:
+        stable = 0.0 if system.is_continuous else 1.0
+        is_far = np.abs(zeros) > _FAR * max(stable, float(np.abs(poles).max(initial=0.0)))
+        far = ", ".join(f"{zero:.3g}" if zero.imag else f"{zero.real:.3g}" for zero in zeros[is_far])
+        name = f"zeros (outside: {far})" if far else "zeros"
+        near = zeros[~is_far]
+        axes.plot(near.real, near.imag, "o", mfc="none", color=_COLOURS[2], label=name)
     axes.axhline(0.0, color=FRAME, lw=0.6)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("real part (1/s)" if system.is_continuous else "real part")
@@ -158,7 +167,7 @@ def draw_pole_map(system: StateSpace) -> Figure:
 def draw_unit_step(system: StateSpace) -> Figure:
     """Draw the responses to a unit step of every input, with 90 % bands if they are known."""
     response = system.step_response()
-    figure = blank(3.4, _write_title(system))
+    figure = blank(3.4, _write_title(system, has_bands=True))
     axes = figure.subplots()
     for place, (name, output, channel) in enumerate(_list_channels(system)):
         style = _choose_style(place)
@@ -181,8 +190,9 @@ LINEAR_FIGURES: Mapping[str, Callable[[StateSpace], Figure]] = MappingProxyType(
 )
 
 
-def _write_title(system: StateSpace) -> str:
-    return f"linear part about {system.describe_point()}"
+def _write_title(system: StateSpace, has_bands: bool = False) -> str:
+    bands = ", with 90 % bands" if has_bands and len(system.members) > 1 else ""
+    return f"linear part about {system.describe_point()}{bands}"
 
 
 def _list_channels(system: StateSpace) -> list[tuple[str, int, int]]:
