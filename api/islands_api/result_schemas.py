@@ -12,7 +12,7 @@ from islands_api.schemas import Envelope, ModelView, ResponseModel
 
 
 class IdentificationResult(ResponseModel):
-    """Result of an identification, as in ``result.json``."""
+    """Result of an identification of one or several outputs, as in ``result.json``."""
 
     schema_version: Literal["islands.result/1"] = Field(alias="schema")
     record: dict[str, Any] = Field(description="Hash, length, sampling time, names and units of the record.")
@@ -26,33 +26,13 @@ class IdentificationResult(ResponseModel):
     recommended: dict[str, Any] | None = Field(
         default=None, description="Rank of the recommended model, and the reasons."
     )
+    outputs: tuple[dict[str, Any], ...] = Field(
+        default=(), description="Name, unit, errors and bands of each of several outputs; otherwise absent."
+    )
     models: tuple[ModelView, ...] = Field(description="The models, least validation error first.")
     ensemble: list[dict[str, Any]] | None = Field(
         default=None, description="Structures with their weights and parameters."
     )
-
-
-class CoupledIdentificationResult(ResponseModel):
-    """Result of an identification of several outputs, as in ``result.json``."""
-
-    schema_version: Literal["islands.coupled-result/1"] = Field(alias="schema")
-    dt: float
-    average: int
-    warm_up: int
-    refined: bool = Field(description="Whether all parameters were refined together.")
-    seed: int
-    settings: dict[str, Any] = Field(description="What determines the result besides the record.")
-    equation: str = Field(description="One line for each output.")
-    not_computed: tuple[dict[str, str], ...] = Field(
-        default=(), description="Steps that failed, each with its step and the reason."
-    )
-    outputs: tuple[dict[str, Any], ...] = Field(description="Name, unit, errors and bands of each output.")
-    models: tuple[ModelView, ...] = Field(description="The model of all outputs.")
-    ensemble: list[dict[str, Any]] | None = Field(
-        default=None, description="Structures with their weights and parameters."
-    )
-    estimation: dict[str, Any] = Field(description="Hash, length, names and units of the estimation data.")
-    validation: dict[str, Any] = Field(description="Hash, length, names and units of the validation data.")
 
 
 class FindingView(ResponseModel):

@@ -8,14 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
 
 from islands.errors import SettingsError
 from islands.estimation.latent_models import search_linear_models
-from islands.facade.coupled.identification import fit_coupled
-from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit_record
-from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.fitted_model import list_metrics
+from islands.facade.results.identification import Result
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
@@ -92,28 +91,24 @@ def count_terms(model: AnyModel) -> int:
 
 
 def _find_latent(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> FoundModel:
-    if isinstance(record, CoupledRecord):
-        return _take_all(fit_coupled(record, model=LATENT, seed=seed, progress=progress, stop=stop))
-    found = fit_record(record, model=LATENT, seed=seed, refit="all", progress=progress, stop=stop)
-    return _take_one(found.best)
+    return _take(fit_record(record, model=LATENT, seed=seed, progress=progress, stop=stop, **_refit(record)))
 
 
 def _find_narx(record: AnyRecord, seed: int, progress: ProgressCallback, stop: Stop, /) -> FoundModel:
-    if isinstance(record, CoupledRecord):
-        return _take_all(fit_coupled(record, seed=seed, progress=progress, stop=stop))
-    return _take_one(fit_record(record, seed=seed, refit="all", progress=progress, stop=stop).best)
+    return _take(fit_record(record, seed=seed, progress=progress, stop=stop, **_refit(record)))
 
 
-def _take_one(best: FittedModel) -> FoundModel:
-    """Return the recommended model of one output."""
-    bands = () if best.prediction_bands is None else (best.prediction_bands,)
-    return FoundModel(best.model, _claim([best.metrics["validation"]["free_run"].rmse]), bands)
+def _refit(record: AnyRecord) -> dict[str, Any]:
+    """Return the settings of an estimate on all data, which several outputs do not have."""
+    return {"refit": "all"} if isinstance(record, Dataset) else {}
 
 
-def _take_all(found: CoupledResult) -> FoundModel:
-    """Return the model of several outputs."""
-    errors = [parts["validation"]["free_run"].rmse for parts in found.metrics.values()]
-    return FoundModel(found.model, _claim(errors), found.prediction_bands)
+def _take(found: Result) -> FoundModel:
+    """Return the recommended model."""
+    best = found.best
+    errors = [each["validation"]["free_run"].rmse for each in list_metrics(best.metrics).values()]
+    bands = () if best.prediction_bands is None else best.prediction_bands.outputs
+    return FoundModel(best.model, _claim(errors), bands)
 
 
 def _claim(errors: list[float]) -> float | None:

@@ -1,23 +1,22 @@
 """Error and coverage on the test of a benchmark, from the outputs that its rule allows only."""
 
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
-from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.results.model_simulation import predict
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
-from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.ensemble import Ensemble
-from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
+from islands.validation.prediction_bands import LEVEL, OutputBands, PredictionBands
 from lab.published_sets.definition import BenchmarkTest
 
 M = TypeVar("M", bound=AnyModel)
@@ -101,15 +100,11 @@ def measure_coverage(
     # The outputs of other models share an ensemble, which remains one.
     if isinstance(model, LatentModel | CoupledLatentModel):
         bands = tuple(_limit_members(each, test) for each in bands)
-    visible = test.visible
-    found: tuple[PredictionBand, ...]
-    if isinstance(visible, Dataset) and not isinstance(model, CoupledModel):
-        found = (bands[0].predict(model, match_rate(model, visible), LEVEL, warm_up),)
-    elif isinstance(visible, CoupledRecord) and isinstance(model, CoupledModel):
-        found = FittedCoupledModel(model, warm_up, bands).bands(visible)
-    else:
+    visible = test.visible.map(partial(match_rate, model))
+    made = bands[0] if len(bands) == 1 else OutputBands(bands)
+    found, records = made.predict(model, visible, LEVEL, warm_up).outputs, test.record.records
+    if len(found) != len(records):
         raise ModelError("the model and the test have different numbers of outputs")
-    records = (test.record,) if isinstance(test.record, Dataset) else test.record.records
     inside: list[NDArray[np.bool_]] = []
     for band, record in zip(found, records, strict=True):
         measured = match_rate(model, record)

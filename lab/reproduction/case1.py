@@ -144,7 +144,7 @@ def search_with_preset(quick: bool) -> Document:
     for most in _SIZES:
         # The models are ordered by their validation error.
         best = next(each for each in found.models if each.model.size <= most)
-        model = require_narx(best.model)
+        model = require_narx(best.assessment.final_model)
         document[str(most)] = {
             **model_document(model),
             "errors": measure_errors(model, records),

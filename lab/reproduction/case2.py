@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from islands.errors import RecordError
 from islands.records.dataset import Dataset, same_dt
-from islands.records.reading import fingerprint, preview, read_record
+from islands.records.reading import fingerprint, preview, read_dataset
 from islands.records.reading.options import ReadingOptions
 from islands.simulation.predictors import free_run
 from islands.systems.bouc_wen import BoucWenPiezo, simulate
@@ -150,7 +150,7 @@ def _read(data: str, names: tuple[str, ...]) -> Dataset | None:
         preview(data, ReadingOptions(names=names))
     except RecordError:
         return None
-    return read_record(data, ["u_V"], "y_um", names=names)
+    return read_dataset(data, ["u_V"], "y_um", options=ReadingOptions(names=names))
 
 
 def remove_drift(record: Dataset) -> Dataset:

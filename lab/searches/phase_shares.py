@@ -22,9 +22,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from islands.diagnosis.procedure import PHASES, diagnose
-from islands.evolution.presets import AUTO, resolve_kinds, resolve_settings
+from islands.evolution.presets import AUTO, resolve_coupled_settings, resolve_kinds, resolve_settings
 from islands.facade.automatic.preset_choice import choose_preset
-from islands.facade.coupled.identification import identify_coupled, resolve_coupled_settings
 from islands.facade.explain_residual import FORMULA, explain_residual
 from islands.facade.identification_progress import identification_phases
 from islands.facade.identify import identify
@@ -139,7 +138,7 @@ def run_outputs(samples: int) -> Recording:
     settings = resolve_coupled_settings(AUTO, {})
     sizes = {name: getattr(settings, name) for name in ("population", "islands", "generations")}
     recording = Recording(kind="outputs", outputs=["a", "b"], preset=AUTO, samples=samples, **sizes)
-    identify_coupled(couple(whole, 2), seed=1, progress=recording, on_epoch=recording.epoch)
+    identify(couple(whole, 2), seed=1, progress=recording, on_epoch=recording.epoch)
     recording.add("end")
     return recording
 

@@ -21,31 +21,28 @@ from matplotlib.figure import Figure
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.export import FILE_EXPORTS
-from islands.facade.coupled.result import read_fitted_model
 from islands.facade.results.model_analysis import split_point
-from islands.models.coupled_narx import CoupledModel
 from islands.persistence.checkpoints import history_from_document
 from islands.persistence.ensembles import bands_from_document, ensemble_from_document
 from islands.persistence.models import any_model_from_json, model_from_json, read_validated_model
 from islands.persistence.saved_documents import read_criterion, read_shooting_interval
 from islands.progress import Failure, attempt
-from islands.records.averaging import average_samples
-from islands.records.coupled import couple, match_coupled, split_coupled
+from islands.records.coupled import AnyRecord, CoupledRecord, split_coupled
 from islands.records.dataset import Dataset
 from islands.records.split import Split, average_split, match_split, split_data
 from islands.report.documents.result_folder import result_document
 from islands.report.figures.drawn_numbers import tabulate_lines
-from islands.report.figures.free_run import draw_free_run
 from islands.report.figures.linear_system import LINEAR_FIGURES
+from islands.report.figures.names import name_free_runs
 from islands.report.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.report.figures.style import save, write_text_figure
 from islands.report.pages.comparison import ComparedModel, comparison_report
-from islands.report.pages.identification import coupled_report, identification_report
+from islands.report.pages.identification import identification_report
 from islands.report.pages.origin import Origin
 from islands.validation.assessment import Assessment, assess, with_refit
 from islands_service.domain.fitted_models import read_fitted
-from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
-from islands_service.domain.job import FMU, REPORT, Job, name_free_run
+from islands_service.domain.free_runs import write_free_runs
+from islands_service.domain.job import FMU, REPORT, Job, name_free_run_artefacts
 from islands_service.domain.job_spec import Identification, parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.settings import ServiceSettings, service_settings
@@ -128,7 +125,7 @@ def _make(arguments: argparse.Namespace, store: Store, blobs: Blobs) -> dict[str
     if rank is None:
         return render_figures(job, found)
     if arguments.numbers:
-        return write_free_run(found.models[0], found.split.validation, rank)
+        return _write_assessed(found, rank)
     return render_model_figures(found, rank)
 
 
@@ -167,12 +164,12 @@ def _read_compared(job: Job, job_name: str, rank: int, store: Store, blobs: Blob
     spec, document, (stored,) = _read_result(job, store, rank)
     free_run = None
     if len(spec.outputs) == 1:
-        blob = store.results.artefact(job.id, name_free_run(rank))
+        (name,) = name_free_run_artefacts(rank)
+        blob = store.results.artefact(job.id, name)
         if blob is None:
             found = read_search_result(job, store, blobs, rank)
-            made = write_free_run(found.models[0], found.split.validation, rank)
-            blob = blobs.write(made[name_free_run(rank)])
-            store.results.keep(job.id, {name_free_run(rank): blob})
+            blob = blobs.write(_write_assessed(found, rank)[name])
+            store.results.keep(job.id, {name: blob})
         free_run = json.loads(blobs.read(blob))
     return ComparedModel(f"{job_name}, model {rank}", document, stored.document, free_run, job.spec)
 
@@ -202,6 +199,8 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     """
     spec, document, stored = _read_result(job, store, rank)
     record, validation = _read_records(spec, job, store, blobs)
+    assert isinstance(record, Dataset)
+    assert not isinstance(validation, CoupledRecord)
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
     average, shooting = models[0].average, read_shooting_interval(document)
     split = match_split(models[0], average_split(split_data(record, validation), average))
@@ -247,7 +246,7 @@ def _read_result(
 
 def _read_records(
     spec: Identification, job: Job, store: Store, blobs: Blobs
-) -> tuple[Dataset, Dataset | float]:
+) -> tuple[AnyRecord, AnyRecord | float]:
     datasets = {name: store.datasets.get(job.owner, name, deleted=True) for name in spec.datasets}
     return read_record_and_validation(spec, datasets, blobs)
 
@@ -289,7 +288,13 @@ def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     entry = found.models[0]
     names = model_figures(found, entry.model)
     drawn = {f"{rank}/{name}": partial(FIGURES[name], entry, found.split) for name in names}
-    return _save_all(drawn) | write_free_run(entry, found.split.validation, rank)
+    return _save_all(drawn) | _write_assessed(found, rank)
+
+
+def _write_assessed(found: SearchResult, rank: int) -> dict[str, bytes]:
+    """Return the free run of the first model of a search result, by artefact name."""
+    entry = found.models[0]
+    return write_free_runs(entry.model, entry.bands, entry.warm_up, found.split.validation, rank)
 
 
 def draw_linear_system(job: Job, store: Store, rank: int, levels: Mapping[str, float]) -> dict[str, bytes]:
@@ -327,25 +332,20 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
         The job, its data or the model no longer exists.
     """
     spec, document, (stored, *_) = _read_result(job, store, None)
-    model = any_model_from_json(stored.file)
-    assert isinstance(model, CoupledModel)
-    fitted = read_fitted_model(model, document, f"the result of job {job.id}")
+    fitted = read_fitted(job.id, stored.file, stored.document, document)
     record, held_out = _read_records(spec, job, store, blobs)
-    outputs = len(spec.outputs)
-    parts = split_coupled(
-        couple(record, outputs), couple(held_out, outputs) if isinstance(held_out, Dataset) else held_out
-    )
-    data = match_coupled(model, parts.validation.map(lambda each: average_samples(each, model.average)))
-    run, bands = simulate_outputs(fitted, data)
-    made, figures = write_free_runs(data, run, bands), dict[str, bytes]()
-    for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1):
-        name = f"1/free-run-{number}"
-        made |= _save_all({name: partial(draw_free_run, each, y, band=band)})
-        figures[each.output_name] = made[f"{name}.svg"]
-    sentences = str((job.summary or {}).get("words", "")).splitlines()
-    terms = stored.document["terms"]
-    made[REPORT] = coupled_report(_origin(job), model, document, terms, sentences, figures)
-    return made
+    assert isinstance(record, CoupledRecord)
+    data = split_coupled(record, held_out).validation
+    drawn = {
+        name: partial(fitted.plot, record=data, output=output)
+        for name, output in zip(name_free_runs(len(spec.outputs)), fitted.output_names, strict=True)
+    }
+    made = _save_all(drawn)
+    complete = {**document, "models": [stored.document]}
+    report = identification_report(_origin(job), complete, fitted.model.equation().mathml, made)
+    figures = {f"1/{name}": figure for name, figure in made.items()}
+    runs = write_free_runs(fitted.model, fitted.prediction_bands, fitted.warm_up, data, 1)
+    return {**runs, **figures, REPORT: report}
 
 
 def _save_all(figures: Mapping[str, Callable[[], Figure]]) -> dict[str, bytes]:

@@ -16,10 +16,6 @@ from islands.evolution.settings import Settings as Settings
 from islands.expressions.parsing import parse as parse
 from islands.expressions.primitives import PRIMITIVES as PRIMITIVES
 from islands.expressions.user_primitive import primitive as primitive
-from islands.facade.coupled.identification import fit_coupled as fit_coupled
-from islands.facade.coupled.identification import identify_coupled as identify_coupled
-from islands.facade.coupled.result import CoupledResult as CoupledResult
-from islands.facade.coupled.result import FittedCoupledModel as FittedCoupledModel
 from islands.facade.diagnose import diagnose as diagnose
 from islands.facade.diagnose import function_simulator as function_simulator
 from islands.facade.diagnose import plan_experiment as plan_experiment
@@ -44,7 +40,6 @@ from islands.models.narx import Model as Model
 from islands.models.narx import make_model as make_model
 from islands.models.operating_point import static_characteristic as static_characteristic
 from islands.models.sympy_expression import to_sympy as to_sympy
-from islands.persistence.models import read_coupled_model as read_coupled_model
 from islands.persistence.models import read_model as read_model
 from islands.persistence.models import write_model as write_model
 from islands.records.coupled import CoupledRecord as CoupledRecord

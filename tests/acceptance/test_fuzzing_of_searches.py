@@ -22,7 +22,7 @@ def test_every_search_of_a_short_or_extreme_record_ends_in_a_result_or_in_words(
     printed = capsys.readouterr().out
     assert status == 0, printed
     assert f"{cases} cases, 0 defects" in printed
-    for function in ("fit", "identify", "diagnose", "fit_coupled"):
+    for function in ("fit", "identify", "diagnose", "fit of several outputs"):
         for ending in ("result", "RecordError"):
             assert f"{function}: {ending} " in printed, printed
 

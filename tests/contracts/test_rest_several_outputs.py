@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import islands
-from islands.facade.coupled.identification import identify_coupled
-from islands.records.coupled import CoupledRecord
+from islands.report.documents.result_folder import result_document
+from islands.report.text.statements import describe
 from islands_api.client import Client
 from islands_service.coordinator import identification_job
 from islands_service.coordinator.heartbeat import CoordinatorStopping
 from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.domain.job import JobState, name_free_run
+from islands_service.domain.job import JobState, name_free_run_artefacts
 from islands_service.store.blobs import Blobs
 from support.command_line import succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
@@ -67,7 +67,7 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         assert generations == sorted(set(generations))
         succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "result")
         assert "y1(k) =" in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
-        names = [name_free_run(1, number) for number in (1, 2)]
+        names = name_free_run_artefacts(1, 2)
         stored = [service.store.results.artefact(job.id, name) for name in names]
         assert client.report(job).count(b"<img") == 2
         # The report draws the free runs that were stored with the result.
@@ -82,16 +82,13 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
             "the model has 2 outputs, there is no 3",
         )
         assert "y2" in client.export(job, 1, "c")
-    files = CoupledRecord(
-        tuple(islands.read_record(tmp_path / "masses.csv", "u", name) for name in ("y1", "y2"))
-    )
-    expected = identify_coupled(files, seed=3, **SETTINGS)
+    files = islands.read_record(tmp_path / "masses.csv", "u", ["y1", "y2"])
+    expected = islands.identify(files, seed=3, **SETTINGS)
     # The same statements over REST, on the page and from the library.
-    assert done.summary["words"].splitlines() == expected.sentences()
+    assert done.summary["words"].splitlines() == describe(result_document(expected.search_result))
     loaded = islands.load(tmp_path / "result")
-    assert loaded.model == expected.model
-    for one, other in zip(loaded.bands(files), expected.bands(files), strict=True):
-        np.testing.assert_array_equal(one.upper, other.upper)
+    assert loaded.best.model == expected.best.model
+    np.testing.assert_array_equal(loaded.bands(files).upper, expected.bands(files).upper)
     assert sorted(path.name for path in (tmp_path / "result" / "figures").iterdir()) == [
         "free-run-1.svg",
         "free-run-2.svg",

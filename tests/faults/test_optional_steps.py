@@ -17,9 +17,8 @@ from islands.evolution import search_result
 from islands.facade import final_models, refit
 from islands.facade.coupled import bands as coupled_bands
 from islands.facade.coupled import identification
-from islands.facade.coupled.identification import fit_coupled
-from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit_record
+from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary
 from islands.report.documents.result_folder import write_interim_result
@@ -27,6 +26,7 @@ from islands.report.figures import model_responses, registry
 from islands.report.figures.names import ALL_FIGURES
 from islands.report.text.facts import ResultFacts
 from islands.validation import assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 
 #: The laws of `Steps` are in the unit tests.
 pytestmark = pytest.mark.ci
@@ -156,8 +156,8 @@ def test_a_final_step_of_an_evolution_may_fail(step, monkeypatch):
 COUPLED_STEPS = {
     "prediction bands": (coupled_bands, "make_ensemble"),
     "refinement of all equations": (identification, "_refine"),
-    "residual tests of y": (CoupledResult, "_measure_residual"),
-    "figure free-run-1-y": (CoupledResult, "_draw_figure"),
+    "residual tests of y": (CoupledAssessment, "measure_residual"),
+    "figure free-run-1": (FittedModel, "plot"),
     "y: linear model for comparison": (search_result, "fit_linear_comparison"),
 }
 
@@ -167,14 +167,12 @@ def test_a_step_of_several_outputs_that_fails_leaves_a_line_and_the_model(step, 
     record = make_record()
     frame = {"u": record.u[:, 0], "y": record.y, "z": 1.0 + 2.0 * record.y + record.u[:, 0] ** 3}
     monkeypatch.setattr(*COUPLED_STEPS[step], fail)
-    result = fit_coupled(
-        pd.DataFrame(frame), inputs="u", outputs=("y", "z"), dt=0.1, degree=2, lags=1, max_terms=4
-    )
+    result = fit(pd.DataFrame(frame), inputs="u", output=("y", "z"), dt=0.1, degree=2, lags=1, max_terms=4)
     folder = result.save(tmp_path / "result")
     document = json.loads((folder / "result.json").read_text())
     assert step in {each["step"] for each in document["not_computed"]}
     assert f"Not computed: {step}: InjectedError" in " ".join((folder / "summary.txt").read_text().split())
-    assert islands.load(folder).equation == result.equation
+    assert islands.load(folder).best.equation == result.best.equation
 
 
 def test_an_export_that_fails_states_the_reason_and_leaves_the_file(monkeypatch, tmp_path):

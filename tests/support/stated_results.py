@@ -14,7 +14,7 @@ from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.results.notebook_html import render_sentences
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
-from islands.report.pages.identification import coupled_report, identification_report
+from islands.report.pages.identification import identification_report
 from islands.report.pages.origin import Origin
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.diagnosed_records import MEASURED_OUTPUTS, OTHERS, diagnose_difference
@@ -22,7 +22,7 @@ from support.laws import LAWS
 from support.measured_portfolio import MEASURED
 from support.portfolio_records import KINDS
 
-AnyResult = islands.Result | islands.CoupledResult | DiagnosisResult
+AnyResult = islands.Result | DiagnosisResult
 
 #: Settings of a fit that takes less than a second.
 QUICK = {"library": "polynomial", "degree": 2, "lags": 3, "max_terms": 6, "certificate": 0, "average": 1}
@@ -96,8 +96,8 @@ def make_cases() -> dict[str, Callable[[], AnyResult]]:
         for noise in (0.0, 0.02, 0.2):
             for samples in (120, 400):
                 make = partial(make_coupled_record, system, samples, noise)
-                cases[f"several outputs, {name}, noise {noise:g}, {samples}"] = lambda make=make: (
-                    islands.fit_coupled(make(), library="polynomial", degree=2, lags=2, certificate=0)
+                cases[f"several outputs, {name}, noise {noise:g}, {samples}"] = lambda make=make: islands.fit(
+                    make(), library="polynomial", degree=2, lags=2, certificate=0
                 )
     for name, read in MEASURED.items():
         cases[f"measured, {name}"] = lambda read=read: islands.fit(_shorten(read()[0]))
@@ -116,11 +116,6 @@ def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
     """Return every text about a result, by where a reader meets it."""
     if isinstance(result, DiagnosisResult):
         return _list_texts_of_diagnosis(name, result)
-    if isinstance(result, islands.CoupledResult):
-        document, sentences = result.document(), result.sentences()
-        terms = document["models"][0]["terms"]
-        report = coupled_report(Origin(name), result.model, document, terms, sentences, {}).decode()
-        return {"summary": str(result), "service": "\n".join(sentences), "report": report}
     with tempfile.TemporaryDirectory() as folder:
         result.save(folder, figures=())
         (Path(folder) / "summary.txt").unlink()

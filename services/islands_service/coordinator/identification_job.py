@@ -13,13 +13,11 @@ from typing import Any
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem
 from islands.evolution.presets import AUTO
-from islands.evolution.search_result import SearchResult, without_optional_steps
+from islands.evolution.search_result import AnySearchResult, without_optional_steps
 from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
-from islands.facade.coupled.identification import identify_coupled_data
-from islands.facade.coupled.result import CoupledResult
 from islands.facade.fit import fit_record
 from islands.facade.identification_progress import SEARCH, IdentificationProgress, class_phases
 from islands.facade.identify import identify_record
@@ -27,16 +25,14 @@ from islands.facade.results.identification import Result
 from islands.persistence.checkpoints import history_document
 from islands.persistence.models import NARX
 from islands.progress import AnswerFoundError, PhasedProgress, ProgressCallback, Stop, StoppedError, TimeLeft
-from islands.records.coupled import couple, split_coupled
+from islands.records.coupled import AnyRecord, CoupledRecord, split_first
 from islands.records.dataset import Dataset
-from islands.records.split import describe_search_extrapolation
+from islands.records.split import describe_extrapolation
 from islands_service.coordinator.checkpoints import CHECKPOINT_SHARE, JobCheckpoints, JobStart
 from islands_service.coordinator.heartbeat import JobCancelled, RunTimeLimitError
 from islands_service.coordinator.identification_outcome import (
     keep_free_runs,
-    make_coupled_outcome,
     make_outcome,
-    write_coupled,
     write_recommended,
 )
 from islands_service.coordinator.job_run import JobRun
@@ -180,14 +176,10 @@ def run_identification_job(run: JobRun) -> JobOutcome:
     engine = StoppableEngine(run.engine, run.is_search_stopped, front.begin, reached)
     warnings = [
         f"validation extrapolates: {statement}"
-        for statement in describe_search_extrapolation(record, validation, len(spec.outputs))
+        for statement in describe_extrapolation(split_first(record, validation))
     ]
     reporter = ProgressReporter(run, checkpoints, stop, start, spec, record.samples, front, warnings)
     try:
-        if len(spec.outputs) > 1:
-            coupled = _identify_outputs(record, validation, spec, start, engine, reporter, stop)
-            outcome = _end_job(partial(make_coupled_outcome, coupled), coupled.left_out, start.note, stop)
-            return keep_free_runs(outcome, partial(write_coupled, coupled), run)
         result = _identify(record, validation, spec, start, engine, reporter, stop)
     except AnswerFoundError as ended:
         models = without_optional_steps(ended.found, str(ended))
@@ -244,14 +236,14 @@ class SearchStop:
 
 
 def _identify(
-    record: Dataset,
-    validation: Dataset | float,
+    record: AnyRecord,
+    validation: AnyRecord | float,
     spec: Identification,
     start: JobStart,
     engine: Engine,
     reporter: "ProgressReporter",
     stop: SearchStop,
-) -> SearchResult:
+) -> AnySearchResult:
     if spec.model != NARX:
         fitted = fit_record(
             record,
@@ -268,7 +260,8 @@ def _identify(
     preset: str | Choice = spec.preset
     if preset == AUTO and start.choice is not None:
         preset = start.choice
-    elif preset == AUTO:
+    elif preset == AUTO and isinstance(record, Dataset):
+        assert not isinstance(validation, CoupledRecord)
         try:
             preset = choose_preset(record, validation, spec.changes, reporter.report_stage, stop)
         except StoppedChoiceError as stopped:
@@ -278,46 +271,17 @@ def _identify(
         record,
         validation,
         preset=preset,
-        **_list_arguments(spec, start, engine, reporter, stop),
+        seed=spec.seed,
+        progress=reporter.report_stage,
+        on_epoch=reporter,
+        stop=stop,
+        start=start.state,
+        engine=engine,
+        on_models=reporter.keep_answer,
+        **spec.changes,
     )
     reporter.flush()
     return result.with_wall_time(reporter.spent).search_result
-
-
-def _list_arguments(
-    spec: Identification, start: JobStart, engine: Engine, reporter: "ProgressReporter", stop: SearchStop
-) -> dict[str, Any]:
-    """Return the arguments that the search of one output and those of several share."""
-    return {
-        "seed": spec.seed,
-        "progress": reporter.report_stage,
-        "on_epoch": reporter,
-        "stop": stop,
-        "start": start.state,
-        "engine": engine,
-        "on_models": reporter.keep_answer,
-        **spec.changes,
-    }
-
-
-def _identify_outputs(
-    record: Dataset,
-    validation: Dataset | float,
-    spec: Identification,
-    start: JobStart,
-    engine: Engine,
-    reporter: "ProgressReporter",
-    stop: SearchStop,
-) -> CoupledResult:
-    outputs = len(spec.outputs)
-    held_out = couple(validation, outputs) if isinstance(validation, Dataset) else validation
-    result = identify_coupled_data(
-        split_coupled(couple(record, outputs), held_out),
-        preset=spec.preset,
-        **_list_arguments(spec, start, engine, reporter, stop),
-    )
-    reporter.flush()
-    return result.with_wall_time(reporter.spent)
 
 
 def _make_progress(progress: ProgressCallback, spec: Identification, samples: int) -> PhasedProgress:

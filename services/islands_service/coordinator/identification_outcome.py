@@ -1,48 +1,25 @@
 """Outcome of an identification job: what the store keeps of its result."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import structlog
 
-from islands.evolution.search_result import SearchResult
-from islands.facade.coupled.result import CoupledResult
+from islands.evolution.search_result import AnySearchResult
 from islands.persistence.models import model_json
 from islands.progress import explain_failure
-from islands.records.coupled import match_coupled
 from islands.report.documents.result_folder import result_document
-from islands.report.text.statements import describe, describe_coupled
+from islands.report.text.statements import describe
+from islands.validation.assessment import Assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 from islands_service.coordinator.job_run import JobRun
-from islands_service.domain.free_runs import simulate_outputs, write_free_run, write_free_runs
+from islands_service.domain.free_runs import write_free_runs
 from islands_service.domain.job import JobOutcome, JobState
 
 log = structlog.get_logger()
 
 
-def make_coupled_outcome(found: CoupledResult, note: str = "", ended_by: str = "") -> JobOutcome:
-    """Return the part of a result of several outputs that the store keeps; see `make_outcome`."""
-    document = found.document()
-    words = describe_coupled(document)
-    (model,) = models = document.pop("models")
-    searches = [result.search_result.search for result in found.results]
-    summary = {
-        "models": 1,
-        "rank": 1,
-        "reasons": [],
-        "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
-        "equation": "; ".join(found.equation.splitlines()),
-        "size": model["size"],
-        "metrics": model["metrics"]["validation"]["free_run"],
-        "property_1": False,
-        "evaluations": sum(search.evaluations for search in searches),
-        "wall_s": found.wall_s,
-        "ended_by": ended_by or searches[-1].ended_by,
-        **({"note": note} if note else {}),
-    }
-    return JobOutcome(JobState.SUCCEEDED, document, ((models[0], model_json(found.model)),), summary)
-
-
-def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> JobOutcome:
+def make_outcome(found: AnySearchResult, note: str = "", ended_by: str = "") -> JobOutcome:
     """Return the part of a search result that the store keeps.
 
     Parameters
@@ -65,16 +42,17 @@ def make_outcome(found: SearchResult, note: str = "", ended_by: str = "") -> Job
         "rank": recommended["rank"],
         "reasons": recommended["reasons"],
         "words": "\n".join([*words, *([f"Note: {note}."] if note else [])]),
-        "equation": found.recommended.final_model.equation().line,
+        "equation": "; ".join(found.recommended.final_model.equation().line.splitlines()),
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],
-        "property_1": best["physics"]["property_1"],
+        "property_1": best.get("physics", {}).get("property_1", False),
         "evaluations": document["search"]["evaluations"],
         "wall_s": document["search"]["wall_s"],
         "ended_by": document["search"]["ended_by"],
         **({"note": note} if note else {}),
     }
-    files = [model_json(entry.final_model) for entry in found.models]
+    entries: Sequence[Assessment | CoupledAssessment] = found.models
+    files = [model_json(entry.final_model) for entry in entries]
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 
@@ -93,12 +71,7 @@ def keep_free_runs(outcome: JobOutcome, write: Callable[[], dict[str, bytes]], r
         return outcome
 
 
-def write_recommended(found: SearchResult) -> dict[str, bytes]:
-    """Return the free run of the recommended model by artefact name."""
-    return write_free_run(found.recommended, found.split.validation, found.recommendation.rank)
-
-
-def write_coupled(found: CoupledResult) -> dict[str, bytes]:
-    """Return the free run of every output by artefact name."""
-    data = match_coupled(found.model, found.split.validation)
-    return write_free_runs(data, *simulate_outputs(found, data))
+def write_recommended(found: AnySearchResult) -> dict[str, bytes]:
+    """Return the free run of every output of the recommended model by artefact name."""
+    best, rank = found.recommended, found.recommendation.rank
+    return write_free_runs(best.model, best.bands, best.warm_up, found.split.validation, rank)

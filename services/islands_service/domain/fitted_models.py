@@ -1,21 +1,16 @@
 """Models of the result of a job with their errors and bands, as `islands.load` opens them from a folder."""
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any
 
 from islands.errors import ModelError
-from islands.facade.coupled.result import FittedCoupledModel, read_fitted_model
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.reader import read_entry
-from islands.models.coupled_narx import CoupledModel
 from islands.persistence.ensembles import ensemble_from_document
 from islands.persistence.models import any_model_from_json
 
-#: A model of one or of several outputs.
-AnyFittedModel: TypeAlias = FittedModel | FittedCoupledModel
 
-
-def read_fitted(job: str, file: str, entry: Mapping[str, Any], document: Mapping[str, Any]) -> AnyFittedModel:
+def read_fitted(job: str, file: str, entry: Mapping[str, Any], document: Mapping[str, Any]) -> FittedModel:
     """Return a model of a job.
 
     Parameters
@@ -35,8 +30,6 @@ def read_fitted(job: str, file: str, entry: Mapping[str, Any], document: Mapping
         The model or the document is damaged.
     """
     model = any_model_from_json(file, f"a model of job {job}")
-    if isinstance(model, CoupledModel):
-        return read_fitted_model(model, document, f"the result of job {job}")
     try:
         ensemble = ensemble_from_document(document["ensemble"], model)
         return read_entry(model, entry, document, ensemble)

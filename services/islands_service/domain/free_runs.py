@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.facade.coupled.result import FittedCoupledModel
+from islands.facade.results.model_simulation import match_columns
+from islands.models.coupled_narx import AnyModel
 from islands.models.protocol import DynamicModel
-from islands.records.coupled import CoupledRecord
+from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import Simulation, free_run
-from islands.validation.assessment import Assessment
-from islands.validation.prediction_bands import PredictionBand
-from islands_service.domain.job import name_free_run
+from islands.simulation.predictors import free_run
+from islands.validation.prediction_bands import AnyBands, PredictionBand
+from islands_service.domain.job import name_free_run_artefacts
 from islands_service.domain.plot_envelopes import describe_envelopes
 
 #: Largest number of samples of a free run that is returned as numbers: a screen shows no more.
@@ -98,38 +98,33 @@ def _round(values: Sequence[float | None]) -> list[float | None]:
     return [None if value is None else float(f"{value:.{_DIGITS}g}") for value in values]
 
 
-def write_free_run(entry: Assessment, data: Dataset, rank: int) -> dict[str, bytes]:
-    """Simulate a model of one output with its band; return the document by artefact name.
+def write_free_runs(
+    model: AnyModel, bands: AnyBands | None, warm_up: int, data: AnyRecord, rank: int
+) -> dict[str, bytes]:
+    """Simulate a model with its bands; return the document of every output by artefact name.
 
     Parameters
     ----------
-    entry : Assessment
-    data : Dataset
-        Validation data with the sampling time of the model.
+    model : DynamicModel or CoupledModel
+    bands : PredictionBands, OutputBands or None
+    warm_up : int
+        Number of samples before the first prediction.
+    data : Dataset or CoupledRecord
+        Validation data.
     rank : int
         Rank of the model.
     """
-    bands = entry.bands
-    band = None if bands is None else bands.predict(entry.model, data, warm_up=entry.warm_up)
-    run = simulate_freely(entry.model, data, entry.warm_up)
-    return {name_free_run(rank): _write_document(data, run.y, run.outcome, band)}
-
-
-def simulate_outputs(
-    fitted: FittedCoupledModel, data: CoupledRecord
-) -> tuple[Simulation, tuple[PredictionBand | None, ...]]:
-    """Return the free run of a model of several outputs, and the band of each, None without bands."""
-    bands = fitted.bands(data) if fitted.prediction_bands else (None,) * len(data.records)
-    return fitted.simulate(data), bands
-
-
-def write_free_runs(
-    data: CoupledRecord, run: Simulation, bands: Sequence[PredictionBand | None]
-) -> dict[str, bytes]:
-    """Return the documents of a free run of several outputs by artefact name; see `simulate_outputs`."""
+    matched = match_columns(model, data)
+    run = simulate_freely(model, matched, warm_up)
+    runs = run.y.reshape(matched.samples, -1).T
+    shown: Sequence[PredictionBand | None] = (None,) * len(runs)
+    if bands is not None:
+        shown = bands.predict(model, matched, warm_up=warm_up).outputs
     return {
-        name_free_run(1, number): _write_document(each, y, run.outcome, band)
-        for number, (each, y, band) in enumerate(zip(data.records, run.y.T, bands, strict=True), start=1)
+        name: _write_document(each, y, run.outcome, band)
+        for name, each, y, band in zip(
+            name_free_run_artefacts(rank, len(runs)), matched.records, runs, shown, strict=True
+        )
     }
 
 

@@ -276,9 +276,11 @@ def find_datasets(spec: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in named if isinstance(name, str)))
 
 
-def name_free_run(rank: int, output: int | None = None) -> str:
-    """Return the name of the artefact with a free run; the outputs of several are numbered from 1."""
-    return f"{rank}/{FREE_RUN}" if output is None else f"{rank}/free-run-{output}.json"
+def name_free_run_artefacts(rank: int, outputs: int = 1) -> list[str]:
+    """Return the name of the artefact with the free run of every output; several are numbered from 1."""
+    if outputs == 1:
+        return [f"{rank}/{FREE_RUN}"]
+    return [f"{rank}/free-run-{number}.json" for number in range(1, outputs + 1)]
 
 
 @dataclass(frozen=True, slots=True)

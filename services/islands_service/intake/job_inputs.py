@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
 from islands.records.channel_names import parse_channel_name
+from islands.records.coupled import AnyRecord, couple
 from islands.records.dataset import Dataset, join
 from islands.records.reading.row_range import parse_rows
 from islands.records.split import hold_out
@@ -45,7 +46,7 @@ def link_blob(blob: Path, name: str) -> Iterator[Path]:
 
 def read_record_and_validation(
     spec: Identification, datasets: dict[str, StoredDataset], blobs: Blobs
-) -> tuple[Dataset, Dataset | float]:
+) -> tuple[AnyRecord, AnyRecord | float]:
     """Read the recordings of a job that estimate, and its validation record or fraction.
 
     Raises
@@ -56,9 +57,10 @@ def read_record_and_validation(
         The data folder has lost a file.
     """
     record = join(tuple(_read_part(spec, part, datasets, blobs) for part in spec.estimation))
-    if isinstance(spec.validation, Part):
-        return record, _read_part(spec, spec.validation, datasets, blobs)
-    return record, spec.validation
+    coupled, validation = couple(record, len(spec.outputs)), spec.validation
+    if isinstance(validation, Part):
+        return coupled, couple(_read_part(spec, validation, datasets, blobs), len(spec.outputs))
+    return coupled, validation
 
 
 def read_beginning(

@@ -8,8 +8,7 @@ from time import monotonic
 from islands.distribution import describe_missing_extra
 from islands.errors import EngineError, SettingsError
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Engine, SerialEngine
-from islands.evolution.problem import Problem
+from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem, SerialEngine
 from islands.facade.engine_choice import Ray, open_engine
 from islands.progress import ProgressCallback, Stop, TimeLimit
 
@@ -91,7 +90,7 @@ class TimedEngine:
     def __init__(self, engine: Engine, until: float, searches: int = 1) -> None:
         self._engine, self._until, self._left = engine, until, searches
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
+    def run(self, problem: SearchProblem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Run the next search."""
         limit = TimeLimit(self._until, monotonic, stop).share(self._left)
         self._left = max(1, self._left - 1)

@@ -1,18 +1,17 @@
 """Output folder of a command: the check before the work and the message after it."""
 
 import os
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import islands
 from islands.cli.console import output
+from islands.cli.stop_requests import REPEAT, StopRequests
 from islands.errors import SettingsError
+from islands.progress import Steps
 
 if TYPE_CHECKING:
     from islands.evolution.search_result import SearchResult
-    from islands.facade.coupled.result import CoupledResult
     from islands.facade.results.identification import Result
 
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 RESULT_FILES = "result.json, models/, figures/, summary.txt, method.txt"
 
 #: Files of a result of several outputs.
-COUPLED_FILES = "result.json, model.json, summary.txt, figures/, outputs/ (the result of each output)"
+SEPARATE_FILES = "result.json, models/, figures/, summary.txt, outputs/ (the result of each output)"
 
 
 def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
@@ -41,12 +40,50 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 
 
-def keep_models(folder: Path) -> Callable[["SearchResult"], None]:
-    """Return a callback that writes the models of a search to a folder before the steps after the search."""
-    # The help of a command does not need it.
-    from islands.report.documents.result_folder import write_interim_result  # noqa: PLC0415
+def keep_models(folder: Path, outputs: Sequence[str]) -> Callable[["SearchResult"], None]:
+    """Return a callback that writes the models of a search to a folder before the steps after the search.
 
-    return partial(write_interim_result, folder=folder)
+    Of several outputs, the models of each are written to its folder.
+    """
+    # The help of a command does not need it.
+    from islands.report.documents.result_folder import list_folders, write_interim_result  # noqa: PLC0415
+
+    folders = [""] if len(outputs) == 1 else list_folders(outputs)
+
+    def write(found: "SearchResult") -> None:
+        write_interim_result(found, folder / folders[outputs.index(found.record.output_name)])
+
+    return write
+
+
+def run_search(
+    search: Callable[[], "Result"],
+    folder: Path,
+    stop: StopRequests,
+    figures: Sequence[str],
+    explain_continuation: Callable[[], str] = lambda: REPEAT,
+) -> "Result":
+    """Run a search; one of several outputs that is stopped before the last of them ends the command.
+
+    The results of its first outputs are kept.
+    """
+    # The search loads the kernels, which the help of a command does not need.
+    from islands.facade.coupled.identification import StoppedCouplingError  # noqa: PLC0415
+    from islands.report.documents.result_folder import list_folders  # noqa: PLC0415
+
+    try:
+        return search()
+    except StoppedCouplingError as stopped:
+        if not stopped.found:
+            raise
+        drawing = Steps(stop=stop)
+        left_out = [f"models of {name}" for name in stopped.outputs[len(stopped.found) :]]
+        for name, found in zip(list_folders(stopped.outputs), stopped.found, strict=False):
+            found.save(folder / name, drawing, figures)
+        stop.end(
+            folder / "outputs", (*left_out, "the common model", *drawing.left_out), explain_continuation()
+        )
+        raise
 
 
 def print_failures(not_computed: Mapping[str, str]) -> None:
@@ -55,8 +92,8 @@ def print_failures(not_computed: Mapping[str, str]) -> None:
         output.print(f"Not computed: {step}: {reason}.", markup=False)
 
 
-def show_result(result: "Result | CoupledResult", folder: Path) -> None:
+def show_result(result: "Result", folder: Path) -> None:
     """Print the summary and the files of a saved result."""
     output.print((folder / "summary.txt").read_text(encoding="utf-8"), markup=False)
-    files = COUPLED_FILES if isinstance(result, islands.CoupledResult) else RESULT_FILES
+    files = SEPARATE_FILES if result.outputs else RESULT_FILES
     output.print(f"{folder}/: {files}", markup=False)

@@ -281,13 +281,18 @@ def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Setting
         As for `resolve_settings`, or a setting is for one output.
     """
     name = COUPLED_PRESET if preset == AUTO else preset
-    settings = resolve_settings(name, {"feedthrough": "no", **changes})
+    settings = resolve_settings(name, {"feedthrough": "no", **without_automatic(changes)})
     check_coupled_settings(settings.constraints, settings.feedthrough, settings.refit)
     if settings.select != "validation":
         raise SettingsError(
             "select is 'validation' with several outputs: equations are chosen by their free run together"
         )
     return settings
+
+
+def without_automatic(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options without those that are ``auto``, of which several outputs have other defaults."""
+    return {name: value for name, value in options.items() if value not in (None, AUTO)}
 
 
 def check_coupled_settings(constraints: str | None, feedthrough: str, refit: str) -> None:

@@ -1,13 +1,15 @@
-"""Result of a search: ranked models and statistics."""
+"""Result of a search: ranked models and statistics, of one output and of several."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from islands.errors import ModelError
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.search_state import HistoryPoint
 from islands.evolution.settings import FITNESS_MODES
@@ -18,14 +20,19 @@ from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.records.averaging import count_means
 from islands.records.channel_names import parse_channel_name
+from islands.records.coupled import CoupledRecord, CoupledSplit
 from islands.records.dataset import Dataset
 from islands.records.loops import has_loops
 from islands.records.split import Split
 from islands.validation.assessment import Assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.linear_comparison import fit_linear_comparison, is_linear
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, measure_size, recommend, recommend_fittest
+
+#: Result of the same search.
+FoundT = TypeVar("FoundT", bound="SearchResult | CoupledSearchResult")
 
 #: Name of the step that makes the ensemble and the prediction bands.
 BANDS = "prediction bands"
@@ -135,8 +142,7 @@ class SearchResult:
     @property
     def direct_inputs(self) -> tuple[str, ...]:
         """Names of the inputs that the models read at sample k (direct feedthrough)."""
-        channels = map(parse_channel_name, self.split.estimation.input_names)
-        return tuple(channel.base for channel in channels if channel.at_once)
+        return list_direct_inputs(self.split.estimation.input_names)
 
     @property
     def requires_property_1(self) -> bool:
@@ -162,6 +168,108 @@ class SearchResult:
     def recommended(self) -> Assessment:
         """Recommended model."""
         return self.models[self.recommendation.rank - 1]
+
+
+def list_direct_inputs(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the inputs that are read at sample k, without the suffix ``+1``."""
+    return tuple(channel.base for channel in map(parse_channel_name, names) if channel.at_once)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledSearchResult:
+    """Complete result of a search of several outputs; its attributes are those of a `SearchResult`.
+
+    Attributes
+    ----------
+    record : CoupledRecord
+        Record as passed by the caller.
+    split : CoupledSplit
+        Estimation data and validation data with the sampling time of the models.
+    seed : int
+    settings : mapping
+        Settings that determine the result, together with the record and the seed.
+    search : SearchStatistics
+    models : tuple of CoupledAssessment
+        Models, best first.
+    outputs : tuple of SearchResult
+        Separate result of every output; empty if one search has found the model of all of them.
+    refusal : str
+        Why the optional facts of the document are not computed; empty if they are.
+    """
+
+    record: CoupledRecord
+    split: CoupledSplit
+    seed: int
+    settings: Mapping[str, Any]
+    search: SearchStatistics
+    models: tuple[CoupledAssessment, ...]
+    outputs: tuple[SearchResult, ...] = ()
+    refusal: str = ""
+
+    @property
+    def average(self) -> int:
+        """Number of samples of the record whose mean is one sample of the models."""
+        return self.models[0].model.average
+
+    @property
+    def shooting_interval(self) -> int:
+        """Samples of the data in each shooting interval of the separate searches."""
+        return self.outputs[0].shooting_interval
+
+    @property
+    def direct_inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that the models read at sample k."""
+        return list_direct_inputs(self.split.estimation.input_names)
+
+    @property
+    def ensemble(self) -> Ensemble | None:
+        """Models that the data do not exclude; None without bands, or if every output has its own."""
+        bands = self.recommended.bands
+        return None if bands is None else bands.ensemble
+
+    @property
+    def recommendation(self) -> Recommendation:
+        """Rank of the recommended model: the first one."""
+        return Recommendation(1, (), 1, ())
+
+    @property
+    def recommended(self) -> CoupledAssessment:
+        """Recommended model."""
+        return self.models[0]
+
+
+#: Result of a search of one or several outputs.
+AnySearchResult: TypeAlias = SearchResult | CoupledSearchResult
+
+
+def require_one_output(found: AnySearchResult) -> SearchResult:
+    """Return the result of a search of one output.
+
+    Raises
+    ------
+    ModelError
+        It is that of several outputs.
+    """
+    if isinstance(found, CoupledSearchResult):
+        raise ModelError(
+            "this is known of each output alone: take its separate result, one of `outputs` of the result"
+        )
+    return found
+
+
+def sum_statistics(searches: Sequence[SearchStatistics], steps: Steps) -> SearchStatistics:
+    """Return the statistics of all searches of several outputs, with the steps that their result lacks."""
+    outcomes = Counter[str]()
+    for search in searches:
+        outcomes.update(search.outcomes)
+    return SearchStatistics(
+        sum(search.evaluations for search in searches),
+        dict(outcomes),
+        {},
+        ended_by="stopped" if steps.left_out else searches[-1].ended_by,
+        left_out=steps.left_out,
+        not_computed=steps.not_computed,
+    )
 
 
 #: Receives a search result before its optional steps.
@@ -220,7 +328,7 @@ def with_bands(
     return state_steps(steps.attempt(BANDS, compute) or found, steps)
 
 
-def state_steps(found: SearchResult, steps: Steps) -> SearchResult:
+def state_steps(found: FoundT, steps: Steps) -> FoundT:
     """Return a search result with the steps that were left out, and those that failed."""
     search = found.search
     if steps.left_out:

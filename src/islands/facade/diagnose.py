@@ -20,7 +20,7 @@ from islands.parallel import ParallelMap
 from islands.progress import ProgressCallback, ignore_progress
 from islands.records.dataset import Dataset
 from islands.records.reading.column_names import list_inputs
-from islands.records.reading.data_frames import as_record
+from islands.records.reading.data_frames import as_dataset
 from islands.records.reading.options import DEFAULT_READING, take_reading
 from islands.records.split import hold_out
 from islands.settings_schema import document_settings
@@ -114,7 +114,7 @@ def diagnose(
     names = [*list_inputs(inputs), *recorded] if recorded else inputs
 
     def read(data: "RecordLike") -> Dataset:
-        return as_record(
+        return as_dataset(
             data, dt=dt, inputs=names, output=output, resting_inputs=True, signals=recorded, **options
         )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from islands.evolution.settings import NARX
 from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
+from islands.facade.coupled.identification import fit_outputs
 from islands.facade.fit_settings import FitSettings
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
@@ -22,6 +24,7 @@ from islands.progress import (
     ignore_progress,
     never_stop,
 )
+from islands.records.coupled import AnyRecord, CoupledRecord, split_coupled, split_first
 from islands.records.dataset import Dataset
 from islands.records.reading.data_frames import read_data
 from islands.records.reading.options import DEFAULT_READING
@@ -42,8 +45,9 @@ def fit(
     dt: float | None = None,
     *,
     inputs: str | Sequence[str] = (),
-    output: str | None = None,
+    output: str | Sequence[str] | None = None,
     validation: "RecordLike | float" = 0.25,
+    refine_together: bool = True,
     seed: int = 0,
     reading: "ReadingLike" = DEFAULT_READING,
     progress: ProgressCallback = ignore_progress,
@@ -52,20 +56,25 @@ def fit(
 ) -> Result:
     """Fit models of increasing size to a record by subset selection and rank them on validation data.
 
+    Of several outputs, the model has one equation per output, which are simulated together; see
+    `islands.facade.coupled.identification.fit_outputs`.
+
     Parameters
     ----------
-    record : Dataset, data frame or array
+    record : record, data frame or array
         Data without missing values, as `as_record` takes them: a `Dataset`; a frame of pandas or polars or an
         xarray Dataset, with ``inputs`` and ``output``; or the inputs as an array, followed by ``y`` and
         ``dt``.
     y : array, optional
-        The output, of shape (samples,), if ``record`` is an array.
+        The output, of shape (samples,), or several, of shape (samples, outputs), if ``record`` is an array.
     dt : float, optional
         Sampling time in seconds. A frame with a time, as its index or as a column, does not need it.
     inputs, output
-        Names of the columns of a frame.
-    validation : Dataset, data frame or float
+        Names of the columns of a frame; ``output`` is one name or several.
+    validation : record, data frame or float
         Data that rank the models: a separate record, or the fraction at the end of ``record``.
+    refine_together : bool
+        Whether the parameters of the equations of several outputs are refined on their common free run.
     seed : int
         Stored in the result; forward selection is deterministic.
     reading : mapping
@@ -74,7 +83,8 @@ def fit(
         Called with a message and the completed fraction.
     stop : callable, optional
         Called before each step. Once it returns true, the fit ends with the models so far, without prediction
-        bands; ``search.ended_by`` of the result is ``stopped``.
+        bands; ``search.ended_by`` of the result is ``stopped``. Several outputs share the time of a
+        `TimeLimit`.
     **settings
 
     Returns
@@ -87,7 +97,7 @@ def fit(
     SettingsError
         A setting is unknown or out of range, or no model could be estimated.
     StoppedError
-        ``stop`` returned true before the first model.
+        ``stop`` returned true before the first model, or before every output had one.
     RecordError
         The record is too short or incomplete, or the validation data has other columns or sampling time.
 
@@ -97,14 +107,23 @@ def fit(
         An input of the validation data leaves the range of the estimation data.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation, reading)
-    warn_of_extrapolation(split_data(record, validation))
-    return fit_record(record, validation, seed=seed, progress=progress, stop=stop, **settings)
+    warn_of_extrapolation(split_first(record, validation))
+    return fit_record(
+        record,
+        validation,
+        refine_together=refine_together,
+        seed=seed,
+        progress=progress,
+        stop=stop,
+        **settings,
+    )
 
 
 def fit_record(
-    record: Dataset,
-    validation: Dataset | float = 0.25,
+    record: AnyRecord,
+    validation: AnyRecord | float = 0.25,
     *,
+    refine_together: bool = True,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
@@ -115,12 +134,12 @@ def fit_record(
 
     Parameters
     ----------
-    record : Dataset
-    validation : Dataset or float
-    seed, progress, stop, **changes
+    record : Dataset or CoupledRecord
+    validation : Dataset, CoupledRecord or float
+    refine_together, seed, progress, stop, **changes
         As for `fit`.
     on_models : callable
-        Called with the ranked models, before the optional steps.
+        Called with the ranked models of each output, before the optional steps.
 
     Raises
     ------
@@ -129,6 +148,11 @@ def fit_record(
     """
     check_seed(seed)
     settings = FitSettings(**changes)
+    if isinstance(record, CoupledRecord):
+        find = partial(fit_record, seed=seed, on_models=on_models)
+        data = split_coupled(record, validation)
+        return fit_outputs(data, find, refine_together, seed, Steps(progress, stop), changes)
+    assert not isinstance(validation, CoupledRecord)
     split = split_data(record, validation)
     held_out = record_document(validation) if isinstance(validation, Dataset) else validation
     if settings.model != NARX:

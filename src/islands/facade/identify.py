@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -36,6 +37,7 @@ from islands.expressions.tree import Primitive
 from islands.expressions.user_primitive import get_source
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.coupled.identification import identify_outputs
 from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.final_models import estimate_candidates, select_final_models
@@ -56,6 +58,7 @@ from islands.progress import (
     never_stop,
 )
 from islands.records.averaging import count_means
+from islands.records.coupled import AnyRecord, CoupledRecord, split_coupled, split_first
 from islands.records.dataset import Dataset
 from islands.records.reading.data_frames import read_data
 from islands.records.reading.options import DEFAULT_READING
@@ -82,8 +85,9 @@ def identify(
     dt: float | None = None,
     *,
     inputs: str | Sequence[str] = (),
-    output: str | None = None,
+    output: str | Sequence[str] | None = None,
     validation: "RecordLike | float" = 0.25,
+    refine_together: bool = True,
     preset: str | Choice = AUTO,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
@@ -96,30 +100,35 @@ def identify(
 ) -> Result:
     """Identify a model of a record by evolution.
 
+    Of several outputs, the model has one equation per output, which are simulated together; see
+    `islands.facade.coupled.identification.identify_outputs`.
+
     Parameters
     ----------
-    record : Dataset, data frame or array
+    record : record, data frame or array
         Data without missing values, as `as_record` takes them: a `Dataset`; a frame of pandas or polars or an
         xarray Dataset, with ``inputs`` and ``output``; or the inputs as an array, followed by ``y`` and
         ``dt``.
     y : array, optional
-        The output, of shape (samples,), if ``record`` is an array.
+        The output, of shape (samples,), or several, of shape (samples, outputs), if ``record`` is an array.
     dt : float, optional
         Sampling time in seconds. A frame with a time, as its index or as a column, does not need it.
     inputs, output
-        Names of the columns of a frame.
-    validation : Dataset, data frame or float
+        Names of the columns of a frame; ``output`` is one name or several.
+    validation : record, data frame or float
         Data that select among the hall of fame: a separate record, or the fraction at the end of ``record``.
+    refine_together : bool
+        Whether the parameters of the equations of several outputs are refined on their common free run.
     preset : str or Choice
         An entry of ``PRESETS``, or ``auto``, which chooses library, primitives, constraints and lags by
         fits that are compared on the validation data. A choice of `choose_preset` is not made again. It has
-        the settings that are not given.
+        the settings that are not given. Of several outputs, ``auto`` is ``narx``.
     seed : int
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
         Called with a message and the completed fraction of each stage before and after the epochs.
     on_epoch : callable, optional
-        Called with the `SearchState` and the `Settings` after every epoch.
+        Called with the `SearchState` and the `Settings` after every epoch, of the search of each output.
     stop : callable, optional
         Called frequently. Once it returns true, the present step ends with the best models so far, and those
         after it are left out: refinement, prediction bands. ``search.ended_by`` of the result is ``stopped``.
@@ -142,7 +151,7 @@ def identify(
     SettingsError
         A setting is unknown or out of range, or no model was found.
     StoppedError
-        ``stop`` returned true before the first models were found.
+        ``stop`` returned true before the first models were found, or before every output had some.
     RecordError
         The record is too short or incomplete, or the validation data do not match it.
     ModelError
@@ -154,10 +163,11 @@ def identify(
         An input of the validation data leaves the range of the estimation data.
     """
     record, validation = read_data(record, y, dt, inputs, output, validation, reading)
-    warn_of_extrapolation(split_data(record, validation))
+    warn_of_extrapolation(split_first(record, validation))
     return identify_record(
         record,
         validation,
+        refine_together=refine_together,
         preset=preset,
         seed=seed,
         progress=progress,
@@ -170,9 +180,10 @@ def identify(
 
 
 def identify_record(
-    record: Dataset,
-    validation: Dataset | float = 0.25,
+    record: AnyRecord,
+    validation: AnyRecord | float = 0.25,
     *,
+    refine_together: bool = True,
     preset: str | Choice = AUTO,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
@@ -187,12 +198,12 @@ def identify_record(
 
     Parameters
     ----------
-    record : Dataset
-    validation : Dataset or float
-    preset, seed, progress, on_epoch, stop, start, engine, **changes
+    record : Dataset or CoupledRecord
+    validation : Dataset, CoupledRecord or float
+    refine_together, preset, seed, progress, on_epoch, stop, start, engine, **changes
         As for `identify`.
     on_models : callable
-        Called with the ranked models, before the optional steps.
+        Called with the ranked models of each output, before the optional steps.
 
     Raises
     ------
@@ -200,8 +211,23 @@ def identify_record(
         As `identify`.
     """
     check_seed(seed)
-    parts = split_data(record, validation)
     steps = Steps(progress, stop)
+    if isinstance(record, CoupledRecord):
+        if isinstance(preset, Choice):
+            raise SettingsError("a choice of auto is for one output: name a preset of several outputs")
+        return identify_outputs(
+            split_coupled(record, validation),
+            partial(identify_record, seed=seed, engine=engine, on_models=on_models),
+            refine_together,
+            seed,
+            steps,
+            changes,
+            preset=preset,
+            start=start,
+            on_epoch=on_epoch,
+        )
+    assert not isinstance(validation, CoupledRecord)
+    parts = split_data(record, validation)
     if preset == AUTO:
         try:
             preset = choose_preset(record, validation, changes, progress, stop)

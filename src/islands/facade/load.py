@@ -8,12 +8,11 @@ from typing import Any, TypeAlias
 from islands.errors import ModelError
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
-from islands.facade.coupled.result import FittedCoupledModel, read_fitted_model
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.reader import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.persistence.models import read_coupled_model, read_model
+from islands.persistence.models import read_model
 from islands.persistence.saved_documents import KINDS, open_document
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.equations import OdeSpec
@@ -21,7 +20,7 @@ from islands.simulators.specification.table import EXTENDED_FILE, LocalExtendedS
 from islands.systems.published_models import get_published_model
 
 #: Values of `load`; each has ``simulate`` and ``export``.
-Loaded: TypeAlias = Result | FittedModel | FittedCoupledModel | SavedSimulation | SavedDiagnosis
+Loaded: TypeAlias = Result | FittedModel | SavedSimulation | SavedDiagnosis
 
 #: A JSON object.
 _Document: TypeAlias = Mapping[str, Any]
@@ -43,7 +42,7 @@ def load(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> 
 
     Returns
     -------
-    Result, FittedModel, FittedCoupledModel, SavedDiagnosis or SavedSimulation
+    Result, FittedModel, SavedDiagnosis or SavedSimulation
         Each has ``simulate(record)`` and ``export(kind, path)``. A model file of a result folder has the
         errors, the warm-up and the prediction bands of the result.
 
@@ -88,15 +87,6 @@ def _load_model(file: Path, _document: _Document, primitives: Mapping[str, Primi
     return FittedModel.from_model(read_model(file, primitives))
 
 
-def _load_coupled(file: Path, document: _Document, primitives: Mapping[str, Primitive]) -> FittedCoupledModel:
-    """Read a model of several outputs, with the warm-up of the errors of its folder."""
-    is_result = file.name == "result.json"
-    model = read_coupled_model(file.parent if is_result else file, primitives)
-    if not is_result:
-        return FittedCoupledModel(model, model.maximum_lag, ())
-    return read_fitted_model(model, document, str(file), primitives)
-
-
 def _load_extended(file: Path, _document: _Document, _primitives: Mapping[str, Primitive]) -> SavedSimulation:
     return _read_extended(file)
 
@@ -121,8 +111,6 @@ _READERS: Mapping[str, Callable[[Path, _Document, Mapping[str, Primitive]], Load
     {
         "islands.result": _load_result,
         "islands.model": _load_model,
-        "islands.coupled-result": _load_coupled,
-        "islands.coupled-model": _load_coupled,
         "islands.extended": _load_extended,
         "islands.discrepancy": _load_diagnosis,
     }

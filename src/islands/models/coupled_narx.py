@@ -111,6 +111,11 @@ class CoupledModel:
         return first.input_names[: max(0, len(first.input_names) - len(self.models) + 1)]
 
     @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of the inputs without the suffix ``+1``."""
+        return self.models[0].column_names[: len(self.input_names)]
+
+    @property
     def dt(self) -> float | None:
         """Sampling time in seconds. None if unspecified."""
         return self.models[0].dt
@@ -202,7 +207,7 @@ class CoupledModel:
             texts.append(self._equation(place))
         return Block(
             equations=tuple(equations),
-            columns=(*self.output_names, *self.models[0].column_names[: len(self.input_names)]),
+            columns=(*self.output_names, *self.column_names),
             signals=(*output_signals(self), *input_signals(self)),
             starts=(),
             leads=self.leads,
@@ -286,6 +291,11 @@ def narx_equations(model: CoupledModel) -> tuple[Model, ...]:
 AnyModel: TypeAlias = DynamicModel | CoupledModel
 
 
+def list_models(model: AnyModel) -> tuple[DynamicModel, ...]:
+    """Return the model of every output."""
+    return model.models if isinstance(model, CoupledModel) else (model,)
+
+
 def measured_coupled_model(model: CoupledModel) -> CoupledModel:
     """Return a model of NARX equations with its offsets inside its expressions; see `measured_model`."""
     return CoupledModel(tuple(map(measured_model, narx_equations(model))))
@@ -350,8 +360,7 @@ def describe_coupled_signals(model: CoupledModel, names: Sequence[str]) -> str:
     """
     offsets = [each.preprocessing.output_offset for each in model.models if each.preprocessing]
     offsets += model.preprocessing.input_offsets if model.preprocessing else ()
-    inputs = model.models[0].column_names[: len(model.input_names)]
-    return join_statements(model, names, (*model.output_names, *inputs), offsets)
+    return join_statements(model, names, (*model.output_names, *model.column_names), offsets)
 
 
 def coupled_text(model: CoupledModel) -> str:

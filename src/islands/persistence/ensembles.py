@@ -1,7 +1,7 @@
 """Ensemble and prediction bands of a result as JSON values."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated, Any
 
@@ -19,7 +19,7 @@ from islands.models.regressor import Regressor, regressor
 from islands.persistence.models import model_from_json, model_json, read_coupled
 from islands.validation.data_range import DataRange
 from islands.validation.ensemble import Ensemble, EnsembleStructure
-from islands.validation.prediction_bands import PredictionBands
+from islands.validation.prediction_bands import OutputBands, PredictionBands
 
 
 class StructureDocument(BaseModel):
@@ -128,6 +128,37 @@ def _structure(
     if parameters.shape[1] != structure.size:
         raise ValueError(f"{parameters.shape[1]} parameters for {structure.size} terms")
     return EnsembleStructure(structure, document.weight, parameters, document.law)
+
+
+def output_bands_from_document(
+    outputs: Sequence[Mapping[str, Any]],
+    shared: Ensemble | None,
+    model: CoupledModel,
+    primitives: Mapping[str, Primitive] = PRIMITIVES,
+) -> OutputBands | None:
+    """Return the bands of every output; None if one has none.
+
+    Parameters
+    ----------
+    outputs : sequence of mapping
+        ``outputs`` of ``result.json``, with the ensemble of each unless all of them have one.
+    shared : Ensemble or None
+        Ensemble of all outputs.
+    model : CoupledModel
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    found = [
+        bands_from_document(
+            each["bands"], shared or ensemble_from_document(each.get("ensemble"), single, primitives)
+        )
+        for each, single in zip(outputs, model.models, strict=True)
+    ]
+    bands = tuple(each for each in found if each is not None)
+    return OutputBands(bands) if len(bands) == len(found) else None
 
 
 def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:

@@ -1,7 +1,8 @@
 """Files of models: JSON with a tag of the class, and the table of classes. Equal models give equal files."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -24,9 +25,6 @@ from islands.models.regressor import Regressor, regressor
 from islands.records.preprocessing_steps import Preprocessing
 
 SCHEMA: Literal["islands.model/1"] = "islands.model/1"
-
-#: Schema of models of several outputs.
-COUPLED_SCHEMA = "islands.coupled-model/1"
 
 #: Tag of NARX models.
 NARX = Model.kind
@@ -170,9 +168,10 @@ def model_json(model: AnyModel) -> str:
             return narx_json(model)
         case CoupledModel():
             models = [json.loads(model_json(single)) for single in model.models]
-            coupled = {"schema": COUPLED_SCHEMA, **model.document(), "models": models}
-            return json.dumps(coupled, indent=2) + "\n"
-    document = {"schema": SCHEMA, "kind": model.kind, **model.document()}
+            content = {**model.document(), "models": models}
+        case _:
+            content = model.document()
+    document = {"schema": SCHEMA, "kind": model.kind, **content}
     try:
         return json.dumps(document, indent=2, allow_nan=False) + "\n"
     except ValueError as error:
@@ -207,8 +206,8 @@ def write_model(model: AnyModel, path: str | Path) -> None:
         raise ModelError(f"cannot write the model file {path}: {error.strerror}") from error
 
 
-def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> DynamicModel:
-    """Read a file of a model of one output.
+def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> AnyModel:
+    """Read the file of a model of one or several outputs.
 
     Parameters
     ----------
@@ -220,13 +219,13 @@ def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVE
     ModelError
         The file does not exist or is not a model file. The message names the invalid field.
     """
-    return model_from_json(_read_text(path), str(path), primitives)
+    return any_model_from_json(_read_text(path), str(path), primitives)
 
 
-def model_from_json(
+def any_model_from_json(
     text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
-) -> DynamicModel:
-    """Parse the text of a file of a model of one output. ``name`` is the name of the file in error messages.
+) -> AnyModel:
+    """Parse the text of a model file. ``name`` is the name of the file in error messages.
 
     Raises
     ------
@@ -237,9 +236,32 @@ def model_from_json(
         document = json.loads(text)
     except ValueError:
         document = None  # reported as a damaged document of a NARX model
-    if isinstance(document, dict) and "kind" in document:
-        return lookup(MODEL_CLASSES, str(document["kind"]), f"class of models of {name}").read(document, name)
-    return read_narx(text, name, primitives)
+    if not isinstance(document, dict) or "kind" not in document:
+        return read_narx(text, name, primitives)
+    readers: dict[str, Callable[[], AnyModel]] = {
+        kind: partial(made.read, document, name) for kind, made in MODEL_CLASSES.items()
+    }
+    for kind in (CoupledModel.kind, CoupledLatentModel.kind):
+        readers[kind] = partial(read_coupled, document, name, primitives)
+    return lookup(readers, str(document["kind"]), f"class of models of {name}")()
+
+
+def model_from_json(
+    text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> DynamicModel:
+    """Parse the text of a file of a model of one output; see `any_model_from_json`.
+
+    Raises
+    ------
+    ModelError
+        As in `read_model`; or the model has several outputs.
+    """
+    model = any_model_from_json(text, name, primitives)
+    if isinstance(model, CoupledModel):
+        raise ModelError(
+            f"{name} has the outputs {', '.join(model.output_names)}: give a model of one output"
+        )
+    return model
 
 
 def read_validated_model(entry: Mapping[str, Any], model: DynamicModel) -> DynamicModel:
@@ -260,23 +282,10 @@ def read_validated_model(entry: Mapping[str, Any], model: DynamicModel) -> Dynam
     return model if found is None else model_from_json(json.dumps(found), "the validated model of the result")
 
 
-def any_model_from_json(
-    text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
-) -> AnyModel:
-    """Parse the text of a file of a model of one or several outputs; see `model_from_json`."""
-    try:
-        document = json.loads(text)
-    except ValueError:
-        document = None
-    if isinstance(document, dict) and document.get("schema") == COUPLED_SCHEMA:
-        return read_coupled(document, name, primitives)
-    return model_from_json(text, name, primitives)
-
-
 def read_coupled(
     document: Mapping[str, Any], name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> CoupledModel:
-    """Read the JSON values of a model of several outputs; see `model_from_json`."""
+    """Read the JSON values of a model of several outputs; see `any_model_from_json`."""
     entries = document.get("models")
     if not isinstance(entries, list):
         raise ModelError(f"{name}: models: there is no list of models")
@@ -291,30 +300,6 @@ def read_coupled(
 def narx_from_json(text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:
     """Parse the text of a NARX model of one output; other models raise `ModelError`."""
     return require_narx(model_from_json(text, name, primitives))
-
-
-def read_coupled_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> CoupledModel:
-    """Read the file of a model of several outputs, or ``model.json`` of a result folder.
-
-    Parameters
-    ----------
-    primitives : mapping
-        As in `read_model`.
-
-    Raises
-    ------
-    ModelError
-        The file does not exist or is not a model of several outputs. The message names the invalid field.
-    """
-    file = Path(path)
-    file = file / "model.json" if file.is_dir() else file
-    try:
-        document = json.loads(_read_text(file))
-    except ValueError as error:
-        raise ModelError(f"cannot read the model file {file}: {error}") from error
-    if not isinstance(document, dict) or document.get("schema") != COUPLED_SCHEMA:
-        raise ModelError(f"{file} is not a coupled model of schema {COUPLED_SCHEMA}")
-    return read_coupled(document, str(file), primitives)
 
 
 def _read_text(path: str | Path) -> str:

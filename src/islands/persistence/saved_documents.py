@@ -11,8 +11,7 @@ from islands.estimation.estimator_table import Criterion
 from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.models.coupled_narx import AnyModel
-from islands.models.protocol import DynamicModel
-from islands.persistence.models import read_coupled_model, read_model, terms_document
+from islands.persistence.models import read_model, terms_document
 
 #: Files and folders that can be opened, for messages.
 KINDS = (
@@ -21,7 +20,10 @@ KINDS = (
 )
 
 #: Files that say what a folder holds; the first one that exists counts.
-_FILES = ("discrepancy.json", "extended.json", "result.json", "model.json")
+_FILES = ("discrepancy.json", "extended.json", "result.json")
+
+#: Schema of the document of a result, without its version.
+RESULT = "islands.result"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +99,6 @@ def read_saved_model(
     match saved.schema:
         case "islands.model":
             return read_model(saved.file, primitives)
-        case "islands.coupled-model":
-            return read_coupled_model(saved.file, primitives)
-        case "islands.coupled-result":
-            return read_coupled_model(saved.file.parent, primitives)
         case "islands.result":
             try:
                 entry = find_recommended(saved.content)
@@ -118,7 +116,7 @@ def find_recommended(result: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def read_listed_model(
     folder: Path, entry: Mapping[str, Any], primitives: Mapping[str, Primitive] = PRIMITIVES
-) -> DynamicModel:
+) -> AnyModel:
     """Read the model file of an entry of ``result.json``.
 
     Raises
@@ -138,21 +136,6 @@ def read_listed_model(
             "give a changed model as a file outside of the folder"
         )
     return model
-
-
-def check_single_output(document: Mapping[str, Any], folder: Path) -> None:
-    """Check that ``result.json`` is the result of one output.
-
-    Raises
-    ------
-    ModelError
-        It is a result of several outputs; the message names their folders.
-    """
-    if str(document.get("schema", "")).startswith("islands.coupled-result/"):
-        raise ModelError(
-            f"{folder} has a model of several outputs, which islands.load and read_coupled_model open: give "
-            f"the result of one output, as {folder / 'outputs' / '1-NAME'}"
-        )
 
 
 def read_shooting_interval(document: Mapping[str, Any]) -> int:

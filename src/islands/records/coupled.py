@@ -12,7 +12,7 @@ from islands.records.channel_names import parse_channel_name
 from islands.records.compatibility import ColumnReference, match_record
 from islands.records.dataset import Dataset
 from islands.records.missing_outputs import skip_missing_outputs
-from islands.records.split import Split, split_data
+from islands.records.split import Split, split, split_data
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,6 +146,11 @@ class CoupledRecord:
 AnyRecord: TypeAlias = Dataset | CoupledRecord
 
 
+def unite(records: Sequence[Dataset]) -> AnyRecord:
+    """Return the record of several outputs, one record for each, or the only record."""
+    return records[0] if len(records) == 1 else CoupledRecord(tuple(records))
+
+
 @dataclass(frozen=True, slots=True)
 class CoupledSplit:
     """Estimation data and validation data of several outputs.
@@ -233,8 +238,8 @@ def check_outputs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
             raise RecordError(f"{name} is an input and an output: remove one of them")
 
 
-def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[str], str]:
-    """Return the inputs and the output of one record with all columns, for `couple`.
+def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
+    """Return the inputs and the output of one record with all columns, for `couple`; None without output.
 
     Raises
     ------
@@ -243,11 +248,11 @@ def join_columns(inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[st
     """
     if len(outputs) > 1:
         check_outputs(inputs, outputs)
-    return [*inputs, *outputs[1:]], outputs[0]
+    return (*inputs, *outputs[1:]), next(iter(outputs), None)
 
 
-def couple(record: Dataset, outputs: int) -> CoupledRecord:
-    """Return the coupled record of a record whose last inputs are the outputs after the first.
+def couple(record: Dataset, outputs: int) -> AnyRecord:
+    """Return the record of several outputs of a record whose last inputs are the outputs after the first.
 
     Reading all outputs at once cuts the record at the gaps of every one.
 
@@ -255,8 +260,10 @@ def couple(record: Dataset, outputs: int) -> CoupledRecord:
     ----------
     record : Dataset
     outputs : int
-        Number of outputs, at least two.
+        Number of outputs. The record itself is returned for less than two.
     """
+    if outputs < 2:
+        return record
     first = record.inputs - outputs + 1
     single = record.first_inputs(first)
     others = [
@@ -265,10 +272,28 @@ def couple(record: Dataset, outputs: int) -> CoupledRecord:
             record.u.T[first:], record.input_names[first:], record.input_units[first:], strict=True
         )
     ]
-    return CoupledRecord((single, *others))
+    return unite([single, *others])
 
 
-def split_coupled(record: CoupledRecord, validation: CoupledRecord | float) -> CoupledSplit:
+def split_record(record: AnyRecord, fraction: float) -> tuple[AnyRecord, AnyRecord]:
+    """Return a record without its end, and the end, as `islands.split` does; missing outputs stay."""
+    parts = [split(each, fraction) for each in record.records]
+    return unite([part.estimation for part in parts]), unite([part.validation for part in parts])
+
+
+def split_first(record: AnyRecord, validation: AnyRecord | float) -> Split:
+    """Return the split of a record of one output, or that of the first of several; see `split_data`."""
+    if isinstance(record, CoupledRecord):
+        return split_coupled(record, validation).first
+    if isinstance(validation, CoupledRecord):
+        raise RecordError(
+            f"the record has the output {record.output_name}, the validation data "
+            f"{', '.join(validation.output_names)}: give both the same outputs"
+        )
+    return split_data(record, validation)
+
+
+def split_coupled(record: CoupledRecord, validation: AnyRecord | float) -> CoupledSplit:
     """Return estimation data and validation data, split at the same samples for every output.
 
     Samples of which an output is missing are skipped.
@@ -287,12 +312,13 @@ def split_coupled(record: CoupledRecord, validation: CoupledRecord | float) -> C
         The fraction leaves a part empty, or the validation data has samples of the record.
     """
     complete = record.skip_missing()
-    if isinstance(validation, CoupledRecord):
+    if isinstance(validation, Dataset | CoupledRecord):
         if validation.output_names != record.output_names:
             raise RecordError(
                 f"the record has the outputs {', '.join(record.output_names)}, the validation data "
                 f"{', '.join(validation.output_names)}: give both the same outputs in one order"
             )
+        assert isinstance(validation, CoupledRecord)
         held_out: list[Dataset | float] = list(validation.skip_missing().records)
     else:
         held_out = [validation] * len(complete.records)

@@ -134,6 +134,20 @@ class Dataset:
         return int(self.u.shape[1])
 
     @property
+    def records(self) -> tuple["Dataset"]:
+        """The record of every output, as of several."""
+        return (self,)
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return (self.output_name,)
+
+    def map(self, function: "Callable[[Dataset], Dataset]") -> "Dataset":
+        """Return the record with a function applied to the record of every output."""
+        return function(self)
+
+    @property
     def time(self) -> NDArray[np.float64]:
         """Time of every sample in seconds, shape (samples,). Recordings follow each other without a pause."""
         return self.start + self.dt * np.arange(self.samples, dtype=np.float64)

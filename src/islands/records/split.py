@@ -121,29 +121,6 @@ def describe_extrapolation(parts: Split) -> list[str]:
     return compare_input_ranges(record.input_names, record.input_units, estimated, validated)
 
 
-def describe_search_extrapolation(
-    record: Dataset, validation: Dataset | float, outputs: int = 1
-) -> list[str]:
-    """State, before a search, which inputs of the validation data leave the range of the estimation data.
-
-    Parameters
-    ----------
-    record : Dataset
-    validation : Dataset or float
-        Validation data, or their fraction of the record.
-    outputs : int
-        Number of outputs; those after the first are the last inputs of both records.
-
-    Raises
-    ------
-    RecordError, SettingsError
-        As `split_data`.
-    """
-    inputs = record.inputs - outputs + 1
-    held_out = validation.first_inputs(inputs) if isinstance(validation, Dataset) else validation
-    return describe_extrapolation(split_data(record.first_inputs(inputs), held_out))
-
-
 def warn_of_extrapolation(parts: Split) -> None:
     """Warn the caller of a search of every input whose validation data leave the range of the estimation."""
     for statement in describe_extrapolation(parts):

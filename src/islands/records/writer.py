@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError, check_type
-from islands.records.coupled import CoupledRecord
+from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset
 
 #: Lower and upper limit of a prediction band.
@@ -58,39 +58,25 @@ def input_csv(u: NDArray[np.float64], dt: float, name: str) -> str:
 
 
 def write_simulation(
-    record: Dataset, simulated: NDArray[np.float64], path: str | Path, band: Band | None = None
+    record: AnyRecord, simulated: NDArray[np.float64], path: str | Path, band: Band | None = None
 ) -> None:
     """Write the columns ``time`` (s) and ``y_sim``, one row for every sample of the record.
 
+    Several outputs have one column each, such as ``level_cm_sim``.
+
     Parameters
     ----------
-    simulated : ndarray, shape (samples,)
-        Simulated output. NaN, as in the warm-up, is written as ``nan``.
+    simulated : ndarray, shape (samples,) or (samples, outputs)
+        Simulated outputs. NaN, as in the warm-up, is written as ``nan``.
     band : (ndarray, ndarray), optional
-        Limits of a prediction band, written as the columns ``y_low`` and ``y_high``; each has the shape of
-        ``simulated``.
+        Limits of a prediction band, written as the columns ``y_low`` and ``y_high`` (``level_cm_low`` ..);
+        each has the shape of ``simulated``.
     """
-    columns = [simulated, *(band or ())]
-    names = ("time", "y_sim", "y_low", "y_high")[: 1 + len(columns)]
-    rows = zip(_round_times(record), *(column.tolist() for column in columns), strict=True)
-    _write(path, names, rows)
-
-
-def write_coupled_simulation(
-    record: CoupledRecord, simulated: NDArray[np.float64], path: str | Path, bands: Sequence[Band] = ()
-) -> None:
-    """Write the column ``time`` (s) and one column per output, such as ``level_cm_sim``.
-
-    Parameters
-    ----------
-    simulated : ndarray, shape (samples, outputs)
-    bands : sequence of (ndarray, ndarray)
-        Limits of the prediction band of each output, written as the columns ``level_cm_low`` and
-        ``level_cm_high``; none by default.
-    """
-    columns = {f"{name}_sim": y for name, y in zip(record.output_names, simulated.T, strict=True)}
-    for name, (lower, upper) in zip(record.output_names, bands, strict=False):
-        columns |= {f"{name}_low": lower, f"{name}_high": upper}
+    names = ["y"] if len(record.records) == 1 else record.output_names
+    columns: dict[str, NDArray[np.float64]] = {}
+    for end, values in zip(("sim", "low", "high"), (simulated, *(band or ())), strict=False):
+        outputs = values.reshape(record.samples, -1).T
+        columns |= {f"{name}_{end}": y for name, y in zip(names, outputs, strict=True)}
     rows = zip(_round_times(record.records[0]), *(each.tolist() for each in columns.values()), strict=True)
     _write(path, ("time", *columns), rows)
 

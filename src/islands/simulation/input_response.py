@@ -9,8 +9,7 @@ from islands.errors import SettingsError
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel, no_model_error
 from islands.records.compatibility import ColumnReference, match_record
-from islands.records.coupled import AnyRecord, CoupledRecord
-from islands.records.dataset import Dataset
+from islands.records.coupled import AnyRecord
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import BOUND, Simulation
 from islands.simulation.stepper import Stepper, measure_offsets, read_inputs
@@ -116,24 +115,19 @@ def simulate_inputs(
     ModelError, RecordError, SettingsError
         As for `input_response`; or the record does not match the model.
     """
-    first = record.records[0] if isinstance(record, CoupledRecord) else record
     columns, output = model.block().columns, model.block().outputs
     inputs = columns[len(columns) - len(model.input_names) :]
-    data = match_record(ColumnReference(inputs, columns[0], model.dt, model.average), first)
+    data = match_record(ColumnReference(inputs, columns[0], model.dt, model.average), record.records[0])
     done = data.preprocessing
     u = data.u + (done.input_offsets if done else 0.0)
     measured = record.y.reshape(len(u), output)
     runs = [input_response(model, u[begin:end], y, 0.0, states) for begin, end in data.bounds]
     found = np.concatenate([each.y.reshape(-1, output) for each in runs])
-    found -= [each.preprocessing.output_offset if each.preprocessing else 0.0 for each in _list(record)]
+    found -= [each.preprocessing.output_offset if each.preprocessing else 0.0 for each in record.records]
     outcome = next((each.outcome for each in runs if not each.outcome), OK)
     errors = np.mean((found - measured) ** 2, axis=0) if outcome else np.full(output, np.inf)
     is_coupled = isinstance(model, CoupledModel)
     return Simulation(found if is_coupled else found[:, 0], tuple(errors.tolist()), outcome)
-
-
-def _list(record: AnyRecord) -> tuple[Dataset, ...]:
-    return record.records if isinstance(record, CoupledRecord) else (record,)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -133,7 +133,7 @@ def _simulate_block(
     bound: float | None,
 ) -> Simulation:
     """Simulate the block of a model."""
-    signals, offsets = _map(model, record)
+    signals, offsets = map_model_signals(model, record)
     block, outputs = model.block(), np.atleast_2d(signals.y.T)
     bounds = [divergence_bound(y) if bound is None else bound for y in outputs]
     simulate_record = make_simulator(model, signals, interval, warm_up)
@@ -147,7 +147,7 @@ def _simulate_block(
     return Simulation(y, tuple(float(dot(each, 0, each, 0, each.size)) / each.size for each in errors), OK)
 
 
-def _map(model: AnyModel, record: AnyRecord) -> tuple[AnyRecord, NDArray[np.float64] | float]:
+def map_model_signals(model: AnyModel, record: AnyRecord) -> tuple[AnyRecord, NDArray[np.float64] | float]:
     """Return the signals of a model, and the offsets that are added to its outputs."""
     if not isinstance(model, CoupledModel):
         return map_signals(model, _require_one_output(record))
@@ -233,7 +233,7 @@ def free_runs(
     RecordError
         The record does not match the model, is too short, or its output is missing in a warm-up.
     """
-    signals, offset = _map(model, record)
+    signals, offset = map_model_signals(model, record)
     if not isinstance(model, Model):
         outputs = np.atleast_2d(signals.y.T)
         bounds = [divergence_bound(y) for y in outputs]

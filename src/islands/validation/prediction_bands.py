@@ -16,15 +16,17 @@ outside together.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError, check_numbers
-from islands.models.coupled_narx import CoupledModel
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.records.compatibility import match_record
-from islands.records.coupled import AnyRecord, CoupledSplit
+from islands.records.coupled import AnyRecord, CoupledRecord, CoupledSplit, match_coupled
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
 from islands.records.split import Split
@@ -52,7 +54,7 @@ class PredictionBand:
     ----------
     level : float
         Probability, between 0.5 and 0.99.
-    y, lower, upper : ndarray, shape (samples,)
+    y, lower, upper : ndarray, shape (samples,) or (samples, outputs)
         Free run and limits of the band, in the unit of the output. NaN during the warm-up and after a
         divergence. The limits are infinite where more than a tenth of the ensemble has diverged.
     """
@@ -61,6 +63,14 @@ class PredictionBand:
     y: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
+
+    @property
+    def outputs(self) -> tuple["PredictionBand", ...]:
+        """The band of every output."""
+        if self.y.ndim == 1:
+            return (self,)
+        columns = zip(self.y.T, self.lower.T, self.upper.T, strict=True)
+        return tuple(PredictionBand(self.level, *each) for each in columns)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +107,7 @@ class PredictionBands:
     independent_samples: float | None = None
 
     def predict(
-        self, model: DynamicModel, record: Dataset, level: float = LEVEL, warm_up: int | None = None
+        self, model: AnyModel, record: AnyRecord, level: float = LEVEL, warm_up: int | None = None
     ) -> PredictionBand:
         """Simulate a record with a band.
 
@@ -122,7 +132,14 @@ class PredictionBands:
         first = model.maximum_lag if warm_up is None else warm_up
         run = simulate_freely(model, record, first).y
         runs = self.ensemble.simulate(record, first)
-        return self.band(match_record(model, match_rate(model, record)), run, runs, level)
+        assert isinstance(model, DynamicModel), "several outputs have `OutputBands`"
+        (single,) = record.records
+        return self.band(match_record(model, match_rate(model, single)), run, runs, level)
+
+    @property
+    def outputs(self) -> tuple["PredictionBands"]:
+        """The bands of every output, as of several."""
+        return (self,)
 
     def band(
         self,
@@ -168,6 +185,56 @@ class PredictionBands:
         return float(np.interp(level, levels, [self.factors[each] for each in levels]))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class OutputBands:
+    """Prediction bands of a model of several outputs, of every level.
+
+    Attributes
+    ----------
+    outputs : tuple of PredictionBands
+        Bands of each output.
+    """
+
+    outputs: tuple[PredictionBands, ...]
+
+    @property
+    def ensemble(self) -> Ensemble | None:
+        """The ensemble of all outputs; None if every output has its own."""
+        first = self.outputs[0].ensemble
+        return first if all(each.ensemble is first for each in self.outputs) else None
+
+    def predict(
+        self, model: AnyModel, record: AnyRecord, level: float = LEVEL, warm_up: int | None = None
+    ) -> PredictionBand:
+        """Simulate a record with a band for every output; see `PredictionBands.predict`."""
+        assert isinstance(model, CoupledModel), "one output has `PredictionBands`"
+        assert isinstance(record, CoupledRecord), "the record matches the model"
+        first = model.maximum_lag if warm_up is None else warm_up
+        data = match_coupled(model, record.map(partial(match_rate, model)))
+        run = free_run(model, data, first).y
+        bands = [
+            each.band(one, y, runs, level)
+            for each, one, y, runs in zip(
+                self.outputs, data.records, run.T, self._simulate(model, data, first), strict=True
+            )
+        ]
+        lower, upper = ([getattr(band, limit) for band in bands] for limit in ("lower", "upper"))
+        return PredictionBand(level, run, np.column_stack(lower), np.column_stack(upper))
+
+    def _simulate(self, model: CoupledModel, data: CoupledRecord, warm_up: int) -> list[NDArray[np.float64]]:
+        """Return the free runs of the ensemble of every output, each of shape (members, samples)."""
+        if self.ensemble is not None:
+            return list(np.moveaxis(self.ensemble.simulate(data, warm_up), 2, 0))
+        return [
+            each.ensemble.simulate(model.separate(data, place), warm_up)
+            for place, each in enumerate(self.outputs)
+        ]
+
+
+#: Prediction bands of a model of one or several outputs.
+AnyBands: TypeAlias = PredictionBands | OutputBands
+
+
 def calibrate_bands(
     models: Sequence[DynamicModel], ensemble: Ensemble, split: Split, warm_up: int
 ) -> tuple[PredictionBands | None, ...]:
@@ -208,8 +275,8 @@ def calibrate_bands(
 
 def calibrate_output_bands(
     model: CoupledModel, ensemble: Ensemble, split: CoupledSplit, warm_up: int
-) -> tuple[PredictionBands, ...]:
-    """Calibrate the bands of every output of a model; none if it diverges on a part of the data.
+) -> OutputBands | None:
+    """Calibrate the bands of every output of a model; None if it diverges on a part of the data.
 
     Parameters
     ----------
@@ -225,15 +292,15 @@ def calibrate_output_bands(
         for record in (split.estimation, split.validation)
     ]
     if not all(run.outcome for _, run, _ in parts):
-        return ()
+        return None
     for place in range(len(model.models)):
         outputs = [
             _Output(record.records[place], run.y[:, place], runs[..., place]) for record, run, runs in parts
         ]
         if (calibrated := _calibrate(ensemble, outputs)) is None:
-            return ()
+            return None
         found.append(calibrated)
-    return tuple(found)
+    return OutputBands(tuple(found))
 
 
 def _list_samples(samples: int) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
 from islands.evolution.settings import NARX, Settings
 from islands.persistence.models import MODEL_CLASSES
-from islands.records.coupled import join_columns
+from islands.records.coupled import check_outputs
 from islands.records.reading.options import ReadingOptions
 from islands.simulators.specification.code import FmuSpec
 from islands.simulators.specification.table import parse_spec
@@ -71,17 +71,18 @@ def submit(
     """Upload recordings and submit a job that identifies one model of them."""
     names, outputs = options.columns(inputs), options.columns(output_columns)
     read = reading.changes()
-    _, output_column = join_columns(names, outputs)
+    if len(outputs) > 1:
+        check_outputs(names, outputs)
     held_out = parse_held_out(validation)
     if isinstance(held_out, str) and len(records) > 1:
         raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with open_client(url, key) as client:
-        whole = output_column if rows is None else None
+        whole = outputs[0] if rows is None else None
         dataset, *others = (client.upload(record, names, whole, dt, read) for record in records)
         validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
-                validation_data = {"dataset": client.upload(held_out, names, output_column, dt, read).id}
+                validation_data = {"dataset": client.upload(held_out, names, outputs[0], dt, read).id}
             case str():
                 validation_data = {"dataset": dataset.id, "rows": held_out}
             case _:
@@ -89,7 +90,7 @@ def submit(
         job = client.submit(
             dataset,
             names,
-            outputs if len(outputs) > 1 else output_column,
+            outputs if len(outputs) > 1 else outputs[0],
             model=model,
             preset=preset,
             seed=seed,

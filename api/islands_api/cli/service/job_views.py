@@ -14,8 +14,7 @@ from rich.table import Table
 
 from islands.cli.console import output
 from islands.cli.progress_display import format_duration, progress
-from islands.models.coupled_narx import CoupledModel
-from islands.models.protocol import DynamicModel
+from islands.models.coupled_narx import list_models
 from islands.persistence.models import any_model_from_json
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.layout import LEGEND, MARK, term_table, wrap
@@ -168,8 +167,7 @@ def _describe_recommended(client: Client, job: JobView, models: Sequence[ModelVi
         return
     rank = next((model.rank for model in models if model.recommended), 1)
     model = any_model_from_json(client.export(job.id, rank, "json"), f"model {rank}")
-    singles: Sequence[DynamicModel] = model.models if isinstance(model, CoupledModel) else (model,)
-    terms = [line for single in singles for line in term_table(single)]
+    terms = [line for single in list_models(model) for line in term_table(single)]
     # The equation in one line is indented.
     words = str((job.summary or {}).get("words", "")).splitlines()
     equation = next((at for at, line in enumerate(words) if line.startswith(" ")), len(words))
@@ -236,9 +234,6 @@ def download(client: Client, job: str, document: dict[str, Any], folder: Path) -
         for done, (name, rank) in enumerate(names):
             show(name, done / len(names))
             (folder / "figures" / f"{name}.svg").write_bytes(client.figure(job, name, rank))
-    if "outputs" in document:
-        # As `islands fit` writes it.
-        (folder / "model.json").write_text(client.export(job, 1, "json"), encoding="utf-8")
     _write_document(document, folder / "result.json")
 
 

@@ -32,7 +32,7 @@ from islands_service.domain.job import (
     IDENTIFICATION,
     MONITORING,
     REPORT,
-    name_free_run,
+    name_free_run_artefacts,
 )
 from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.confined_process import REQUESTS
@@ -209,7 +209,7 @@ async def simulation(
         raise ResourceNotFoundError(
             f"the model has {outputs} output{'s' * (outputs > 1)}, there is no {output}"
         )
-    name = name_free_run(rank, output if outputs > 1 else None)
+    name = name_free_run_artefacts(rank, outputs)[output - 1]
     return await _figure_response(state, caller, job, name, rank, "application/json")
 
 

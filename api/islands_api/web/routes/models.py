@@ -9,7 +9,6 @@ from islands.persistence.models import any_model_from_json
 from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset
 from islands_api.result_schemas import (
-    CoupledIdentificationResult,
     DiscrepancyResult,
     IdentificationResult,
     MonitoredRecordResult,
@@ -42,7 +41,7 @@ from islands_service.store.results import StoredModel
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES, route_class=StrictRoute)
 
 #: Results of all kinds of jobs.
-AnyResult = IdentificationResult | CoupledIdentificationResult | DiscrepancyResult | MonitoredRecordResult
+AnyResult = IdentificationResult | DiscrepancyResult | MonitoredRecordResult
 
 #: Path parameter: the rank of a model in its result.
 Rank = Annotated[int, Path(ge=1, le=10_000, description="1 has the least error on the validation data.")]
@@ -119,10 +118,7 @@ async def exported(
 
 @router.get(
     "/{job}/result",
-    response_model=IdentificationResult
-    | CoupledIdentificationResult
-    | DiscrepancyResult
-    | MonitoredRecordResult,
+    response_model=IdentificationResult | DiscrepancyResult | MonitoredRecordResult,
 )
 async def result(job: Id, caller: Reader, state: AppStateDep) -> Any:
     """Return the whole result, in the form of `result.json` or `discrepancy.json`."""

@@ -20,6 +20,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.paper_search import estimate_again, list_models, rank_models, run_island
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.facade.identify import identify_record
+from islands.models.coupled_narx import AnyModel
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.records.dataset import Dataset
@@ -88,7 +89,7 @@ def demo(
                 islands=ISLANDS,
                 progress=searching,
                 on_epoch=searching.show_epoch,
-                on_models=keep_models(out),
+                on_models=keep_models(out, estimation.output_names),
                 stop=stop,
                 engine=engine,
             )
@@ -173,7 +174,7 @@ def _describe_origin(name: str) -> str:
     return "estimated again"
 
 
-def _compute_metrics(model: DynamicModel, record: Dataset, warm_up: int) -> Metrics:
+def _compute_metrics(model: AnyModel, record: Dataset, warm_up: int) -> Metrics:
     """Return the metrics of a free run."""
     return metrics(record.y, free_run(model, record, warm_up).y)
 

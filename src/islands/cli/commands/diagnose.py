@@ -259,9 +259,9 @@ def _read_record(
     """Read the recordings, and separately the column of a simulation that was recorded in them."""
     extra = [] if column is None else [column]
     names = [simulation_options.single_input(inputs), *channels, *extra]
-    recordings = Recordings(records, names, output_column, dt, reading, resting_inputs=True, signals=extra)
-    whole = recordings.read(rows)
+    recordings = Recordings(records, names, [output_column], dt, reading, resting_inputs=True, signals=extra)
+    (whole,) = recordings.read(rows).records
     if validation is not None:
-        whole = hold_out(whole, replace(recordings, paths=[validation]).read())
+        whole = hold_out(whole, replace(recordings, paths=[validation]).read().records[0])
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

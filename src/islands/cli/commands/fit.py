@@ -2,23 +2,18 @@
 
 from functools import partial
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Annotated
 
-import islands
 from islands.cli import options
-from islands.cli.output_folder import check_folder, keep_models, show_result
+from islands.cli.output_folder import check_folder, keep_models, run_search, show_result
 from islands.cli.progress_display import compile_kernels, progress
-from islands.cli.recordings import Recordings, measured_names, state_extrapolation
-from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
+from islands.cli.recordings import Recordings, state_extrapolation
 from islands.cli.settings_options import Given, with_settings
 from islands.cli.stop_requests import REPEAT, stop_requests
-from islands.errors import SettingsError
 from islands.evolution.settings import NARX
 from islands.facade.fit_settings import FitSettings
 from islands.facade.identification_progress import class_phases, fit_phases
 from islands.progress import PhasedProgress, Steps
-from islands.records.averaging import AUTO
-from islands.records.coupled import join_columns, split_coupled
 from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading.options import ReadingOptions
 from islands.report.figures.names import FREE_RUN, parse_figures
@@ -45,20 +40,15 @@ def fit(
     check_folder(out, force)
     drawn, settings = parse_figures(figures), FitSettings(**changes)
     outputs = options.columns(output_columns)
-    names, output_column = join_columns(options.columns(inputs), outputs)
-    if len(outputs) == 1:
-        recordings = Recordings(records, names, output_column, dt, reading, steps)
-    else:
-        recordings = Recordings(records, measured_names(names, steps), output_column, dt, reading)
+    recordings = Recordings(records, options.columns(inputs), outputs, dt, reading, steps)
     # Read first: an error in a file is shown before the kernels are compiled, which takes a minute.
     with progress("fit") as show:
         show("reading", 0.0)
         data = recordings.read(rows)
         held_out = recordings.read_held_out(validation, rows)
-    state_extrapolation(data, held_out, len(outputs))
+    state_extrapolation(data, held_out)
     compile_kernels()
     # The fits load the kernels, which the help of the command does not need.
-    from islands.facade.coupled.identification import fit_coupled_data  # noqa: PLC0415
     from islands.facade.fit import fit_record  # noqa: PLC0415
 
     with progress("fit") as show, stop_requests() as stop:
@@ -70,23 +60,17 @@ def fit(
             if is_narx
             else class_phases(settings.model, data.samples, several)
         )
-        given: dict[str, Any] = {
+        search = partial(
+            fit_record,
+            data,
+            held_out,
+            on_models=keep_models(out, data.output_names),
+            seed=seed,
+            progress=PhasedProgress(show, phases),
+            stop=stop,
             **changes,
-            "seed": seed,
-            "progress": PhasedProgress(show, phases),
-            "stop": stop,
-        }
-        result: islands.Result | islands.CoupledResult
-        if len(outputs) > 1:
-            if settings.delays:
-                raise SettingsError("delays are for one output: leave them out")
-            if settings.library == AUTO:
-                given.pop("library", None)
-            record, held = couple_data(data, [held_out], len(outputs), steps, names)
-            fit_all = partial(fit_coupled_data, split_coupled(record, held), **coupled_options(given))
-            result = search_outputs(fit_all, out, stop, drawn)
-        else:
-            result = fit_record(data, held_out, on_models=keep_models(out), **given)
+        )
+        result = run_search(search, out, stop, drawn)
         result = result.with_wall_time(perf_counter() - began)
         show("figures", 1.0)
         drawing = Steps(stop=stop)

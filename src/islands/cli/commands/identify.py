@@ -13,7 +13,6 @@ from islands.cli.settings_options import GIVEN, Given, split_settings, with_sett
 from islands.errors import SettingsError
 from islands.evolution.presets import AUTO
 from islands.evolution.settings import Settings
-from islands.records.coupled import join_columns
 from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading import fingerprint
 from islands.records.reading.options import ReadingOptions
@@ -63,8 +62,6 @@ def identify(
         if not records or not inputs or not outputs or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
-        names, output_column = join_columns(options.columns(inputs), outputs)
-        several = len(outputs) > 1
         paths = [str(path.resolve()) for path in records]
         given = {"validation": validation, "test": test}
         files = {
@@ -75,9 +72,8 @@ def identify(
             **given,
             **files,
             "sha256": {path: fingerprint(path) for path in (*paths, *files.values())},
-            "inputs": names,
-            "output": output_column,
-            **({"outputs": len(outputs)} if several else {}),
+            "inputs": options.columns(inputs),
+            "outputs": outputs,
             "dt": dt,
             "rows": rows,
             "reading": reading.changes(),

@@ -135,9 +135,10 @@ class _Reader:
         inner = innermost(self.spec)
         extra = [inner.column] if isinstance(inner, ColumnSpec) else []
         names = [*self.inputs, *extra]
-        whole = Recordings(
-            *([path], names, self.output, self.dt, self.reading), resting_inputs=True, signals=extra
-        ).read()
+        recordings = Recordings(
+            *([path], names, [self.output], self.dt, self.reading), resting_inputs=True, signals=extra
+        )
+        (whole,) = recordings.read().records
         kept = len(self.inputs)
         return whole.first_inputs(kept), dict.fromkeys(extra, whole.u[:, -1])
 

@@ -17,6 +17,7 @@ from islands.models.equations import named_signals
 from islands.models.operating_point import parse_levels
 from islands.models.state_space import FORMS
 from islands.persistence.saved_documents import open_document, read_saved_model
+from islands.records.coupled import couple, join_columns
 from islands.records.reading import read_dataset
 from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
@@ -133,7 +134,7 @@ def _show_linear(
     from islands.facade.results.model_analysis import split_point  # noqa: PLC0415
 
     loaded = islands.load(name)
-    if not isinstance(loaded, islands.Result | islands.FittedModel | islands.FittedCoupledModel):
+    if not isinstance(loaded, islands.Result | islands.FittedModel):
         raise SettingsError(f"a linear system is that of a model, and {name} is none")
     model = loaded.best.model if isinstance(loaded, islands.Result) else loaded.model
     at = split_point(model, values)
@@ -168,9 +169,10 @@ def _draw(
     loaded = islands.load(name)
     model = loaded.best if isinstance(loaded, islands.Result) else loaded
     if not isinstance(model, islands.FittedModel):
-        raise SettingsError(f"--figure is for a model of one output, and {name} is none")
+        raise SettingsError(f"--figure is that of a model, and {name} is none")
     stated = model.model
-    data = read_dataset(record, stated.column_names, stated.output_name, dt, rows, options=reading)
+    columns, first = join_columns(stated.column_names, model.output_names)
+    data = read_dataset(record, columns, first, dt, rows, options=reading)
     from islands.report.figures.style import save  # noqa: PLC0415 - matplotlib takes half a second
 
-    save(model.plot(figure, data), out)
+    save(model.plot(figure, couple(data, len(model.output_names))), out)

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
@@ -16,33 +17,31 @@ from islands.cli.console import output
 from islands.cli.progress_display import compile_kernels
 from islands.cli.settings_options import with_settings
 from islands.errors import ExtrapolationWarning, ModelError, SettingsError
-from islands.facade.coupled.result import FittedCoupledModel
 from islands.facade.load import Loaded, load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
-from islands.facade.results.model_simulation import SHOOTING
+from islands.facade.results.model_simulation import SHOOTING, match_columns
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
-from islands.models.coupled_narx import AnyModel, coupled_signals
+from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals
 from islands.models.equations import named_signals
 from islands.models.operating_point import parse_levels
-from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_values
-from islands.records.coupled import AnyRecord, CoupledRecord, match_coupled
+from islands.records.coupled import AnyRecord, unite
 from islands.records.dataset import Dataset, same_dt
 from islands.records.preprocessing import preprocess
 from islands.records.preprocessing_steps import DETREND
-from islands.records.reading import read_columns, read_dataset
+from islands.records.reading import read_dataset
 from islands.records.reading.column_names import find_column
 from islands.records.reading.open_table import read_table
 from islands.records.reading.options import ReadingOptions
 from islands.records.reading.reader import open_record
 from islands.records.reading.row_range import parse_rows
-from islands.records.signal_map import map_signals, match_rate
 from islands.records.split import compare_input_ranges, measure_input_ranges
-from islands.records.writer import write_coupled_simulation, write_simulation
+from islands.records.writer import write_simulation
 from islands.settings_schema import Integer, setting, settings_class
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.simulation.initial_states import find_first_states
+from islands.simulation.predictors import map_model_signals
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 
@@ -98,27 +97,31 @@ class _Request:
         y, states = (part or None for part in parts)
         return y, states
 
-    def read(
-        self,
-        inputs: Sequence[str],
-        output_name: str,
-        missing_output: bool = False,
-        signals: Sequence[str] = (),
-    ) -> Dataset:
-        """Read a record of one output; a given output column replaces that of the model."""
-        if len(self.outputs) > 1:
-            raise SettingsError(f"the model has one output, got {', '.join(self.outputs)}: give one --output")
-        name: str | None = self.outputs[0] if self.outputs else output_name
-        if missing_output and not self.outputs:
-            columns = read_columns(self.record, self.reading)
-            name = name if find_column(output_name, columns) in columns else None
-        record = read_dataset(
-            *(self.record, inputs, name, self.dt, self.rows),
-            missing_output=missing_output,
-            options=self.reading,
-            signals=signals,
-        )
-        return record if name else replace(record, output_name=output_name)
+    def read(self, inputs: Sequence[str], names: Sequence[str]) -> AnyRecord:
+        """Read a record of the outputs of a model, which may be missing; given columns replace them.
+
+        Raises
+        ------
+        SettingsError
+            Another number of outputs is given.
+        """
+        if self.outputs and len(self.outputs) != len(names):
+            raise SettingsError(
+                f"the model has the outputs {', '.join(names)}, got {', '.join(self.outputs)}: give as many "
+                "--output, or none"
+            )
+        table = open_record(self.record, self.reading)
+
+        def read_output(name: str) -> Dataset:
+            is_known = self.outputs or find_column(name, table.names) in table.names
+            found = read_table(
+                *(table, self.record.name, inputs, name if is_known else None, self.dt, self.rows),
+                missing_output=True,
+                options=self.reading,
+            )
+            return found if is_known else replace(found, output_name=name)
+
+        return unite([read_output(name) for name in self.outputs or names])
 
     def refuse_detrend(self, model: str) -> None:
         """Refuse ``detrend`` for a model that states its signals."""
@@ -217,8 +220,6 @@ def _simulate_loaded(loaded: Loaded, request: _Request) -> None:
             _simulate_model(result.best, request, result.document.get("data", {}).get("inputs", {}))
         case FittedModel() as single:
             _simulate_model(single, request)
-        case FittedCoupledModel() as coupled:
-            _simulate_outputs(coupled, request)
         case SavedDiagnosis() as diagnosis:
             _simulate_system(diagnosis.require_extension(), request)
         case SavedSimulation() as simulation:
@@ -228,19 +229,21 @@ def _simulate_loaded(loaded: Loaded, request: _Request) -> None:
 def _simulate_model(
     found: FittedModel, request: _Request, ranges: Mapping[str, Sequence[Sequence[float]]] = _NO_RANGES
 ) -> None:
-    """Simulate a model of one output; ``ranges`` are those of its inputs by the part of its data."""
+    """Simulate a model; ``ranges`` are those of its inputs by the part of its data."""
     model, mode = found.model, request.mode
     if request.bands is not None and mode != "free-run":
         raise SettingsError("--bands are for free runs of models of a result folder")
-    recorded = request.read(request.inputs or model.column_names, model.output_name, missing_output=True)
-    for step in recorded.reading:
+    recorded = request.read(request.inputs or model.column_names, found.output_names)
+    for step in dict.fromkeys(step for each in recorded.records for step in each.reading):
         output.print(step, markup=False)
     if model.preprocessing is not None:
         request.refuse_detrend("a model that states its preprocessing")
-    prepared = preprocess(recorded, detrend=request.settings.detrend)
-    data = match_rate(model, prepared)
-    if statement := named_signals(model):
-        output.print(_describe_preparation(model, data, data is prepared, statement), markup=False)
+    prepared = recorded.map(partial(preprocess, detrend=request.settings.detrend))
+    data = match_columns(model, prepared)
+    if found.signals:
+        statement = coupled_signals(model) if isinstance(model, CoupledModel) else named_signals(model)
+        is_prepared = data.samples == prepared.samples
+        output.print(_describe_preparation(model, data, is_prepared, statement), markup=False)
     if "estimation" in ranges:
         _print_extrapolation(model, data, ranges["estimation"])
     compile_kernels()
@@ -249,10 +252,10 @@ def _simulate_model(
         if request.bands is not None:
             raise SettingsError("--bands need the measured output of the first samples: add it to the record")
         try:
-            simulation = found.simulate(data, mode, y=y[0] if y else None, states=states)
+            simulation = found.simulate(data, mode, y=y, states=states)
         except ModelError as error:
-            advice = "" if y or states else f", as --start {model.output_name}=VALUE"
-            raise ModelError(f"{error}{advice}") from error
+            names = " ".join(f"--start {name}=VALUE" for name in found.output_names)
+            raise ModelError(f"{error}{'' if y or states else f', as {names}'}") from error
         line = f"{mode} {_describe_start(request)}: {simulation.outcome}"
         _print_metrics(data, simulation.y, line, request.out, None, bool(simulation.outcome))
         return
@@ -273,7 +276,7 @@ def _describe_start(request: _Request) -> str:
     return f"from {', '.join(f'{name} = {value:g}' for name, value in request.start.items())}"
 
 
-def _describe_preparation(model: DynamicModel, data: Dataset, is_prepared: bool, statement: str) -> str:
+def _describe_preparation(model: AnyModel, data: AnyRecord, is_prepared: bool, statement: str) -> str:
     """Return which signals of the record the model reads."""
     values = describe_values(model)
     if values and is_prepared and model.dt is not None and same_dt(model.dt, data.dt):
@@ -284,76 +287,14 @@ def _describe_preparation(model: DynamicModel, data: Dataset, is_prepared: bool,
     return f"as in the model, {statement}"
 
 
-def _print_extrapolation(model: DynamicModel, data: Dataset, estimated: Sequence[Sequence[float]]) -> None:
+def _print_extrapolation(model: AnyModel, data: AnyRecord, estimated: Sequence[Sequence[float]]) -> None:
     """State the inputs that leave the range of the estimation data."""
-    signals, _ = map_signals(model, data)
+    (signals, *_) = map_model_signals(model, data)[0].records
     found = measure_input_ranges(signals)
     for statement in compare_input_ranges(
         *(signals.input_names, signals.input_units, estimated, found), title="the record"
     ):
         output.print(f"extrapolation: {statement}", markup=False)
-
-
-def _simulate_outputs(found: FittedCoupledModel, request: _Request) -> None:
-    """Simulate all outputs of a record from its first samples; print the errors and write the outputs."""
-    model, outputs = found.model, request.outputs
-    if request.mode != "free-run":
-        raise SettingsError("a model of several outputs has free runs only: leave out --mode")
-    request.refuse_detrend("a model of several outputs")
-    if outputs and len(outputs) != len(model.output_names):
-        raise SettingsError(
-            f"the model has the outputs {', '.join(model.output_names)}: give as many --output, or none"
-        )
-    inputs = request.inputs or model.models[0].column_names[: len(model.input_names)]
-    table = open_record(request.record, request.reading)
-    names = outputs or model.output_names
-    recorded = CoupledRecord(
-        tuple(
-            replace(
-                read_table(
-                    *(
-                        table,
-                        request.record.name,
-                        inputs,
-                        name if find_column(name, table.names) in table.names else None,
-                    ),
-                    *(request.dt, request.rows),
-                    missing_output=True,
-                    options=request.reading,
-                ),
-                output_name=name,
-            )
-            for name in names
-        )
-    )
-    data = match_coupled(model, recorded.map(lambda each: match_rate(model, each)))
-    if statement := coupled_signals(model):
-        output.print(f"as in the model, {statement}", markup=False)
-    compile_kernels()
-    first = found.warm_up if request.settings.warm_up is None else request.settings.warm_up
-    y, states = request.split_start(model)
-    is_measured = y is None and states is None and bool(np.isfinite(data.y).any())
-    simulation = found.simulate(data, first, y, states)
-    bands = () if request.bands is None else found.bands(data, request.bands, first)
-    if request.out is not None:
-        limits = [(band.lower, band.upper) for band in bands]
-        write_coupled_simulation(data, simulation.y, request.out, limits)
-        output.print(f"{request.out}: {data.samples} rows", markup=False)
-    if is_measured:
-        _print_first_states(model, data, first)
-    begun = f"after a warm-up of {first} samples" if is_measured else _describe_start(request)
-    output.print(f"free-run {begun}: {simulation.outcome}", markup=False)
-    for each, simulated in zip(data.records, simulation.y.T, strict=True):
-        if np.count_nonzero(np.isfinite(each.y)) < _LEAST_KNOWN:
-            continue
-        errors = metrics(each.y, simulated)
-        output.print(
-            f"{each.output_name}: MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
-            f"{each.output_unit}".rstrip(),
-            markup=False,
-        )
-    for each, band in zip(data.records, bands, strict=False):
-        _print_band(each, band, f"{each.output_name}: ")
 
 
 def _print_first_states(model: AnyModel, data: AnyRecord, warm_up: int) -> None:
@@ -374,7 +315,20 @@ def _simulate_system(found: SavedSimulation, request: _Request) -> None:
     if request.mode != "free-run":
         raise SettingsError(f"a simulation supports free runs only: --mode {request.mode} is for models")
     driving, recorded = request.inputs or found.column_names, found.recorded_columns
-    whole = request.read([*driving, *recorded], found.output_name, signals=recorded)
+    if len(request.outputs) > 1:
+        raise SettingsError(
+            f"a simulation has one output, got {', '.join(request.outputs)}: give one --output"
+        )
+    (name,) = request.outputs or [found.output_name]
+    whole = read_dataset(
+        request.record,
+        [*driving, *recorded],
+        name,
+        request.dt,
+        request.rows,
+        options=request.reading,
+        signals=recorded,
+    )
     data = whole.first_inputs(len(driving))
     compile_kernels()
     with warnings.catch_warnings(record=True, category=ExtrapolationWarning) as caught:
@@ -386,46 +340,43 @@ def _simulate_system(found: SavedSimulation, request: _Request) -> None:
 
 
 def _print_metrics(
-    data: Dataset,
-    y: NDArray[np.float64],
+    data: AnyRecord,
+    simulated: NDArray[np.float64],
     line: str,
     out: Path | None,
     band: PredictionBand | None = None,
     is_complete: bool = True,
 ) -> None:
-    """Write a simulation and print its errors; one that diverged has none."""
+    """Write a simulation and print the errors of every output; one that diverged has none."""
     if out is not None:
-        write_simulation(data, y, out, None if band is None else (band.lower, band.upper))
+        write_simulation(data, simulated, out, None if band is None else (band.lower, band.upper))
         output.print(f"{out}: {data.samples} rows", markup=False)
     output.print(line, markup=False)
+    runs = simulated.reshape(data.samples, -1).T
+    for place, (each, y) in enumerate(zip(data.records, runs, strict=True)):
+        title = f"{each.output_name}: " if len(data.records) > 1 else ""
+        if is_complete:
+            _print_errors(each, y, title)
+            if band is not None:
+                _print_band(each, band.outputs[place], title)
+
+
+def _print_errors(data: Dataset, y: NDArray[np.float64], title: str) -> None:
     known = int(np.count_nonzero(np.isfinite(data.y) & np.isfinite(y)))
-    if not is_complete:
-        return
     if not known:
-        output.print(
-            f"{data.output_name}: {y[0]:.6g} at the first sample, {y[-1]:.6g} at the last", markup=False
-        )
+        text = f"{data.output_name}: {y[0]:.6g} at the first sample, {y[-1]:.6g} at the last"
     elif known < _LEAST_KNOWN:
-        output.print(
-            f"{data.output_name} is measured in {known} of the simulated samples: too few for an error",
-            markup=False,
-        )
+        text = f"{data.output_name} is measured in {known} of the simulated samples: too few for an error"
     else:
-        _print_errors(data, y)
-    if band is not None:
-        _print_band(data, band)
+        errors = metrics(data.y, y)
+        text = (
+            f"{title}MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
+            f"{data.output_unit}  fit {errors.fit_percent:.3f} %"
+        )
+    output.print(text, markup=False)
 
 
-def _print_errors(data: Dataset, y: NDArray[np.float64]) -> None:
-    errors = metrics(data.y, y)
-    output.print(
-        f"MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} {data.output_unit}  "
-        f"fit {errors.fit_percent:.3f} %",
-        markup=False,
-    )
-
-
-def _print_band(data: Dataset, band: PredictionBand, title: str = "") -> None:
+def _print_band(data: Dataset, band: PredictionBand, title: str) -> None:
     predicted = ~np.isnan(band.y)
     half = 0.5 * float(np.median((band.upper - band.lower)[predicted]))
     text = f"{title}{100 * band.level:g} % band: median half-width {half:.6g} {data.output_unit}".rstrip()

@@ -1,9 +1,7 @@
 """Errors of a model on test data, which no search has used."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
-from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -13,8 +11,8 @@ from numpy.typing import NDArray
 
 import islands
 from islands.cli.console import output
-from islands.records.coupled import CoupledRecord
-from islands.records.signal_map import match_rate
+from islands.facade.results.model_simulation import match_columns
+from islands.records.coupled import AnyRecord
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.metrics import metrics
 
@@ -22,33 +20,21 @@ from islands.validation.metrics import metrics
 TEST = "test.json"
 
 
-def evaluate_test(
-    result: islands.Result | islands.CoupledResult,
-    test_data: islands.Dataset | CoupledRecord,
-    folder: Path,
-) -> None:
+def evaluate_test(result: islands.Result, test_data: AnyRecord, folder: Path) -> None:
     """Simulate the test data with the recommended model; print and write the metrics of each output."""
-    if isinstance(result, islands.CoupledResult):
-        assert isinstance(test_data, CoupledRecord)
-        records = test_data.map(partial(match_rate, result.model))
-        simulated = result.simulate(records)
-        entries, lines = [], []
-        for record, y in zip(records.records, simulated.y.T, strict=True):
-            numbers, text = _compute_errors(record, y, simulated.outcome)
-            entries.append({"name": record.output_name, **numbers})
-            lines += [f"\n  {record.output_name}{text.replace(',', ':', 1)}"] if text else []
-        _report({"outputs": entries}, "".join(lines), simulated.outcome, folder)
+    data = match_columns(result.best.model, test_data)
+    run = result.simulate(data)
+    pairs = zip(data.records, run.y.reshape(data.samples, -1).T, strict=True)
+    found = [(each.output_name, *_compute_errors(each, y, run.outcome)) for each, y in pairs]
+    document: dict[str, Any] = {"outcome": str(run.outcome)}
+    if len(found) == 1:
+        ((_, numbers, text),) = found
+        document |= numbers
     else:
-        assert isinstance(test_data, islands.Dataset)
-        single = match_rate(result.best.model, test_data)
-        run = result.best.simulate(single)
-        _report(*_compute_errors(single, run.y, run.outcome), run.outcome, folder)
-
-
-def _report(numbers: Mapping[str, Any], text: str, outcome: EvaluationOutcome, folder: Path) -> None:
-    document = {"outcome": str(outcome), **numbers}
+        document["outputs"] = [{"name": name, **numbers} for name, numbers, _ in found]
+        text = "".join(f"\n  {name}{text.replace(',', ':', 1)}" for name, _, text in found if text)
     (folder / TEST).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    output.print(f"test data, not used before: free run {outcome}{text}", markup=False)
+    output.print(f"test data, not used before: free run {run.outcome}{text}", markup=False)
 
 
 def _compute_errors(

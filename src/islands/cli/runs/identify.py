@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import islands
 from islands.cli.console import errors, output, print_message
 from islands.cli.engines import ENGINES, TimedEngine, check_engine, start_engine
-from islands.cli.output_folder import keep_models, print_failures, show_result
+from islands.cli.output_folder import keep_models, print_failures, run_search, show_result
 from islands.cli.progress_display import Display, compile_kernels, progress
-from islands.cli.recordings import Recordings, measured_names, state_extrapolation
-from islands.cli.runs.coupled import couple_data, coupled_options, search_outputs
+from islands.cli.recordings import Recordings, state_extrapolation
 from islands.cli.runs.held_out_test import TEST, evaluate_test
 from islands.cli.search_progress import SearchDisplay
 from islands.cli.stop_requests import REPEAT, StopRequests, stop_requests
@@ -29,7 +28,6 @@ from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
 from islands.facade.automatic.preset_choice import choose_preset
-from islands.facade.coupled.identification import identify_coupled_data
 from islands.facade.identify import identify_record
 from islands.persistence.checkpoints import (
     read_checkpoint,
@@ -40,11 +38,11 @@ from islands.persistence.checkpoints import (
 )
 from islands.progress import ProgressCallback, Steps
 from islands.records.compatibility import match_record
-from islands.records.coupled import CoupledRecord, split_coupled
+from islands.records.coupled import AnyRecord, split_first, split_record
 from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading import fingerprint
 from islands.records.reading.options import ReadingOptions
-from islands.records.split import share_samples, split_data
+from islands.records.split import share_samples
 from islands.settings_schema import setting, settings_class
 
 #: File of the search state.
@@ -123,26 +121,25 @@ def run(
             # signal that arrives while Ray ends does not discard the result.
             stop = handlers.enter_context(stop_requests())
             until = inf if settings.wall_time is None else monotonic() + settings.wall_time
-            engine = TimedEngine(started, until, job.get("outputs", 1))
+            engine = TimedEngine(started, until, len(job["outputs"]))
             if state is None:
                 # Delete the files of an earlier run.
                 for name in (CHECKPOINT, HALL, TEST):
                     (folder / name).unlink(missing_ok=True)
             preset = job["preset"]
             searching = _make_display(show, job, data, possible[0])
-            if preset == AUTO and "outputs" not in job:
+            if preset == AUTO and len(job["outputs"]) == 1:
                 preset = _choose_preset(data, held_out, job, searching, stop, folder, run_options.figures)
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_document()}
             checkpoints = _CheckpointWriter(folder, job, searching, state, spent)
             began = perf_counter() - spent
             try:
-                result = _search(
+                search = partial(
+                    identify_record,
                     data,
                     held_out,
-                    folder,
-                    run_options.figures,
-                    job["changes"],
+                    on_models=keep_models(folder, data.output_names),
                     start=state,
                     progress=searching,
                     on_epoch=checkpoints,
@@ -150,7 +147,10 @@ def run(
                     engine=engine,
                     preset=preset,
                     seed=job["seed"],
+                    **job["changes"],
                 )
+                explain = partial(_explain_continuation, folder)
+                result = run_search(search, folder, stop, run_options.figures, explain)
             finally:
                 # Also after an engine failure, so that no finished epoch is lost.
                 checkpoints.write()
@@ -166,32 +166,14 @@ def run(
         stop.end(folder, (*result.left_out, *drawing.left_out), _explain_continuation(folder))
 
 
-def _search(
-    data: islands.Dataset | CoupledRecord,
-    held_out: Any,
-    folder: Path,
-    figures: Sequence[str],
-    changes: dict[str, Any],
-    **arguments: Any,
-) -> islands.Result | islands.CoupledResult:
-    """Search one or several outputs."""
-    if isinstance(data, islands.Dataset):
-        return identify_record(data, held_out, on_models=keep_models(folder), **arguments, **changes)
-    parts = split_coupled(data, held_out)
-    search = partial(identify_coupled_data, parts, **arguments, **coupled_options(changes))
-    return search_outputs(search, folder, arguments["stop"], figures, partial(_explain_continuation, folder))
-
-
 def _explain_continuation(folder: Path) -> str:
     """Say how to get the complete result. A run has no checkpoint before its first epoch."""
     return f"continue with --resume {folder}" if (folder / CHECKPOINT).exists() else REPEAT
 
 
-def _show_run(
-    result: islands.Result | islands.CoupledResult, options: RunOptions, folder: Path, stop: StopRequests
-) -> None:
+def _show_run(result: islands.Result, options: RunOptions, folder: Path, stop: StopRequests) -> None:
     """Print the result, whether its searches ended before their last generations, and their caches."""
-    results = result.results if isinstance(result, islands.CoupledResult) else (result,)
+    results = result.outputs or (result,)
     searches = [each.search_result.search for each in results]
     if not stop() and any(each.ended_by == "stopped" for each in searches):
         errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
@@ -206,13 +188,10 @@ def _show_run(
                 output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
 
 
-def _make_display(
-    show: Display, job: dict[str, Any], data: islands.Dataset | CoupledRecord, settings: Settings
-) -> SearchDisplay:
+def _make_display(show: Display, job: dict[str, Any], data: AnyRecord, settings: Settings) -> SearchDisplay:
     preset = job.get("choice") or job["preset"]
-    if isinstance(data, islands.Dataset):
-        return SearchDisplay(show, preset, data.samples, settings)
-    return SearchDisplay(show, preset, data.samples, settings, data.output_names)
+    several = data.output_names if len(data.output_names) > 1 else ()
+    return SearchDisplay(show, preset, data.samples, settings, several)
 
 
 def _choose_preset(
@@ -242,68 +221,51 @@ def _choose_preset(
 
 def _resolve_possible(job: dict[str, Any]) -> tuple[Settings, ...]:
     """Return the settings of a job, or of every kind of record among which the preset auto chooses."""
-    if "outputs" in job:
-        return (resolve_coupled_settings(job["preset"], coupled_options(job["changes"])),)
+    if len(job["outputs"]) > 1:
+        return (resolve_coupled_settings(job["preset"], job["changes"]),)
     if job["preset"] == AUTO:
         return tuple(resolve_kinds(job["changes"]).values())
     return (resolve_settings(job["preset"], job["changes"]),)
 
 
-def _read_data(job: dict[str, Any], lag: int) -> tuple[Any, Any, Any]:
-    """Read the data for estimation, validation (or its fraction) and the final test."""
-    for name, known in job["sha256"].items():
-        if fingerprint(name) != known:
-            raise RecordError(f"{name} has changed since the run began: restore the file, or start a new run")
-    # Checkpoints of versions with one recording have its path under another name.
-    paths = [Path(name) for name in job.get("records") or [job["record"]]]
-    reading = ReadingOptions(**job.get("reading", {}))
-    steps = PreprocessingSteps(**job.get("preprocessing", {}))
-    outputs = job.get("outputs", 1)
-    if outputs == 1:
-        recordings = Recordings(paths, job["inputs"], job["output"], job["dt"], reading, steps)
-        record, held_out, test_data = _read_parts(recordings, job, lag)
-        state_extrapolation(record, held_out)
-        return record, held_out, test_data
-    names = measured_names(job["inputs"], steps)
-    recordings = Recordings(paths, names, job["output"], job["dt"], reading)
-    data, validation, test = _read_parts(recordings, job, lag)
-    state_extrapolation(data, validation, outputs)
-    record, held_out, test_data = couple_data(data, [validation, test], outputs, steps, job["inputs"])
-    return record, held_out, test_data
-
-
-def _read_parts(
-    recordings: Recordings, job: dict[str, Any], lag: int
-) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
-    """Read the data for estimation, validation (or its fraction) and the final test, of all outputs.
+def _read_data(job: dict[str, Any], lag: int) -> tuple[AnyRecord, AnyRecord | float, AnyRecord | None]:
+    """Read the data for estimation, validation (or its fraction) and the final test.
 
     Raises
     ------
     SettingsError, RecordError
-        A part shares samples with another one, or is too short.
+        A file has changed, or a part shares samples with another one or is too short.
     """
+    for name, known in job["sha256"].items():
+        if fingerprint(name) != known:
+            raise RecordError(f"{name} has changed since the run began: restore the file, or start a new run")
+    reading = ReadingOptions(**job.get("reading", {}))
+    steps = PreprocessingSteps(**job.get("preprocessing", {}))
+    paths = [Path(name) for name in job["records"]]
+    recordings = Recordings(paths, job["inputs"], job["outputs"], job["dt"], reading, steps)
     rows, test = job["rows"], job["test"]
     data = recordings.read(rows)
     held_out = recordings.read_held_out(job["validation"], rows)
-    test_data: islands.Dataset | None = None
+    test_data: AnyRecord | None = None
     if test is not None:
         given = recordings.read_held_out(test, rows, "--test")
         if isinstance(given, float):
-            parts = islands.split(data, given)
-            data, test_data = parts.estimation, parts.validation
+            data, test_data = split_record(data, given)
         else:
             test_data = given
         _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], lag)
     # Check the validation data before the folder is made; the search repeats this.
-    split_data(data, held_out)
+    split_first(data, held_out)
+    state_extrapolation(data, held_out)
     return data, held_out, test_data
 
 
-def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], lag: int) -> None:
+def _check_test(test_data: AnyRecord, others: list[AnyRecord], lag: int) -> None:
     """Check that the test data overlaps no other data, has the same sampling time and is long enough."""
-    test_data = match_record(others[0], test_data, "the record", "the test data")
-    for other in others:
-        if share_samples(other, test_data):
+    used = [each.records[0] for each in others]
+    tested = match_record(used[0], test_data.records[0], "the record", "the test data")
+    for other in used:
+        if share_samples(other, tested):
             raise SettingsError(
                 "--test has samples that are used for estimation or validation: exclude them by --rows and "
                 "--validation"

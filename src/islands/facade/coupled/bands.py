@@ -12,7 +12,7 @@ from islands.progress import Steps
 from islands.records.coupled import CoupledSplit
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import ValidatedModel, find_predicted, make_ensemble, mean_squares
-from islands.validation.prediction_bands import PredictionBands, calibrate_output_bands
+from islands.validation.prediction_bands import OutputBands, calibrate_output_bands
 
 #: Name of the step.
 _BANDS = "prediction bands"
@@ -30,8 +30,8 @@ def make_bands(
     warm_up: int,
     seed: int,
     steps: Steps,
-) -> tuple[PredictionBands, ...]:
-    """Return the prediction bands of every output; none if the model diverges, or the step is missing.
+) -> OutputBands | None:
+    """Return the prediction bands of every output; None if the model diverges, or the step is missing.
 
     The ensemble has the structure of the model, and those in which one equation is another of its output. The
     parameters of its members are from a block bootstrap of the error of the common free run.
@@ -55,7 +55,7 @@ def make_bands(
     """
     skip = partial(steps.skip, _BANDS)
 
-    def compute() -> tuple[PredictionBands, ...]:
+    def compute() -> OutputBands | None:
         steps.report(_BANDS, 1.0)
         candidates = [
             ValidatedModel(each, _CRITERION, _validate(each, data, warm_up))
@@ -63,10 +63,10 @@ def make_bands(
         ]
         ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip, model)
         if ensemble is None or skip():
-            return ()
+            return None
         return calibrate_output_bands(model, ensemble, data, warm_up)
 
-    return steps.attempt(_BANDS, compute) or ()
+    return steps.attempt(_BANDS, compute)
 
 
 def _list_rivals(

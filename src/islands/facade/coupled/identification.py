@@ -1,62 +1,49 @@
-"""`fit_coupled` and `identify_coupled`: one equation per output, chosen and refined for a common free run.
+"""Searches of several outputs: one equation per output, chosen and refined for a common free run.
 
 Latent models of several outputs read the inputs only, so that each is searched on its own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
-from islands.errors import SettingsError, lookup
+from islands.errors import SettingsError
 from islands.estimation.refinement import refine
-from islands.evolution.engine import Engine
 from islands.evolution.presets import AUTO as AUTO_PRESET
 from islands.evolution.presets import (
     COUPLED_PRESET,
     check_coupled_settings,
     resolve_coupled_settings,
     with_tuples,
+    without_automatic,
 )
-from islands.evolution.search_result import ResultCallback, ignore_result, without_optional_steps
+from islands.evolution.search_result import require_one_output, without_optional_steps
 from islands.evolution.search_state import SearchState, keep_hall, stop_reason
 from islands.evolution.settings import LATENT, NARX, Settings
 from islands.facade.coupled.bands import make_bands
-from islands.facade.coupled.latent import join_latent_results
-from islands.facade.coupled.result import CoupledResult
+from islands.facade.coupled.joined_results import join_latent_results, join_results
 from islands.facade.coupled.selection import choose_equations, measure_error
-from islands.facade.engine_choice import Ray
 from islands.facade.evolution_run import SearchCallback
-from islands.facade.fit import fit_record
-from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import require_narx
-from islands.progress import (
-    AnswerFoundError,
-    ProgressCallback,
-    Steps,
-    Stop,
-    StoppedError,
-    ignore_progress,
-    never_stop,
-)
+from islands.progress import AnswerFoundError, ProgressCallback, Steps, StoppedError
 from islands.records.averaging import AUTO, average_samples
-from islands.records.coupled import CoupledRecord, CoupledSplit, check_outputs, couple, split_coupled
+from islands.records.coupled import CoupledSplit
 from islands.records.dataset import Dataset
-from islands.records.reading.data_frames import as_record
-from islands.records.reading.options import DEFAULT_READING, take_reading
-from islands.records.split import Split, warn_of_extrapolation
+from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
-
-if TYPE_CHECKING:
-    from islands.records.reading.data_frames import FrameLike, ReadingLike
+from islands.validation.coupled_assessment import CoupledAssessment
 
 #: Largest number of accepted steps of the common refinement over each interval.
 _STEPS = 20
+
+#: Search of one output: its record, its validation data, and options by name.
+FindOutput: TypeAlias = Callable[..., Result]
 
 #: Names of the steps after the searches of the outputs.
 _CHOICE, _REFINEMENT = "choice of the equations", "refinement of all equations"
@@ -78,234 +65,104 @@ class StoppedCouplingError(StoppedError):
         self.outputs, self.found = tuple(outputs), tuple(found)
 
 
-def fit_coupled(
-    record: "CoupledRecord | FrameLike",
-    *,
-    inputs: str | Sequence[str] = (),
-    outputs: Sequence[str] = (),
-    dt: float | None = None,
-    validation: "CoupledRecord | FrameLike | float" = 0.25,
-    refine_together: bool = True,
-    seed: int = 0,
-    progress: ProgressCallback = ignore_progress,
-    stop: Stop = never_stop,
-    reading: "ReadingLike" = DEFAULT_READING,
-    **options: Any,
-) -> CoupledResult:
+def fit_outputs(
+    data: CoupledSplit,
+    find: FindOutput,
+    refine_together: bool,
+    seed: int,
+    steps: Steps,
+    options: Mapping[str, Any],
+) -> Result:
     """Fit one equation per output by subset selection, for a simulation of all outputs together.
 
-    Every output is fitted by `fit` with the measured values of the other outputs as further inputs, which it
-    reads from sample k-1 on. Of the models of each size, `choose_equations` takes those with the least error
-    of the common free run on the validation data. Then all parameters are refined on the common free run of
-    the estimation data; the refined parameters are kept if the error on the validation data is smaller.
+    Every output is fitted with the measured values of the other outputs as further inputs, which it reads
+    from sample k-1 on. Of the models of each size, `choose_equations` takes those with the least error of the
+    common free run on the validation data. Then all parameters are refined on the common free run of the
+    estimation data; the refined parameters are kept if the error on the validation data is smaller.
 
     With ``model="latent"``, every output has a latent model of the inputs alone; see `join_latent_results`.
 
     Parameters
     ----------
-    record : CoupledRecord or data frame
-        Data without missing inputs; a frame needs ``inputs`` and ``outputs``.
-    inputs, outputs
-        Names of the columns of a frame. ``u+1`` is an input that the outputs respond to within the sample.
-    dt : float, optional
-        Sampling time in seconds. A frame with a time does not need it.
-    validation : CoupledRecord, data frame or float
-        Data that choose the equations: a separate record, or the fraction at the end of ``record``.
+    data : CoupledSplit
+    find : callable
+        Fit of one output: `fit_record` with the arguments that all outputs share.
     refine_together : bool
         Whether all parameters are refined together. Those of latent models never are: the outputs do not
         depend on each other.
     seed : int
-        Seed of the results.
-    progress : callable, optional
-        Called with a message and the completed fraction.
-    stop : callable, optional
-        Called between all steps. Once it returns true and every output has models, the fit ends with the best
-        ones so far; ``left_out`` of the result names the steps that are missing. The outputs share the time
-        of a `TimeLimit`.
-    reading : mapping
-        Options of reading a frame, as of `as_record`: ``{"gaps": "split"}``.
-    **options
-        Options of `fit`; ``model`` is ``narx`` or ``latent``. The default library is ``polynomial``;
-        ``constraints`` are an entry of ``CONSTRAINTS`` and hold for every equation. ``feedthrough`` is
-        ``no``; that of latent models is found by their search.
-
-    Returns
-    -------
-    CoupledResult
+    steps : Steps
+        Once a stop is requested and every output has models, the fit ends with the best ones so far.
+    options : mapping
+        Settings of `fit` that are given; ``auto`` is the default of several outputs.
 
     Raises
     ------
-    StoppedError
-        ``stop`` returned true before every output had models.
     SettingsError
         A setting is unknown, out of range or not for several outputs, or an output has no model.
+    StoppedError
+        A stop was requested before every output had models.
     RecordError
-        The record is too short or incomplete, an output is given twice or is also an input, or the
-        validation data has other columns or another sampling time.
-
-    Warns
-    -----
-    ExtrapolationWarning
-        An input of the validation data leaves the range of the estimation data.
+        The record is too short or incomplete.
     """
-    data = _read_data(record, inputs, outputs, dt, validation, reading)
-    warn_of_extrapolation(data.first)
-    return fit_coupled_data(
-        data, refine_together=refine_together, seed=seed, progress=progress, stop=stop, **options
+    chosen = without_automatic(options)
+    check_coupled_settings(
+        chosen.get("constraints"), chosen.get("feedthrough", "no"), chosen.get("refit", "none")
     )
-
-
-def fit_coupled_data(
-    data: CoupledSplit,
-    *,
-    refine_together: bool = True,
-    seed: int = 0,
-    progress: ProgressCallback = ignore_progress,
-    stop: Stop = never_stop,
-    **options: Any,
-) -> CoupledResult:
-    """Fit one equation per output as `fit_coupled` does, for a caller that states an extrapolation itself.
-
-    Parameters
-    ----------
-    data : CoupledSplit
-    refine_together, seed, progress, stop, **options
-        As for `fit_coupled`.
-
-    Raises
-    ------
-    SettingsError, StoppedError, RecordError
-        As `fit_coupled`.
-    """
-    find, steps = partial(fit_record, seed=seed), Steps(progress, stop)
-    kind = options.get("model", NARX)
-    lookup(dict.fromkeys((NARX, LATENT)), kind, "class of models")
-    if kind == LATENT:
-        check_coupled_settings(options.get("constraints"), "no", options.get("refit", "none"))
-        return _couple_latent(data, dict(options), steps, find)
-    chosen: dict[str, Any] = {"library": "polynomial", "feedthrough": "no", **options}
-    check_coupled_settings(chosen.get("constraints"), chosen["feedthrough"], chosen.get("refit", "none"))
+    if chosen.get("delays"):
+        raise SettingsError("delays are for one output: leave them out")
+    if chosen.get("model", NARX) == LATENT:
+        return _couple_latent(data, chosen, seed, steps, find)
+    chosen = {"library": "polynomial", "feedthrough": "no", **chosen}
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
     return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, steps, find)
 
 
-def identify_coupled(
-    record: "CoupledRecord | FrameLike",
+def identify_outputs(
+    data: CoupledSplit,
+    find: FindOutput,
+    refine_together: bool,
+    seed: int,
+    steps: Steps,
+    changes: Mapping[str, Any],
     *,
-    inputs: str | Sequence[str] = (),
-    outputs: Sequence[str] = (),
-    dt: float | None = None,
-    validation: "CoupledRecord | FrameLike | float" = 0.25,
-    refine_together: bool = True,
-    preset: str = "narx",
-    seed: int = 0,
-    progress: ProgressCallback = ignore_progress,
-    on_epoch: SearchCallback | None = None,
-    stop: Stop = never_stop,
-    start: SearchState | None = None,
-    engine: Engine | Ray | str | None = None,
-    reading: "ReadingLike" = DEFAULT_READING,
-    **changes: Any,
-) -> CoupledResult:
-    """Identify one equation per output by evolution, for a simulation of all outputs together.
-
-    As `fit_coupled`, with `identify` for every output.
+    preset: str,
+    start: SearchState | None,
+    on_epoch: SearchCallback | None,
+) -> Result:
+    """Identify one equation per output by evolution, as `fit_outputs` does.
 
     Parameters
     ----------
-    record, inputs, outputs, dt, validation, refine_together
-        As for `fit_coupled`.
+    data, refine_together, seed, steps
+        As for `fit_outputs`.
+    find : callable
+        Search of one output: `identify_record` with the arguments that all outputs share.
+    changes : mapping
+        Settings that differ from the preset.
     preset : str
-        An entry of ``PRESETS``; ``auto`` is ``narx``.
-    seed : int
-        Seed of the random generator; the same seed gives the same result, bit for bit.
-    progress : callable, optional
-        Called with a message and the completed fraction of each stage.
-    on_epoch : callable, optional
+        An entry of ``PRESETS``; ``auto`` is `COUPLED_PRESET`.
+    start : SearchState or None
+        State to continue from.
+    on_epoch : callable or None
         Called with the `SearchState` and the `Settings` after every epoch of the search of each output. The
         state contains those of the outputs before it.
-    stop : callable, optional
-        As for `fit_coupled`.
-    start : SearchState, optional
-        State to continue from; the result equals that of an uninterrupted run.
-    engine : str, Ray or Engine, optional
-        What runs the islands, as for `identify`.
-    reading : mapping
-        As for `fit_coupled`.
-    **changes
-        Settings that differ from the preset; ``constraints`` and ``feedthrough`` as for `fit_coupled`.
-
-    Returns
-    -------
-    CoupledResult
 
     Raises
     ------
-    SettingsError, RecordError, StoppedError
-        As `fit_coupled`.
-
-    Warns
-    -----
-    ExtrapolationWarning
-        As `fit_coupled`.
+    SettingsError, StoppedError, RecordError
+        As `fit_outputs`.
     """
-    data = _read_data(record, inputs, outputs, dt, validation, reading)
-    warn_of_extrapolation(data.first)
-    return identify_coupled_data(
-        data,
-        refine_together=refine_together,
-        preset=preset,
-        seed=seed,
-        progress=progress,
-        on_epoch=on_epoch,
-        stop=stop,
-        start=start,
-        engine=engine,
-        **changes,
-    )
-
-
-def identify_coupled_data(
-    data: CoupledSplit,
-    *,
-    refine_together: bool = True,
-    preset: str = "narx",
-    seed: int = 0,
-    progress: ProgressCallback = ignore_progress,
-    on_epoch: SearchCallback | None = None,
-    stop: Stop = never_stop,
-    start: SearchState | None = None,
-    engine: Engine | Ray | str | None = None,
-    on_models: ResultCallback = ignore_result,
-    **changes: Any,
-) -> CoupledResult:
-    """Identify one equation per output, for a caller that states an extrapolation itself.
-
-    Parameters
-    ----------
-    data : CoupledSplit
-    refine_together, preset, seed, progress, on_epoch, stop, start, engine, **changes
-        As for `identify_coupled`.
-    on_models : callable
-        Called with the ranked models of each output, before the optional steps. After an `AnswerFoundError`,
-        the result has none of them.
-
-    Raises
-    ------
-    SettingsError, RecordError, StoppedError
-        As `fit_coupled`.
-    """
-    chosen: dict[str, Any] = {"feedthrough": "no", **with_tuples(changes)}
+    chosen = {"feedthrough": "no", **without_automatic(with_tuples(changes))}
     settings = resolve_coupled_settings(preset, chosen)
-    preset = COUPLED_PRESET if preset == AUTO_PRESET else preset
-    search = partial(identify_record, preset=preset, seed=seed, engine=engine, on_models=on_models)
-    find, steps = _Searches(search, start, on_epoch), Steps(progress, stop)
+    name = COUPLED_PRESET if preset == AUTO_PRESET else preset
+    searches = _Searches(partial(find, preset=name), start, on_epoch)
     if settings.model_class == LATENT:
-        return _couple_latent(data, chosen, steps, find)
+        return _couple_latent(data, chosen, seed, steps, searches)
     chosen.setdefault("average", settings.average)
     trial = make_trial_library(settings)
-    return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, steps, find)
+    return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, steps, searches)
 
 
 class _Searches:
@@ -346,37 +203,12 @@ class _Searches:
             self._on_epoch(replace(state, earlier=self._ended), settings)
 
 
-def _read_data(
-    record: "CoupledRecord | FrameLike",
-    inputs: str | Sequence[str],
-    outputs: Sequence[str],
-    dt: float | None,
-    validation: "CoupledRecord | FrameLike | float",
-    reading: "ReadingLike",
-) -> CoupledSplit:
-    """Return estimation data and validation data, at the sampling time of the record."""
-    named = take_reading(reading).changes()
-
-    def as_coupled(data: Any) -> CoupledRecord:
-        if isinstance(data, CoupledRecord):
-            return data
-        if isinstance(data, Dataset):
-            raise SettingsError("a Dataset has one output: give a CoupledRecord, one Dataset per output")
-        columns = [inputs] if isinstance(inputs, str) else list(inputs)
-        check_outputs(columns, outputs)
-        read = as_record(data, None, dt, inputs=[*columns, *outputs[1:]], output=outputs[0], **named)
-        return couple(read, len(outputs))
-
-    held_out = validation if isinstance(validation, int | float) else as_coupled(validation)
-    return split_coupled(as_coupled(record), held_out)
-
-
 def _search_outputs(
     names: Sequence[str],
     splits: Sequence[Split],
     options: dict[str, Any],
     steps: Steps,
-    find: Callable[..., Result],
+    find: FindOutput,
 ) -> list[Result]:
     """Search every output; a stop before the models of an output is a `StoppedCouplingError`.
 
@@ -392,19 +224,19 @@ def _search_outputs(
             found = Result.from_search(without_optional_steps(ended.found, steps.refusal))
         except StoppedError as stopped:
             raise StoppedCouplingError(f"{name}: {stopped.step}", names, results) from stopped
-        search = found.search_result.search
+        search = require_one_output(found.search_result).search
         steps.add(search.left_out, search.not_computed, name)
         results.append(found)
     return results
 
 
 def _couple_latent(
-    data: CoupledSplit, options: dict[str, Any], steps: Steps, find: Callable[..., Result]
-) -> CoupledResult:
+    data: CoupledSplit, options: dict[str, Any], seed: int, steps: Steps, find: FindOutput
+) -> Result:
     """Search a latent model of every output, and join them."""
     splits = [Split(*pair) for pair in zip(data.estimation.records, data.validation.records, strict=True)]
     results = _search_outputs(data.estimation.output_names, splits, options, steps, find)
-    return join_latent_results(data, results, steps)
+    return join_latent_results(data, results, seed, steps)
 
 
 def _couple(
@@ -415,8 +247,8 @@ def _couple(
     refine_together: bool,
     seed: int,
     steps: Steps,
-    find: Callable[..., Result],
-) -> CoupledResult:
+    find: FindOutput,
+) -> Result:
     """Search every output, choose the equations and refine them."""
     names = data.estimation.output_names
     splits = [
@@ -428,9 +260,10 @@ def _couple(
     options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
     results = _search_outputs(names, splits, options, steps, find)
     steps.report("choice of the equations", 0.0)
-    data = data.map(partial(average_samples, count=options["average"]))
+    record, data = data.record, data.map(partial(average_samples, count=options["average"]))
     warm_up = max(entry.warm_up for result in results for entry in result.models)
-    ranked = [[require_narx(entry.model) for entry in result.models] for result in results]
+    searches = [require_one_output(result.search_result) for result in results]
+    ranked = [[require_narx(entry.final_model) for entry in search.models] for search in searches]
     best = [result.recommendation.rank for result in results]
     choice = choose_equations(ranked, best, data.validation, warm_up, partial(steps.skip, _CHOICE))
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
@@ -443,18 +276,8 @@ def _couple(
         refine_all = partial(_refine, model, data, shooting, warm_up, constraints, choice.error, skip)
         refined = steps.attempt(_REFINEMENT, refine_all)
     bands = make_bands(refined or model, ranked, choice.ranks, data, constraints, warm_up, seed, steps)
-    return CoupledResult(
-        refined or model,
-        warm_up,
-        bands,
-        tuple(results),
-        choice.ranks,
-        refined is not None,
-        data,
-        steps.left_out,
-        steps.not_computed,
-        refusal=steps.refusal,
-    )
+    assessed = CoupledAssessment(refined or model, data, warm_up, refined is not None, choice.ranks, bands)
+    return join_results(record, results, assessed, seed, steps)
 
 
 def _refine(

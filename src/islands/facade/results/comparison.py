@@ -7,9 +7,9 @@ from math import isfinite, nan
 from typing import TYPE_CHECKING
 
 from islands.errors import SettingsError
-from islands.facade.results.fitted_model import FittedModel
-from islands.facade.results.model_simulation import record_of_model
-from islands.records.signal_map import match_rate
+from islands.facade.results.fitted_model import FittedModel, list_metrics
+from islands.facade.results.model_simulation import match_columns, record_of_model
+from islands.models.coupled_narx import list_models
 from islands.report.text.facts import BEFORE_REFIT
 from islands.validation.metrics import Metrics, metrics
 
@@ -28,6 +28,8 @@ class ComparisonRow:
     ----------
     result : str
         Name of the result.
+    output : str
+        Name of the output.
     rank, terms : int
     rmse, mape, r2 : float
         Errors in free run: in the unit of the output, in per cent of the output range, and R2. NaN after a
@@ -36,12 +38,18 @@ class ComparisonRow:
     """
 
     result: str
+    output: str
     rank: int
     terms: int
     rmse: float
     mape: float
     r2: float
     equation: str
+
+    @property
+    def name(self) -> str:
+        """Name of the result and of the output."""
+        return f"{self.result}, {self.output}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,7 +59,7 @@ class ResultComparison:
     Attributes
     ----------
     recommended : tuple of ComparisonRow
-        Recommended model of each result.
+        Recommended model of each result, a row for each output.
     models : tuple of ComparisonRow
         All models of both results.
     data : str
@@ -72,11 +80,11 @@ class ResultComparison:
         """
         from islands.report.figures.convergence import draw_fronts  # noqa: PLC0415
 
-        names = dict.fromkeys(each.result for each in self.models)
+        names = dict.fromkeys(each.name for each in self.models)
         fronts = {
-            name: [(each.terms, each.rmse) for each in self.models if each.result == name] for name in names
+            name: [(each.terms, each.rmse) for each in self.models if each.name == name] for name in names
         }
-        marked = {each.result: (each.terms, each.rmse) for each in self.recommended}
+        marked = {each.name: (each.terms, each.rmse) for each in self.recommended}
         return draw_fronts(fronts, marked, self.data, ax)
 
     def __str__(self) -> str:
@@ -142,7 +150,7 @@ def compare_models(
     if len(set(names)) != len(results):
         raise SettingsError(f"two results need two different names, got {', '.join(names)}")
     rows = [
-        [_row(name, rank, each, record) for rank, each in enumerate(models, start=1)]
+        [_list_rows(name, rank, each, record) for rank, each in enumerate(models, start=1)]
         for name, models in zip(names, results, strict=True)
     ]
     data = "the given record"
@@ -152,15 +160,27 @@ def compare_models(
             data += " of each result, which differ: give a record to compare on"
         if any(each.is_refitted for models in results for each in models):
             data += f" ({BEFORE_REFIT})"
-    recommended = tuple(models[rank - 1] for rank, models in zip(chosen, rows, strict=True))
-    return ResultComparison(recommended, tuple(row for models in rows for row in models), data)
+    recommended = (row for rank, models in zip(chosen, rows, strict=True) for row in models[rank - 1])
+    every = (row for models in rows for model in models for row in model)
+    return ResultComparison(tuple(recommended), tuple(every), data)
 
 
-def _row(name: str, rank: int, entry: FittedModel, record: "RecordLike | None") -> ComparisonRow:
+def _list_rows(name: str, rank: int, entry: FittedModel, record: "RecordLike | None") -> list[ComparisonRow]:
+    """Return the row of every output of a model."""
     if record is None:
-        errors = entry.metrics["validation"]["free_run"]
+        found = [errors["validation"]["free_run"] for errors in list_metrics(entry.metrics).values()]
     else:
-        data = match_rate(entry.model, record_of_model(entry.model, record))
+        data = match_columns(entry.model, record_of_model(entry.model, record))
         run = entry.simulate(data)
-        errors = metrics(data.y, run.y) if run.outcome else Metrics(nan, nan, nan, nan)
-    return ComparisonRow(name, rank, entry.model.size, errors.rmse, errors.mape, errors.r2, entry.equation)
+        runs = run.y.reshape(data.samples, -1).T
+        found = [
+            metrics(each.y, y) if run.outcome else Metrics(nan, nan, nan, nan)
+            for each, y in zip(data.records, runs, strict=True)
+        ]
+    return [
+        ComparisonRow(
+            *(name, single.output_name, rank, single.size, errors.rmse, errors.mape, errors.r2),
+            single.equation().named,
+        )
+        for single, errors in zip(list_models(entry.model), found, strict=True)
+    ]

@@ -3,37 +3,45 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.errors import ModelError, lookup
+from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import AnySearchResult, require_one_output
 from islands.export import export_or_write
 from islands.facade.results.model_analysis import find_rest_of_data, linearise
-from islands.facade.results.model_simulation import SHOOTING, predict, record_of_model, simulate
+from islands.facade.results.model_simulation import (
+    SHOOTING,
+    match_columns,
+    predict,
+    record_of_model,
+    simulate,
+)
 from islands.facade.results.notebook_html import render_html
+from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals, list_models
 from islands.models.narx import Model
 from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.models.state_space import StateSpace
 from islands.models.sympy_expression import to_sympy
-from islands.records.dataset import Dataset
-from islands.records.signal_map import match_rate
+from islands.records.coupled import AnyRecord
+from islands.report.figures.names import FREE_RUN
 from islands.report.text.facts import BEFORE_REFIT, is_refitted
 from islands.simulation.input_response import StepResponse, step_response
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
 from islands.simulation.stepper import Stepper
 from islands.validation.assessment import Assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
-from islands.validation.prediction_bands import LEVEL, PredictionBand, PredictionBands
+from islands.validation.prediction_bands import LEVEL, AnyBands, PredictionBand, PredictionBands
 from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
@@ -52,51 +60,56 @@ class FittedModel:
 
     Attributes
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         Structure, parameters, standard errors; those of a refit, if there is one.
     rank : int or None
         Rank of the model; 1 has the least validation error. None for a model file outside of a result folder.
     metrics : mapping
-        Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``; empty outside
-        of a result folder. They are those of the parameters before a refit.
+        Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``, and of several
+        outputs by output before them, ``metrics["y1"]["validation"]["free_run"].mape``; empty outside of a
+        result folder. They are those of the parameters before a refit.
     warm_up : int
         Number of samples before the first prediction of the simulations of ``metrics``; the largest lag
         outside of a result folder.
     shooting_interval : int
         Steps of the model in each interval of multiple shooting.
-    prediction_bands : PredictionBands or None
-        Prediction bands of every level. None if the free run of the model diverged, the search was stopped
-        before them, or outside of a result folder.
-    output_unit : str
-        Unit of the output; empty if unknown.
+    prediction_bands : PredictionBands, OutputBands or None
+        Prediction bands of every level, of every output. None if the free run of the model diverged, the
+        search was stopped before them, or outside of a result folder.
+    output_units : tuple of str
+        Units of the outputs; each is empty if it is unknown.
     document : mapping
         Entry of the model in the ``result.json`` of the folder that it was read from: also physics checks,
         residual tests and constraints. Empty for a new result.
     """
 
-    model: DynamicModel
+    model: AnyModel
     rank: int | None
-    metrics: Mapping[str, Mapping[str, Metrics]]
+    metrics: Mapping[str, Any]
     warm_up: int
     shooting_interval: int
-    prediction_bands: PredictionBands | None
-    output_unit: str
+    prediction_bands: AnyBands | None
+    output_units: tuple[str, ...]
     document: Mapping[str, Any] = field(default_factory=dict)
     _assessment: Assessment | None = None
-    _search_result: SearchResult | None = None
+    _search_result: AnySearchResult | None = None
 
     @classmethod
-    def from_search(cls, rank: int, assessment: Assessment, found: SearchResult) -> "FittedModel":
+    def from_search(
+        cls, rank: int, assessment: Assessment | CoupledAssessment, found: AnySearchResult
+    ) -> "FittedModel":
         """Return a model of a search result."""
+        units = tuple(each.output_unit for each in found.record.records)
+        single = assessment if isinstance(assessment, Assessment) else None
         return cls(
             *(assessment.final_model, rank, assessment.metrics, assessment.warm_up, found.shooting_interval),
-            *(assessment.bands, found.record.output_unit, {}, assessment, found),
+            *(assessment.bands, units, {}, single, found),
         )
 
     @classmethod
-    def from_model(cls, model: DynamicModel) -> "FittedModel":
+    def from_model(cls, model: AnyModel) -> "FittedModel":
         """Return a model outside of a result."""
-        return cls(model, None, {}, model.maximum_lag, SHOOTING, None, "")
+        return cls(model, None, {}, model.maximum_lag, SHOOTING, None, ("",) * len(list_models(model)))
 
     @property
     def assessment(self) -> Assessment:
@@ -105,9 +118,10 @@ class FittedModel:
         Raises
         ------
         ModelError
-            The model was read from a file or a folder.
+            The model was read from a file or a folder, or has several outputs.
         """
         if self._assessment is None:
+            require_one_output(self.search_result)
             raise _missing_search()
         return self._assessment
 
@@ -119,7 +133,7 @@ class FittedModel:
         return self._assessment.refit is not None and not self._assessment.refit.discarded
 
     @property
-    def search_result(self) -> SearchResult:
+    def search_result(self) -> AnySearchResult:
         """Result of the search that the model belongs to.
 
         Raises
@@ -132,7 +146,7 @@ class FittedModel:
         return self._search_result
 
     @property
-    def validation(self) -> Dataset:
+    def validation(self) -> AnyRecord:
         """Validation data of the search.
 
         Raises
@@ -141,6 +155,11 @@ class FittedModel:
             The model was read from a file or a folder, which have no data.
         """
         return self.search_result.split.validation
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(each.output_name for each in list_models(self.model))
 
     @property
     def equation(self) -> str:
@@ -155,11 +174,13 @@ class FittedModel:
     @property
     def signals(self) -> str:
         """Signals that the equation reads: deviations, filtered samples or means; empty for the record's."""
+        if isinstance(self.model, CoupledModel):
+            return coupled_signals(self.model)
         return describe_signals(self.model)
 
     def to_sympy(self) -> "sympy.Eq":
         """Return the model as a SymPy equation; see `to_sympy` (extra ``sympy``)."""
-        return to_sympy(self.model)
+        return to_sympy(self._require_one_output())
 
     def linearise(
         self, operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
@@ -174,14 +195,15 @@ class FittedModel:
             the only one within the range of the output is taken.
         """
         bands = self.prediction_bands
-        data = None if bands is None else bands.data_range
+        data = bands.data_range if isinstance(bands, PredictionBands) else None
         if data is not None and isinstance(self.model, Model):
             if operating_point is None:
                 operating_point = [0.5 * (low + high) for low, high in data.inputs]
             if y is None:
                 y = find_rest_of_data(self.model, operating_point, data.output)
         found = linearise(self.model, operating_point, y, None if bands is None else bands.ensemble)
-        return replace(found, output_units=(self.output_unit or found.output_units[0],))
+        units = zip(self.output_units, found.output_units, strict=True)
+        return replace(found, output_units=tuple(own or other for own, other in units))
 
     def plot_linear(
         self, kind: str = "bode", operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
@@ -219,17 +241,18 @@ class FittedModel:
         """
         from islands.report.figures.model_responses import draw_static_characteristic  # noqa: PLC0415 - matplotlib
 
-        if self.model.inputs > 1:
+        model = self._require_one_output()
+        if model.inputs > 1:
             raise ModelError(
                 "a characteristic curve has one input: draw a section of static_characteristic()"
             )
-        return draw_static_characteristic(self.model, inputs, self.static_characteristic(inputs), ax)
+        return draw_static_characteristic(model, inputs, self.static_characteristic(inputs), ax)
 
     def step_response(
         self, start: ArrayLike, end: ArrayLike, y: float | None = None, samples: int | None = None
     ) -> StepResponse:
         """Simulate the response to a step of the inputs from rest; see `step_response`."""
-        return step_response(self.model, start, end, y, samples)
+        return step_response(self._require_one_output(), start, end, y, samples)
 
     def plot_step_response(
         self,
@@ -294,8 +317,10 @@ class FittedModel:
         Above 2 to 3 the noise is coloured or a term is missing: take another entry of ``ESTIMATORS``. The
         estimation runs at each access.
         """
-        result = self.search_result
-        found = least_squares_bias(self.model, result.split.estimation, str(result.settings["constraints"]))
+        result = require_one_output(self.search_result)
+        found = least_squares_bias(
+            self._require_one_output(), result.split.estimation, str(result.settings["constraints"])
+        )
         return None if isinstance(found, EvaluationOutcome) else found
 
     def predict(
@@ -305,9 +330,9 @@ class FittedModel:
         dt: float | None = None,
         *,
         inputs: str | Sequence[str] = (),
-        output: str | None = None,
+        output: str | Sequence[str] | None = None,
     ) -> NDArray[np.float64]:
-        """Return the free run of the model, one value for every row of the data.
+        """Return the free run of the model, one value of each output for every row of the data.
 
         It starts from the first samples of the output, as many as the largest lag of the model. If their
         noise has an effect on the whole run, they are estimated from the first samples that are known: the
@@ -315,14 +340,14 @@ class FittedModel:
 
         Parameters
         ----------
-        record : Dataset, data frame or array
-            Inputs, and the output, of which only the first samples are used; others may be missing.
+        record : record, data frame or array
+            Inputs, and the outputs, of which only the first samples are used; others may be missing.
         y, dt, inputs, output
             As in `as_record`. By default the columns and the sampling time are those of the model.
 
         Returns
         -------
-        ndarray, shape (samples,)
+        ndarray, shape (samples,) or (samples, outputs)
             Each row of a model of means has the prediction of its mean. NaN during the warm-up of every
             segment and after a divergence.
 
@@ -332,8 +357,7 @@ class FittedModel:
             The data do not match the model (the message lists the columns), are too short, or the output is
             missing in the warm-up.
         """
-        data = record_of_model(self.model, record, y, dt, inputs, output)
-        return predict(self.model, data)
+        return predict(self.model, record_of_model(self.model, record, y, dt, inputs, output))
 
     def simulate(
         self,
@@ -341,7 +365,7 @@ class FittedModel:
         mode: str = "free-run",
         warm_up: int | None = None,
         shooting: int | None = None,
-        y: float | None = None,
+        y: ArrayLike | None = None,
         states: Sequence[float] | None = None,
     ) -> Simulation:
         """Simulate the model on a record, or on inputs alone.
@@ -351,7 +375,7 @@ class FittedModel:
 
         Parameters
         ----------
-        record : Dataset, data frame or array
+        record : record, data frame or array
             Its samples are averaged as in the search if it has the sampling time of the search's record. An
             array, or a frame without the output, is simulated from rest at its first inputs, and every
             sample is predicted. A list of frames has several recordings.
@@ -362,8 +386,8 @@ class FittedModel:
         shooting : int, optional
             Steps of the model in each shooting interval; by default those of the errors in `metrics`.
         y, states
-            Output before the first sample, or states of a latent model at the first sample, from which to
-            start in place of the measured output.
+            Outputs before the first sample, or states of a latent model at the first sample, from which to
+            start in place of the measured outputs.
         """
         warm_up = self.warm_up if warm_up is None else warm_up
         shooting = self.shooting_interval if shooting is None else shooting
@@ -372,7 +396,7 @@ class FittedModel:
     def stepper(
         self,
         u: "OperatingPoint | None" = None,
-        y: float | None = None,
+        y: ArrayLike | None = None,
         states: Sequence[float] | None = None,
     ) -> Stepper:
         """Return a simulation that computes one sample at a time, for observers and controllers.
@@ -382,17 +406,19 @@ class FittedModel:
         Parameters
         ----------
         u, y, states
-            Inputs and output before the first sample, or states at the first one; see `Stepper`.
+            Inputs and outputs before the first sample, or states at the first one; see `Stepper`.
         """
         return Stepper(self.model, u, y, states)
 
     def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
         """Simulate the model on a record, with a band that contains a measured sample with a probability.
 
+        The arrays of the band have the shape (samples,), or (samples, outputs) of several outputs.
+
         Parameters
         ----------
-        record : Dataset or data frame
-            Inputs, and the output of the warm-up; averaged as in `simulate`.
+        record : record or data frame
+            Inputs, and the outputs of the warm-up; averaged as in `simulate`.
         level : float
             Probability, between 0.5 and 0.99.
         warm_up : int, optional
@@ -414,11 +440,16 @@ class FittedModel:
                 "stopped before them. Take another model"
             )
         warm_up = self.warm_up if warm_up is None else warm_up
-        data = match_rate(self.model, record_of_model(self.model, record))
+        data = match_columns(self.model, record_of_model(self.model, record))
         return self.prediction_bands.predict(self.model, data, level, warm_up)
 
     def plot(
-        self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None
+        self,
+        kind: str = "free-run",
+        record: "RecordLike | None" = None,
+        *,
+        output: str | None = None,
+        ax: "Axes | None" = None,
     ) -> "Figure":
         """Draw a figure of the model.
 
@@ -428,9 +459,12 @@ class FittedModel:
             A key of ``islands.report.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in
             ``metrics``), ``loop``, ``hold``, ``residuals``; of latent models ``structure``, ``curves``
             and ``bode``.
-        record : Dataset or data frame, optional
+        record : record or data frame, optional
             Record that is drawn; by default the validation data, with the parameters that the errors on them
             belong to. A frame has the columns of the model.
+        output : str, optional
+            Output to draw, of several; by default all of them, without bands. They have the free run alone;
+            `Result.outputs` has the other figures.
         ax : Axes, optional
             Axes to draw into, for the kinds of ``PANELS``: of a figure with several panels, the first.
 
@@ -453,13 +487,46 @@ class FittedModel:
         from islands.report.figures.registry import FIGURES, draw_record_figure  # noqa: PLC0415
 
         kind = kind.replace("_", "-")
-        if record is None and ax is None:
-            return lookup(FIGURES, kind, "figure")(self.assessment, self.search_result.split)
-        if record is None:
-            model, data = self.assessment.model, self.validation
-        else:
-            model, data = self.model, match_rate(self.model, record_of_model(self.model, record))
-        return draw_record_figure(kind, model, data, self.warm_up, self.prediction_bands, ax)
+        data = None if record is None else record_of_model(self.model, record)
+        if isinstance(self.model, CoupledModel):
+            return self._plot_outputs(self.model, kind, self.validation if data is None else data, output, ax)
+        if output not in (None, self.model.output_name):
+            raise SettingsError(f"the model has the output {self.model.output_name}, not {output}")
+        if data is None and ax is None:
+            found = require_one_output(self.search_result)
+            return lookup(FIGURES, kind, "figure")(self.assessment, found.split)
+        model = self.assessment.model if data is None else self.model
+        (single,) = (self.validation if data is None else match_columns(model, data)).records
+        bands = None if self.prediction_bands is None else self.prediction_bands.outputs[0]
+        return draw_record_figure(kind, model, single, self.warm_up, bands, ax)
+
+    def _plot_outputs(
+        self, model: CoupledModel, kind: str, record: AnyRecord, output: str | None, ax: "Axes | None"
+    ) -> "Figure":
+        """Draw the free run of one of several outputs, or of all of them."""
+        from islands.report.figures.free_run import (  # noqa: PLC0415 - matplotlib
+            draw_free_run,
+            draw_free_run_panel,
+            draw_free_runs,
+        )
+
+        if kind != FREE_RUN:
+            raise SettingsError(
+                f"a model of several outputs has the figure {FREE_RUN}: take others of the separate results, "
+                f"as result.outputs[0].plot({kind!r})"
+            )
+        data = match_columns(model, record)
+        runs = self.simulate(data).y.T
+        if output is None and ax is None:
+            return draw_free_runs(data.records, list(runs))
+        if output not in model.output_names:
+            raise SettingsError(f"name one output as output=..., of {', '.join(model.output_names)}")
+        place = model.output_names.index(output)
+        if ax is not None:
+            draw_free_run_panel(ax, data.records[place], runs[place])
+            return cast("Figure", ax.get_figure(root=True))
+        band = None if self.prediction_bands is None else self.bands(data).outputs[place]
+        return draw_free_run(data.records[place], runs[place], band=band)
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:
         """Return the model as text, or write it to a file.
@@ -486,14 +553,36 @@ class FittedModel:
         return f"<{type(self).__name__}{rank}: {self.equation}>"
 
     def _repr_html_(self) -> str:
-        sentences = [self.describe_error()] if self.metrics else []
-        return render_html(self.model, sentences, None if self._search_result is None else self.plot())
+        figure = None if self._search_result is None else self.plot()
+        return render_html(self.model, self.describe_errors() if self.metrics else [], figure)
 
-    def describe_error(self) -> str:
-        """Return the rank and the error of the model as a sentence."""
-        error = self.metrics["validation"]["free_run"].rmse
-        text = f"Rank {self.rank}: free-run RMSE on the validation data {error:.4g} {self.output_unit}"
-        return text.rstrip() + (f", {BEFORE_REFIT}" if self.is_refitted else "")
+    def describe_errors(self) -> list[str]:
+        """Return the rank and the error of every output as sentences."""
+        refitted = f", {BEFORE_REFIT}" if self.is_refitted else ""
+        named = list_metrics(self.metrics).items()
+        return [
+            f"Rank {self.rank}: free-run RMSE {f'of {name} ' if name else ''}on the validation data "
+            f"{errors['validation']['free_run'].rmse:.4g} {unit}".rstrip()
+            + refitted
+            for (name, errors), unit in zip(named, self.output_units, strict=True)
+        ]
+
+    def _require_one_output(self) -> DynamicModel:
+        """Return the model.
+
+        Raises
+        ------
+        ModelError
+            It has several outputs.
+        """
+        if isinstance(self.model, CoupledModel):
+            raise ModelError("the model has several outputs: take a separate one, as result.outputs[0].best")
+        return self.model
+
+
+def list_metrics(metrics: Mapping[str, Any]) -> Mapping[str, Mapping[str, Mapping[str, Metrics]]]:
+    """Return the errors of a model by output; that of a model of one output has no name."""
+    return {"": metrics} if "validation" in metrics and "free_run" in metrics["validation"] else metrics
 
 
 def _missing_search() -> ModelError:

@@ -11,20 +11,29 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError, SettingsError, check_type
-from islands.evolution.search_result import SearchResult, state_steps
+from islands.evolution.search_result import AnySearchResult, CoupledSearchResult, state_steps
 from islands.facade.results.comparison import ResultComparison, compare_models
-from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.fitted_model import FittedModel, list_metrics
 from islands.facade.results.notebook_html import render_html
+from islands.models.coupled_narx import list_models
 from islands.models.state_space import StateSpace
 from islands.progress import Steps
-from islands.report.documents.result_folder import content_sha256, result_document, write_result
-from islands.report.figures.names import OVERVIEW, RESPONSES
+from islands.report.documents.result_folder import (
+    content_sha256,
+    list_folders,
+    result_document,
+    write_result,
+)
+from islands.report.figures.names import FREE_RUN, OVERVIEW, RESPONSES, name_free_runs
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.statements import describe
 from islands.report.text.summary import summary
 from islands.simulation.predictors import Simulation
 from islands.simulation.stepper import Stepper
+from islands.validation.assessment import Assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.metrics import Metrics
+from islands.validation.prediction_bands import LEVEL, PredictionBand
 from islands.validation.recommendation import Recommendation
 
 if TYPE_CHECKING:
@@ -49,6 +58,8 @@ class Result:
         Rank of the recommended model, and the reasons for the choice.
     settings : mapping
         Settings that determine the result, together with the record and the seed.
+    outputs : tuple of Result
+        Separate result of every output, of several outputs that were searched one by one; otherwise empty.
     folder : Path or None
         Folder that the result was read from; None for a new result.
     document : mapping
@@ -59,20 +70,24 @@ class Result:
     models: tuple[FittedModel, ...]
     recommendation: Recommendation
     settings: Mapping[str, Any]
+    outputs: tuple["Result", ...] = ()
     folder: Path | None = None
     document: Mapping[str, Any] = field(default_factory=dict)
-    _search_result: SearchResult | None = None
+    _search_result: AnySearchResult | None = None
 
     @classmethod
-    def from_search(cls, found: SearchResult) -> "Result":
+    def from_search(cls, found: AnySearchResult) -> "Result":
         """Return the result of a search."""
+        entries: Sequence[Assessment | CoupledAssessment] = found.models
         models = tuple(
-            FittedModel.from_search(rank, entry, found) for rank, entry in enumerate(found.models, start=1)
+            FittedModel.from_search(rank, entry, found) for rank, entry in enumerate(entries, start=1)
         )
-        return cls(models, found.recommendation, found.settings, _search_result=found)
+        outputs = found.outputs if isinstance(found, CoupledSearchResult) else ()
+        separate = tuple(map(cls.from_search, outputs))
+        return cls(models, found.recommendation, found.settings, separate, _search_result=found)
 
     @property
-    def search_result(self) -> SearchResult:
+    def search_result(self) -> AnySearchResult:
         """Record, split and statistics of the search.
 
         Raises
@@ -83,6 +98,11 @@ class Result:
         if self._search_result is None:
             raise ModelError(f"{self.folder} has no data of its search: read `document`, or search again")
         return self._search_result
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return self.best.output_names
 
     @property
     def best(self) -> FittedModel:
@@ -99,7 +119,7 @@ class Result:
         dt: float | None = None,
         *,
         inputs: str | Sequence[str] = (),
-        output: str | None = None,
+        output: str | Sequence[str] | None = None,
     ) -> NDArray[np.float64]:
         """Return the free run of the recommended model; see `FittedModel.predict`."""
         return self.best.predict(record, y, dt, inputs=inputs, output=output)
@@ -110,7 +130,7 @@ class Result:
         mode: str = "free-run",
         warm_up: int | None = None,
         shooting: int | None = None,
-        y: float | None = None,
+        y: ArrayLike | None = None,
         states: Sequence[float] | None = None,
     ) -> Simulation:
         """Simulate a record, or inputs alone, with the recommended model; see `FittedModel.simulate`."""
@@ -119,7 +139,7 @@ class Result:
     def stepper(
         self,
         u: "OperatingPoint | None" = None,
-        y: float | None = None,
+        y: ArrayLike | None = None,
         states: Sequence[float] | None = None,
     ) -> Stepper:
         """Return a simulation of one sample at a time; see `FittedModel.stepper`."""
@@ -141,11 +161,20 @@ class Result:
         """Return the recommended model as text, or write it to a file; see `FittedModel.export`."""
         return self.best.export(kind, path)
 
+    def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
+        """Simulate a record with a band about the free run; see `FittedModel.bands`."""
+        return self.best.bands(record, level, warm_up)
+
     def plot(
-        self, kind: str = "free-run", record: "RecordLike | None" = None, *, ax: "Axes | None" = None
+        self,
+        kind: str = "free-run",
+        record: "RecordLike | None" = None,
+        *,
+        output: str | None = None,
+        ax: "Axes | None" = None,
     ) -> "Figure":
         """Draw a figure of the recommended model; see `FittedModel.plot`."""
-        return self.best.plot(kind, record, ax=ax)
+        return self.best.plot(kind, record, output=output, ax=ax)
 
     def compare(
         self,
@@ -186,7 +215,7 @@ class Result:
         )
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per model, by rank.
+        """Return a table with one row per model, by rank, and per output of several.
 
         Columns: whether it is recommended, its terms, its errors in free run (RMSE in the unit of the output,
         MAPE in per cent of the output range, R2) on both parts of the data and one step ahead, and its
@@ -201,8 +230,9 @@ class Result:
             import pandas  # noqa: PLC0415
         except ImportError as error:
             raise SettingsError("install pandas to get a table of the models") from error
-        rows = [_row(each, each.rank == self.recommendation.rank) for each in self.models]
-        return pandas.DataFrame(rows).set_index("rank")
+        rows = [row for each in self.models for row in _rows(each, each.rank == self.recommendation.rank)]
+        index = ["rank", "output"] if "output" in rows[0] else "rank"
+        return pandas.DataFrame(rows).set_index(index)
 
     def __repr__(self) -> str:
         models = len(self.models)
@@ -221,7 +251,7 @@ class Result:
         if self._search_result is None:
             sha256, average = self.document["record"]["sha256"], self.document["preprocessing"]["average"]
         else:
-            record, average = self._search_result.record, self._search_result.average
+            record, average = self._search_result.record.records[0], self._search_result.average
             sha256 = record.sha256 or content_sha256(record)
         return json.dumps([sha256, self.settings["validation"], average], sort_keys=True)
 
@@ -232,6 +262,8 @@ class Result:
 
     def save(self, folder: str | Path, steps: Steps | None = None, figures: Sequence[str] = OVERVIEW) -> Path:
         """Write ``result.json``, the models, the texts, and figures of the recommended model and the search.
+
+        Of several outputs, the folder ``outputs/`` has a folder with the separate result of each.
 
         Parameters
         ----------
@@ -250,6 +282,10 @@ class Result:
         for path in (folder / "figures").glob("*.svg"):
             path.unlink()  # of an earlier result
         write_result(found, folder)
+        for name, separate in zip(list_folders(self.output_names), self.outputs, strict=False):
+            own = Steps(stop=steps.stop)
+            separate.save(folder / name, own, figures)
+            steps.add(own.left_out, own.not_computed, separate.output_names[0])
         if figures:  # matplotlib takes half a second to load
             steps.attempt("figures", partial(self._draw_figures, folder / "figures", figures, steps))
         if steps.not_computed:
@@ -262,24 +298,30 @@ class Result:
         from islands.report.figures.style import save  # noqa: PLC0415
 
         folder.mkdir(parents=True, exist_ok=True)
-        drawn: dict[str, Callable[[], Figure]] = {
-            kind: partial(self.best.plot, kind) for kind in model_figures(self.search_result, self.best.model)
-        }
-        for name in search_figures(self.search_result):
-            drawn[name] = partial(SEARCH_FIGURES[name], self.search_result)
+        found = self.search_result
+        drawn: dict[str, Callable[[], Figure]] = {}
+        if isinstance(found, CoupledSearchResult):
+            if FREE_RUN in names:
+                runs = zip(name_free_runs(len(self.output_names)), self.output_names, strict=True)
+                drawn = {name: partial(self.plot, output=output) for name, output in runs}
+            responses: Callable[[], dict[str, Figure]] = dict
+        else:
+            model = self.best.assessment.final_model
+            drawn = {kind: partial(self.plot, kind) for kind in model_figures(found, model)}
+            drawn |= {name: partial(SEARCH_FIGURES[name], found) for name in search_figures(found)}
+            drawn = {name: draw for name, draw in drawn.items() if name in names}
+            responses = partial(draw_responses, model, found.split.estimation)
 
         def draw_one(name: str) -> None:
             save(drawn[name](), folder / f"{name}.svg")
 
         def draw_all_responses() -> None:
-            responses = draw_responses(self.best.model, self.search_result.split.estimation)
-            for name, figure in responses.items():
+            for name, figure in responses().items():
                 if name in names:
                     save(figure, folder / f"{name}.svg")
 
         for name in drawn:
-            if name in names:
-                steps.attempt(f"figure {name}", partial(draw_one, name))
+            steps.attempt(f"figure {name}", partial(draw_one, name))
         if set(names).intersection(RESPONSES):
             steps.attempt("figures of responses", draw_all_responses)
 
@@ -297,17 +339,24 @@ class Result:
         return self.document if self._search_result is None else result_document(self._search_result)
 
 
-def _row(entry: FittedModel, recommended: bool) -> dict[str, object]:
-    return {
-        "rank": entry.rank,
-        "recommended": recommended,
-        "terms": entry.model.size,
-        **list_errors(entry.metrics),
-        "equation": entry.equation,
-    }
+def _rows(entry: FittedModel, recommended: bool) -> list[dict[str, object]]:
+    """Return the row of every output of a model."""
+    return [
+        {
+            "rank": entry.rank,
+            **({"output": name} if name else {}),
+            "recommended": recommended,
+            "terms": single.size,
+            **_list_errors(found),
+            "equation": single.equation().named,
+        }
+        for (name, found), single in zip(
+            list_metrics(entry.metrics).items(), list_models(entry.model), strict=True
+        )
+    ]
 
 
-def list_errors(metrics: Mapping[str, Mapping[str, Metrics]]) -> dict[str, float]:
+def _list_errors(metrics: Mapping[str, Mapping[str, Metrics]]) -> dict[str, float]:
     """Return the errors of a table by column: in free run on both parts of the data, and one step ahead."""
     parts = {"est": "estimation", "val": "validation"}
     errors = {

@@ -7,7 +7,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from islands.errors import ModelError
-from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.coupled_narx import AnyModel, CoupledModel, list_models
 from islands.models.linearisation import OperatingPoint, find_rest, linearise_block, read_levels
 from islands.models.measured_signals import measured_block
 from islands.models.protocol import DynamicModel, no_model_error
@@ -83,7 +83,7 @@ def split_point(
     ModelError
         Some outputs are given, but not all.
     """
-    outputs = model.output_names if isinstance(model, CoupledModel) else (model.output_name,)
+    outputs = [each.output_name for each in list_models(model)]
     inputs = {name: level for name, level in levels.items() if name not in outputs}
     given = [name for name in outputs if name in levels]
     if given and len(given) < len(outputs):

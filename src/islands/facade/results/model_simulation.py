@@ -2,20 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.errors import SettingsError, lookup
+from islands.errors import RecordError, SettingsError, lookup
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.protocol import DynamicModel
 from islands.records.channel_names import parse_channel_name
 from islands.records.compatibility import ColumnReference
-from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.coupled import AnyRecord, CoupledRecord, match_coupled
 from islands.records.dataset import Dataset, join
-from islands.records.reading.column_names import find_column
-from islands.records.reading.data_frames import as_record, column_names, states_time
+from islands.records.reading.column_names import find_column, take_outputs
+from islands.records.reading.data_frames import as_dataset, as_record, column_names, states_time
 from islands.records.signal_map import match_rate
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.input_response import simulate_inputs
@@ -36,7 +37,7 @@ SIMULATION_MODES = ("one-step", "shooting", "free-run")
 
 
 def simulate(
-    model: "DynamicModel | str | Mapping[str, object] | SimulationSpec | LocalSpec",
+    model: "AnyModel | str | Mapping[str, object] | SimulationSpec | LocalSpec",
     record: "RecordLike",
     mode: str = "free-run",
     shooting: int = SHOOTING,
@@ -49,11 +50,11 @@ def simulate(
 
     Parameters
     ----------
-    model : DynamicModel, str, mapping or spec
+    model : DynamicModel, CoupledModel, str, mapping or spec
         A model; or a simulator, as its name on the command line (``second-order``), its specification, or
         the document of an extended simulation.
-    record : Dataset, data frame or array
-        Inputs, and the output from which initial states are taken. Without an output, a model is simulated
+    record : record, data frame or array
+        Inputs, and the outputs from which initial states are taken. Without an output, a model is simulated
         from rest at the first inputs. A list has several recordings. Its samples are averaged if the model
         describes means of samples and the record has the sampling time before averaging (see `match_rate`).
     mode : str
@@ -65,8 +66,8 @@ def simulate(
         Recorded simulations by name for the simulator ``column:NAME``, each of shape (samples,).
     warm_up : int, optional
         Number of samples before the first prediction of a model; by default the model's largest lag.
-    y : float, optional
-        Output of a model before the first sample, in place of that of the record.
+    y : float or sequence of float, optional
+        Outputs of a model before the first sample, in place of those of the record.
     states : sequence of float, optional
         States of a latent model at the first sample.
 
@@ -81,22 +82,21 @@ def simulate(
     """
     intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
     interval = lookup(intervals, mode, "mode")
-    if isinstance(model, DynamicModel):
-        record = record_of_model(model, record)
-        record = match_rate(model, record)
+    if isinstance(model, DynamicModel | CoupledModel):
+        data = match_columns(model, record_of_model(model, record))
         if interval is None:
-            return run_freely(model, record, warm_up, y, states)
+            return run_freely(model, data, warm_up, y, states)
         if y is not None or states is not None:
             raise SettingsError("a start is that of a free run: leave out the mode")
-        return multiple_shooting(model, record, interval, warm_up)
+        return multiple_shooting(model, data, interval, warm_up)
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
     # Import the simulators of the discrepancy analysis only if they are used.
     from islands.diagnosis.calibration.record_simulation import simulate_spec  # noqa: PLC0415
 
-    record = as_record(record)
-    y = simulate_spec(model, record, columns)
-    return Simulation(y, (float(np.mean((record.y - y) ** 2)),), EvaluationOutcome())
+    single = as_dataset(record)
+    y = simulate_spec(model, single, columns)
+    return Simulation(y, (float(np.mean((single.y - y) ** 2)),), EvaluationOutcome())
 
 
 def run_freely(
@@ -113,28 +113,72 @@ def run_freely(
 
 
 def record_of_model(
-    model: DynamicModel | ColumnReference,
+    model: AnyModel,
     data: "RecordLike",
     y: "ArrayLike | IntoSeries | None" = None,
     dt: float | None = None,
     inputs: str | Sequence[str] = (),
-    output: str | None = None,
-) -> Dataset:
+    output: str | Sequence[str] | None = None,
+) -> AnyRecord:
     """Return the record of a simulation of a model, as `as_record` makes it, with missing outputs.
 
-    The columns of a frame are those of the model; one without that of the output, and an array, have inputs
-    alone. A frame without a time has the sampling time of the
-    model, unless others are given.
+    The columns of a frame are those of the model; one without those of some outputs, and an array, have the
+    other columns alone. A frame without a time has the sampling time of the model, unless others are given.
 
     Raises
     ------
     RecordError, SettingsError
         As in `as_record`.
     """
-    if isinstance(data, Dataset):
+    if not isinstance(model, CoupledModel):
+        return _read_output(model, data, y, dt, inputs, output)
+    if isinstance(data, Dataset | CoupledRecord) or y is not None:
         return as_record(data, y, dt, inputs=inputs, output=output)
+    references = (
+        ColumnReference(model.input_names, name, model.dt, model.average) for name in model.output_names
+    )
+    names = take_outputs(output) or model.output_names
+    return CoupledRecord(
+        tuple(
+            _read_output(each, data, None, dt, inputs, name)
+            for each, name in zip(references, names, strict=True)
+        )
+    )
+
+
+def match_columns(model: AnyModel, record: AnyRecord) -> AnyRecord:
+    """Return a record at the rate of a model, with several outputs in the order of the model.
+
+    Raises
+    ------
+    RecordError
+        The record has other outputs, or is too short for the preprocessing of the model.
+    """
+    data = record.map(partial(match_rate, model))
+    if not isinstance(model, CoupledModel):
+        return data
+    if isinstance(data, Dataset):
+        raise RecordError(
+            f"the model has the outputs {', '.join(model.output_names)}, the record {data.output_name}: give "
+            "a record of all of them, as by as_record(frame, inputs=[...], output=[...])"
+        )
+    return match_coupled(model, data)
+
+
+def _read_output(
+    model: DynamicModel | ColumnReference,
+    data: "RecordLike",
+    y: "ArrayLike | IntoSeries | None",
+    dt: float | None,
+    inputs: str | Sequence[str],
+    output: str | Sequence[str] | None,
+) -> Dataset:
+    """Return the record of a model of one output, or of one output of several."""
+    if isinstance(data, Dataset | CoupledRecord):
+        return as_dataset(data, y, dt, inputs=inputs, output=output)
     if isinstance(data, list | tuple) and y is None and not np.isscalar(data[0]):
-        return join(tuple(record_of_model(model, each, None, dt, inputs, output) for each in data))
+        return join(tuple(_read_output(model, each, None, dt, inputs, output) for each in data))
+    output = next(iter(take_outputs(output)), None)
     if y is None:
         inputs, output = inputs or _name_columns(model), output or model.output_name
     known = column_names(data)
@@ -146,7 +190,7 @@ def record_of_model(
         output = None
     if dt is None and model.dt is not None and not states_time(data, (*inputs, output or "")):
         dt = model.dt / model.average
-    record = as_record(data, y, dt, inputs=inputs, output=output, missing_output=True)
+    record = as_dataset(data, y, dt, inputs=inputs, output=output, missing_output=True)
     return record if y is not None or output else replace(record, output_name=model.output_name)
 
 
@@ -154,39 +198,23 @@ def _name_columns(model: "DynamicModel | ColumnReference") -> tuple[str, ...]:
     return tuple(parse_channel_name(name).base for name in model.input_names)
 
 
-def coupled_record_of_model(model: CoupledModel, data: "RecordLike | CoupledRecord") -> CoupledRecord:
-    """Return the record of a model of several outputs, of which a frame may lack some or all outputs.
-
-    Raises
-    ------
-    RecordError, SettingsError
-        As in `as_record`.
-    """
-    if isinstance(data, CoupledRecord):
-        return data
-    references = (
-        ColumnReference(model.input_names, name, model.dt, model.average) for name in model.output_names
-    )
-    return CoupledRecord(tuple(record_of_model(each, data) for each in references))
-
-
-def predict(model: DynamicModel, record: Dataset, warm_up: int | None = None) -> NDArray[np.float64]:
-    """Return the free run of a model with one value for every sample of a record.
+def predict(model: AnyModel, record: AnyRecord, warm_up: int | None = None) -> NDArray[np.float64]:
+    """Return the free run of a model with one value of each output for every sample of a record.
 
     Each sample of a model of means has the prediction of its mean. Behind a decimation, a prediction is held
     until the next sample of the model.
 
     Parameters
     ----------
-    model : DynamicModel
-    record : Dataset
-        Inputs, and the first samples of the output.
+    model : DynamicModel or CoupledModel
+    record : Dataset or CoupledRecord
+        Inputs, and the first samples of the outputs.
     warm_up : int, optional
         Number of steps of the model before the first prediction; by default the model's largest lag.
 
     Returns
     -------
-    ndarray, shape (samples,)
+    ndarray, shape (samples,) or (samples, outputs)
         NaN during the warm-up of every segment and after a divergence.
 
     Raises
@@ -194,19 +222,13 @@ def predict(model: DynamicModel, record: Dataset, warm_up: int | None = None) ->
     RecordError
         The record does not match the model, is too short, or its output is missing in the warm-up.
     """
-    data = match_rate(model, record)
-    return hold_predictions(record, data, run_freely(model, data, warm_up).y)
-
-
-def hold_predictions(
-    record: AnyRecord, data: AnyRecord, simulated: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return a simulation at the rate of a model with one value for every sample as measured."""
-    if data is record:
-        return simulated
-    predicted = np.full((record.samples, *simulated.shape[1:]), np.nan)
+    data = match_columns(model, record)
+    found = run_freely(model, data, model.maximum_lag if warm_up is None else warm_up).y
+    if data.samples == record.samples:
+        return found
+    predicted = np.full((record.samples, *found.shape[1:]), np.nan)
     every = round(data.dt / record.dt)
     for (begin, end), (first, last) in zip(record.bounds, data.bounds, strict=True):
-        held = np.repeat(simulated[first:last], every, axis=0)[: end - begin]
+        held = np.repeat(found[first:last], every, axis=0)[: end - begin]
         predicted[begin : begin + len(held)] = held
     return predicted

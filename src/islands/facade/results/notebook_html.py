@@ -3,14 +3,14 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from islands.models.protocol import DynamicModel
+from islands.models.coupled_narx import AnyModel
 from islands.report.text.layout import write_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def render_html(model: DynamicModel, sentences: Iterable[str], figure: "Figure | None" = None) -> str:
+def render_html(model: AnyModel, sentences: Iterable[str], figure: "Figure | None" = None) -> str:
     """Return the equation of a model in MathML, sentences as paragraphs, and a figure as an image."""
     return render_sentences(sentences, figure, "free run and measurement", model.equation().mathml)
 

@@ -12,16 +12,20 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.tree import Primitive
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
-from islands.models.protocol import DynamicModel
-from islands.persistence.ensembles import bands_from_document, ensemble_from_document
+from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.persistence.ensembles import (
+    bands_from_document,
+    ensemble_from_document,
+    output_bands_from_document,
+)
 from islands.persistence.saved_documents import (
-    check_single_output,
     find_recommended,
     read_listed_model,
     read_shooting_interval,
 )
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
+from islands.validation.prediction_bands import AnyBands
 from islands.validation.recommendation import Exclusion, Recommendation
 
 
@@ -51,14 +55,18 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
         raise ModelError(f"{folder} has no result.json: give the folder of a result") from error
     except (OSError, ValueError) as error:
         raise ModelError(f"{file} cannot be read ({error})") from error
-    if isinstance(document, dict):
-        check_single_output(document, folder)
     try:
         entries = document["models"]
         models = [read_listed_model(folder, entry, primitives) for entry in entries]
         ensemble = ensemble_from_document(document["ensemble"], models[0], primitives)
         stored = tuple(
-            read_entry(model, entry, document, ensemble) for entry, model in zip(entries, models, strict=True)
+            read_entry(model, entry, document, ensemble, primitives)
+            for entry, model in zip(entries, models, strict=True)
+        )
+        separate = tuple(
+            read_result(folder / each["folder"], primitives)
+            for each in document.get("outputs", ())
+            if (folder / each["folder"]).is_dir()
         )
         chosen = document["recommended"]
         recommendation = Recommendation(
@@ -69,37 +77,48 @@ def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMIT
         )
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error
-    return Result(stored, recommendation, document["settings"], folder, MappingProxyType(document))
+    return Result(stored, recommendation, document["settings"], separate, folder, MappingProxyType(document))
 
 
 def read_entry(
-    model: DynamicModel, entry: Mapping[str, Any], document: Mapping[str, Any], ensemble: Ensemble | None
+    model: AnyModel,
+    entry: Mapping[str, Any],
+    document: Mapping[str, Any],
+    ensemble: Ensemble | None,
+    primitives: Mapping[str, Primitive] = PRIMITIVES,
 ) -> FittedModel:
     """Return a model with its errors and prediction bands.
 
     Parameters
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
     entry : mapping
         Entry of the model in ``result.json``.
     document : mapping
         Content of ``result.json``.
     ensemble : Ensemble or None
         Ensemble of the result.
+    primitives : mapping
+        Primitives that expressions may contain.
 
     Raises
     ------
     KeyError, TypeError, ValueError, ModelError
         The document is damaged.
     """
+    metrics: Mapping[str, Any]
+    bands: AnyBands | None
+    units = document["record"]["units"]
+    if isinstance(model, CoupledModel):
+        outputs = document["outputs"]
+        metrics = {each["name"]: _read_metrics(each["metrics"]) for each in outputs}
+        bands = output_bands_from_document(outputs, ensemble, model, primitives)
+    else:
+        metrics = _read_metrics(entry["metrics"])
+        bands = bands_from_document(entry["bands"], ensemble)
     return FittedModel(
-        model,
-        entry["rank"],
-        _read_metrics(entry["metrics"]),
-        entry["warm_up"],
-        read_shooting_interval(document),
-        bands_from_document(entry["bands"], ensemble),
-        document["record"]["units"]["output"],
+        *(model, entry["rank"], metrics, entry["warm_up"], read_shooting_interval(document), bands),
+        tuple(units["outputs"]) if isinstance(model, CoupledModel) else (units["output"],),
         MappingProxyType(entry),
     )
 

@@ -13,7 +13,7 @@ from islands.export.closed_form import closed_form
 from islands.facade.results.model_simulation import simulate
 from islands.facade.results.notebook_html import render_sentences
 from islands.records.dataset import Dataset
-from islands.records.reading.data_frames import as_record
+from islands.records.reading.data_frames import as_dataset
 from islands.report.text.statements import describe_diagnosis
 from islands.simulation.predictors import Simulation
 from islands.simulators.specification.code import FmuSpec
@@ -78,7 +78,7 @@ class SavedSimulation:
             The record does not match the simulation.
         """
         if not isinstance(record, Dataset):
-            record = as_record(record, inputs=self.column_names, output=self.output_name)
+            record = as_dataset(record, inputs=self.column_names, output=self.output_name)
         return simulate(self.spec, record, columns=columns)
 
     def export(self, kind: str = "python", path: str | Path | None = None) -> str | None:

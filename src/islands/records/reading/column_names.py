@@ -111,25 +111,22 @@ def _check_name(name: object, argument: str) -> str:
     )
 
 
-def take_output(output: object) -> str | None:
-    """Return the name of the output; an integer becomes a text.
+def take_outputs(output: object) -> tuple[str, ...]:
+    """Return the names of the outputs; an integer becomes a text.
 
     Raises
     ------
     SettingsError
-        Several outputs are given, or something that is no name.
+        Something is given that is no name, or an empty list.
     """
-    if output is None or isinstance(output, str):
-        return output
-    if isinstance(output, Iterable):
-        names = tuple(_check_name(name, "output") for name in output)
-        if len(names) == 1:
-            return names[0]
-        raise SettingsError(
-            f"output names one column, got {', '.join(names) or 'none'}: name one, or take fit_coupled or "
-            "identify_coupled for all"
-        )
-    return _check_name(output, "output")
+    if output is None:
+        return ()
+    if isinstance(output, str) or not isinstance(output, Iterable):
+        return (_check_name(output, "output"),)
+    names = tuple(_check_name(name, "output") for name in output)
+    if not names:
+        raise SettingsError("output names at least one column, got none")
+    return names
 
 
 def number_column(place: int) -> str:

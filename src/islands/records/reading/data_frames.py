@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import RecordError, SettingsError
+from islands.records.coupled import AnyRecord, CoupledRecord, couple, join_columns
 from islands.records.dataset import Dataset, join
 from islands.records.masked_values import fill_masked
 from islands.records.reading.column_names import (
@@ -21,7 +22,7 @@ from islands.records.reading.column_names import (
     list_inputs,
     looks_like_time,
     seconds_per_unit,
-    take_output,
+    take_outputs,
 )
 from islands.records.reading.formats.columnar import ColumnarFile
 from islands.records.reading.memory_columns import MemoryColumns, read_columns_in_memory
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     FrameLike: TypeAlias = IntoDataFrame | xarray.Dataset | Mapping[str, ArrayLike]
 
     #: What a record can be made of.
-    RecordLike: TypeAlias = Dataset | FrameLike | IntoSeries | ArrayLike | Sequence[Dataset | FrameLike]
+    RecordLike: TypeAlias = AnyRecord | FrameLike | IntoSeries | ArrayLike | Sequence[Dataset | FrameLike]
 
 #: Options of reading, or a mapping of their names to values.
 ReadingLike: TypeAlias = ReadingOptions | Mapping[str, Any]
@@ -51,22 +52,22 @@ def as_record(
     dt: float | None = None,
     *,
     inputs: str | Sequence[str] = (),
-    output: str | None = None,
+    output: str | Sequence[str] | None = None,
     missing_output: bool = False,
     resting_inputs: bool = False,
     signals: Sequence[str] = (),
     **options: Any,
-) -> Dataset:
+) -> AnyRecord:
     """Make a record of a data frame or of arrays, and check it as `read_record` checks a file.
 
     Parameters
     ----------
-    data : Dataset, data frame, xarray Dataset or DataArray, mapping, array, or list of them
+    data : record, data frame, xarray Dataset or DataArray, mapping, array, or list of them
         Columns by name (pandas, polars or another frame that narwhals reads, xarray, or a mapping of names to
-        arrays); or the inputs alone, of shape (samples,) or (samples, inputs), if ``y`` is given. A `Dataset`
-        is returned as it is. A list of frames or of Datasets is one record of several recordings.
+        arrays); or the inputs alone, of shape (samples,) or (samples, inputs), if ``y`` is given. A record is
+        returned as it is. A list of frames or of Datasets is one record of several recordings.
     y : array, optional
-        The output, of shape (samples,).
+        The output, of shape (samples,), or several, of shape (samples, outputs).
     dt : float, optional
         Sampling time in seconds. It may be left out if the data have a time: an index of times or of
         fractions of a second, the time coordinate of xarray data, or a column that `read_record` would take
@@ -74,8 +75,8 @@ def as_record(
     inputs : str or sequence of str
         Names of the input columns, in the order of the model's inputs; ``u_V+1`` reads the column u_V one
         sample early.
-    output : str
-        Name of the output column.
+    output : str or sequence of str
+        Name of the output column, or names of several.
     missing_output : bool
         Accept missing values of the output, also of a whole output that is not named, and constant columns,
         for a simulation.
@@ -90,25 +91,27 @@ def as_record(
 
     Returns
     -------
-    Dataset
+    Dataset or CoupledRecord
+        A record of several outputs is a `CoupledRecord`.
 
     Raises
     ------
     RecordError
-        A column does not exist (the message lists them), has missing values or is constant, or the time is
-        not uniform.
+        A column does not exist (the message lists them), has missing values or is constant, the time is not
+        uniform, or an output is given twice or is also an input.
     SettingsError
         The arguments do not describe a record.
     """
     _check_kinds(data, y)
-    output = take_output(output)
+    outputs = take_outputs(output)
     inputs = inputs if isinstance(inputs, str) else list_inputs(inputs)
     reading = take_reading(options)
     reading.check_array_file(_TITLE, zones=False)
-    if isinstance(data, Dataset):
-        if y is not None or dt is not None or inputs or output is not None or options:
+    if isinstance(data, Dataset | CoupledRecord):
+        if y is not None or dt is not None or inputs or outputs or options:
             raise SettingsError(
-                "a Dataset already has its inputs, output and sampling time: give nothing else"
+                f"a {type(data).__name__} already has its inputs, outputs and sampling time: give nothing "
+                "else"
             )
         return data
     if y is None and isinstance(data, list | tuple) and data and _is_recording(data[0]):
@@ -118,21 +121,23 @@ def as_record(
             "resting_inputs": resting_inputs,
             "signals": signals,
         }
-        made = (_read_one(each, dt, inputs, output, accepted) for each in data)
-        return join(tuple(made))
+        inputs, first = join_columns(list_inputs(inputs), outputs)
+        made = (_read_one(each, dt, inputs, first, accepted) for each in data)
+        return couple(join(tuple(made)), len(outputs))
     columns = read_columns_in_memory(data)
     if y is not None:
-        if inputs or output is not None:
+        if inputs or outputs:
             raise SettingsError(
                 "inputs and output name columns of a data frame: leave them out with two arrays"
             )
-        inputs, output, columns = _join_output(data, columns, y)
+        inputs, outputs, columns = _join_outputs(data, columns, y)
     elif columns is None:
         raise SettingsError(
             "an array holds the inputs only: give the output and the sampling time as well, (u, y, dt)"
         )
-    table = _make_table(columns, (*list_inputs(inputs), output), reading)
-    if output is None and not missing_output:
+    inputs, first = join_columns(list_inputs(inputs), outputs)
+    table = _make_table(columns, (*inputs, first), reading)
+    if first is None and not missing_output:
         raise SettingsError(
             f"no output is given: take one of the columns {', '.join(table.names)} as output=..."
         )
@@ -140,20 +145,43 @@ def as_record(
         # The elements of arrays are samples; a column of a frame may have its own clock.
         reading = replace(reading, rates=ROWS)
     record = read_table(
-        *(table, _TITLE, inputs, output, dt),
+        *(table, _TITLE, inputs, first, dt),
         missing_output=missing_output,
         options=reading,
         resting_inputs=resting_inputs,
         signals=signals,
     )
-    if output is None:
+    if first is None:
         return record
-    names = [*record.input_names, output]
+    names = [*record.input_names, first]
     units = [
         columns.units.get(find_column(name, table.names)) or unit
         for name, unit in zip(names, (*record.input_units, record.output_unit), strict=True)
     ]
-    return replace(record, input_units=tuple(units[:-1]), output_unit=units[-1])
+    record = replace(record, input_units=tuple(units[:-1]), output_unit=units[-1])
+    return couple(record, len(outputs))
+
+
+def as_dataset(
+    data: "RecordLike",
+    y: "ArrayLike | IntoSeries | None" = None,
+    dt: float | None = None,
+    *,
+    inputs: str | Sequence[str] = (),
+    output: str | Sequence[str] | None = None,
+    **options: Any,
+) -> Dataset:
+    """Make a record of one output as `as_record` does.
+
+    Raises
+    ------
+    RecordError, SettingsError
+        As in `as_record`; or there are several outputs.
+    """
+    record = as_record(data, y, dt, inputs=inputs, output=output, **options)
+    if isinstance(record, CoupledRecord):
+        raise SettingsError(f"one output is needed, got {', '.join(record.output_names)}: name one of them")
+    return record
 
 
 def _check_kinds(data: Any, y: Any) -> None:
@@ -174,13 +202,13 @@ def _is_recording(data: Any) -> bool:
 def _read_one(
     data: Any,
     dt: float | None,
-    inputs: str | Sequence[str],
+    inputs: Sequence[str],
     output: str | None,
     accepted: Mapping[str, Any],
 ) -> Dataset:
     if isinstance(data, Dataset):
         return data
-    return as_record(data, dt=dt, inputs=inputs, output=output, **accepted)
+    return as_dataset(data, dt=dt, inputs=inputs, output=output, **accepted)
 
 
 def column_names(data: "RecordLike") -> tuple[str, ...]:
@@ -200,10 +228,10 @@ def read_data(
     y: "ArrayLike | IntoSeries | None",
     dt: float | None,
     inputs: str | Sequence[str],
-    output: str | None,
+    output: str | Sequence[str] | None,
     validation: "RecordLike | float",
     reading: ReadingLike = DEFAULT_READING,
-) -> tuple[Dataset, Dataset | float]:
+) -> tuple[AnyRecord, AnyRecord | float]:
     """Return the record of a search, and its validation data with the same columns or their fraction."""
     options = take_reading(reading).changes()
     record = as_record(data, y, dt, inputs=inputs, output=output, **options)
@@ -212,17 +240,17 @@ def read_data(
             f"validation is a fraction such as 0.25, or a record, got {validation!r}: cut rows by "
             "record[start:stop]"
         )
-    if isinstance(validation, Dataset | Real):
-        return record, cast("Dataset | float", validation)
+    if isinstance(validation, Dataset | CoupledRecord | Real):
+        return record, cast("AnyRecord | float", validation)
     columns = inputs or record.input_names
-    held_out = as_record(validation, dt=dt, inputs=columns, output=output or record.output_name, **options)
+    held_out = as_record(validation, dt=dt, inputs=columns, output=output or record.output_names, **options)
     return record, held_out
 
 
-def _join_output(
+def _join_outputs(
     data: Any, columns: MemoryColumns | None, y: Any
-) -> tuple[tuple[str, ...], str, MemoryColumns]:
-    """Return the names of the inputs and of the output, and the columns of both."""
+) -> tuple[tuple[str, ...], tuple[str, ...], MemoryColumns]:
+    """Return the names of the inputs and of the outputs, and the columns of both."""
     if columns is None:
         u = _to_array(data, "inputs")
         if not u.ndim:
@@ -231,9 +259,10 @@ def _join_output(
             raise SettingsError(
                 f"the inputs are an array of the shape (samples,) or (samples, inputs), got {u.shape}"
             )
-        if u.ndim == 2 and len(u) != np.size(y) == u.shape[1]:
+        samples = (np.shape(y) or (1,))[0]
+        if u.ndim == 2 and len(u) != samples == u.shape[1]:
             raise RecordError(
-                f"the inputs have the shape {u.shape}, the output {np.size(y)} samples: rows are samples, "
+                f"the inputs have the shape {u.shape}, the output {samples} samples: rows are samples, "
                 "give the transpose (u.T)"
             )
         names = ("u",) if u.ndim < 2 else tuple(f"u{place + 1}" for place in range(u.shape[1]))
@@ -242,12 +271,29 @@ def _join_output(
             {name: partial(np.asarray, channel) for name, channel in zip(names, channels, strict=True)}
         )
     loads = {name or "u": load for name, load in columns.load.items()}
-    other = read_columns_in_memory(y) or MemoryColumns({"": partial(_to_array, y, "output")})
-    if len(other.load) != 1:
-        raise RecordError(f"the output is one column, got {', '.join(other.load)}")
-    ((name, load),) = other.load.items()
-    output = name if name and name not in loads else "y"
-    return tuple(loads), output, MemoryColumns(loads | {output: load}, columns.time or other.time)
+    other = read_columns_in_memory(y) or _read_output_array(y)
+    outputs = {
+        name if name and name not in loads else _number_output(place, len(other.load)): load
+        for place, (name, load) in enumerate(other.load.items(), start=1)
+    }
+    return tuple(loads), tuple(outputs), MemoryColumns(loads | outputs, columns.time or other.time)
+
+
+def _read_output_array(y: Any) -> MemoryColumns:
+    """Return the columns of an array of one output, or of several, of the shape (samples, outputs)."""
+    values = _to_array(y, "output")
+    if values.ndim < 2 or 1 in values.shape:
+        return MemoryColumns({"": lambda: values})
+    if values.ndim > 2 or values.shape[0] < values.shape[1]:
+        raise RecordError(
+            f"outputs are an array of the shape (samples, outputs), got {values.shape}: rows are samples"
+        )
+    columns = {_number_output(place, len(values.T)): column for place, column in enumerate(values.T, start=1)}
+    return MemoryColumns({name: partial(np.asarray, column) for name, column in columns.items()})
+
+
+def _number_output(place: int, outputs: int) -> str:
+    return "y" if outputs == 1 else f"y{place}"
 
 
 def _to_array(data: Any, name: str) -> NDArray[Any]:

@@ -18,7 +18,7 @@ from islands.records.reading.column_names import (
     find_column,
     list_inputs,
     split_structures,
-    take_output,
+    take_outputs,
 )
 from islands.records.reading.options import DEFAULT_READING, KEEP, MEAN, ROWS, ReadingOptions
 from islands.records.reading.sampling.column_clocks import ColumnClock, find_clocks, may_differ
@@ -86,7 +86,7 @@ def read_table(
     RecordError
         The record cannot be used as it is.
     """
-    inputs, output = list_inputs(inputs), take_output(output)
+    inputs, (output,) = list_inputs(inputs), take_outputs(output) or (None,)
     sources = [find_column(name, table.names) for name in inputs]
     output = None if output is None else find_column(output, table.names)
     outputs = () if output is None else (output,)

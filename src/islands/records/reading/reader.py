@@ -7,7 +7,9 @@ from functools import partial
 from pathlib import Path
 
 from islands.errors import RecordError, SettingsError
+from islands.records.coupled import AnyRecord, couple, join_columns
 from islands.records.dataset import Dataset
+from islands.records.reading.column_names import list_inputs, take_outputs
 from islands.records.reading.content import find_suffix
 from islands.records.reading.formats.excel import read_workbook
 from islands.records.reading.formats.hdf5 import read_hdf5
@@ -46,7 +48,7 @@ READERS: dict[str, Callable[[Path, ReadingOptions], Table]] = {
 def read_record(
     path: str | Path,
     inputs: Sequence[str],
-    output: str | None,
+    output: str | Sequence[str] | None,
     dt: float | None = None,
     rows: slice | None = None,
     missing_output: bool = False,
@@ -65,8 +67,8 @@ def read_record(
     outliers: str = EXCLUDE,
     rates: str | None = None,
     resting_inputs: bool = False,
-) -> Dataset:
-    """Read inputs and an output from a file and check them.
+) -> AnyRecord:
+    """Read inputs and an output, or several, from a file and check them.
 
     The formats are text (CSV), XLSX, NPZ, MAT, HDF5, Parquet, MDF and TDMS; a file may be compressed as
     ``.gz`` or ``.zip``. A column named ``t``, ``t_*``, ``time*`` or ``Zeit*`` that is not chosen is the time,
@@ -87,9 +89,9 @@ def read_record(
     inputs : sequence of str
         Names of the input columns, in the order of the model's inputs; ``u_V+1`` reads the column u_V one
         sample early, ``u`` the column ``u [V]``.
-    output : str or None
-        Name of the output column. None for an input without data, as `plan_experiment` takes it: all values
-        of the output are then missing.
+    output : str, sequence of str or None
+        Name of the output column, or names of several. None for an input without data, as `plan_experiment`
+        takes it: all values of the output are then missing.
     dt : float, optional
         Sampling time in seconds, for files that do not contain it. If the file contains it, both must agree
         within 1 %; time stamps with jitter or few digits are then replaced. An NPZ or MAT file may contain it
@@ -141,7 +143,8 @@ def read_record(
 
     Returns
     -------
-    Dataset
+    Dataset or CoupledRecord
+        A `CoupledRecord`, which has one `Dataset` for each output, of several outputs. The arrays are
         float64 with the columns' names and units; ``start`` is the time of the first sample; ``reading``
         states what was assumed about the time, and what ``resample``, ``gaps``, ``outliers`` and
         ``rates`` have done.
@@ -168,7 +171,10 @@ def read_record(
         outliers=outliers,
         rates=rates,
     )
-    return read_dataset(path, inputs, output, dt, rows, missing_output, options, resting_inputs)
+    outputs = take_outputs(output)
+    columns, first = join_columns(list_inputs(inputs), outputs)
+    record = read_dataset(path, columns, first, dt, rows, missing_output, options, resting_inputs)
+    return couple(record, len(outputs))
 
 
 def read_dataset(

@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from math import isfinite
@@ -15,8 +16,14 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.estimation.estimator_table import Criterion
-from islands.evolution.search_result import SearchResult, state_steps, without_optional_steps
-from islands.models.coupled_narx import AnyModel
+from islands.evolution.search_result import (
+    AnySearchResult,
+    CoupledSearchResult,
+    SearchResult,
+    state_steps,
+    without_optional_steps,
+)
+from islands.models.coupled_narx import AnyModel, coupled_signals
 from islands.models.equations import name_gains, named_signals, named_statement
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
@@ -28,6 +35,7 @@ from islands.persistence.checkpoints import replace_file
 from islands.persistence.ensembles import bands_document, ensemble_document
 from islands.persistence.models import model_json, terms_document, write_model
 from islands.progress import Steps
+from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset
 from islands.records.flat_extremes import find_limits
 from islands.records.inspection.noise import measure_output_noise
@@ -36,16 +44,17 @@ from islands.records.split import measure_input_ranges
 from islands.report.text.summary import certificates_document, method_text, summary
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
-from islands.validation.metrics import metrics
+from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import PhysicsChecks
-from islands.validation.predictable_residual import ResidualStructure
+from islands.validation.predictable_residual import ResidualStructure, missing_structure
 from islands.validation.residual_tests import ResidualTests
 
 SCHEMA = "islands.result/1"
 
 
-def result_json(found: SearchResult) -> str:
+def result_json(found: AnySearchResult) -> str:
     """Return the text of ``result.json``."""
     return _write_json(result_document(found))
 
@@ -54,13 +63,9 @@ def _write_json(document: Mapping[str, Any]) -> str:
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def result_document(found: SearchResult) -> dict[str, Any]:
+def result_document(found: AnySearchResult) -> dict[str, Any]:
     """Return a result as JSON values; NaN and infinity become null."""
-    # The checks of a model are made when they are first read.
-    list(map_over_record(attrgetter("final_physics", "residual_tests"), found.models, found.record.samples))
-    steps = Steps()
-    data = steps.attempt("facts about the data", partial(_data_document, found)) or {}
-    search, recommendation = found.search, found.recommendation
+    search, record = found.search, found.record.records[0]
     document = {
         "schema": SCHEMA,
         "record": record_document(found.record),
@@ -69,7 +74,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             "dt": found.split.estimation.dt,
             "feedthrough": list(found.direct_inputs),
             "shooting_interval": found.shooting_interval,
-            "steps": None if found.record.preprocessing is None else found.record.preprocessing.as_document(),
+            "steps": None if record.preprocessing is None else record.preprocessing.as_document(),
         },
         "seed": found.seed,
         "settings": dict(found.settings),
@@ -84,11 +89,24 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             "left_out": list(search.left_out),
             "duplicates": search.duplicates,
             "feasible_share": search.feasible_share,
-            "certificates": certificates_document(found),
+            "certificates": certificates_document(found) if isinstance(found, SearchResult) else [],
             "caches": {
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },
         },
+        **(_describe_outputs(found) if isinstance(found, CoupledSearchResult) else _describe_models(found)),
+    }
+    complete: dict[str, Any] = finite(document)
+    return complete
+
+
+def _describe_models(found: SearchResult) -> dict[str, Any]:
+    """Return the models of one output, and what they are compared with."""
+    # The checks of a model are made when they are first read.
+    list(map_over_record(attrgetter("final_physics", "residual_tests"), found.models, found.record.samples))
+    steps, recommendation = Steps(), found.recommendation
+    data = steps.attempt("facts about the data", partial(_data_document, found)) or {}
+    return {
         "not_computed": _list_not_computed(state_steps(found, steps)),
         "data": data,
         "loop": found.has_loop,
@@ -100,8 +118,97 @@ def result_document(found: SearchResult) -> dict[str, Any]:
         "ensemble": ensemble_document(found.ensemble),
         "linear": None if found.linear is None else _comparison_document(found.linear),
     }
-    described: dict[str, Any] = finite(document)
-    return described
+
+
+def _describe_outputs(found: CoupledSearchResult) -> dict[str, Any]:
+    """Return the model of several outputs, and the common free run of each of them."""
+    steps, entry = Steps(), found.recommended
+    steps.refusal = found.refusal
+    outputs = [_output_document(place, entry, steps) for place in range(len(entry.model.models))]
+    parts = {part: getattr(entry.split, part).records[0] for part in PARTS}
+    return {
+        "not_computed": list_failures({**found.search.not_computed, **steps.not_computed}),
+        "data": {"inputs": {part: measure_input_ranges(record) for part, record in parts.items()}},
+        "recommended": asdict(found.recommendation),
+        "outputs": outputs,
+        "models": [_coupled_model_document(rank, each) for rank, each in enumerate(found.models, start=1)],
+        "ensemble": ensemble_document(found.ensemble),
+    }
+
+
+def _output_document(place: int, entry: CoupledAssessment, steps: Steps) -> dict[str, Any]:
+    """Return the common free run of one output; its residual and its gross errors are optional steps."""
+    estimation, validation, whole = (
+        data.records[place] for data in (entry.split.estimation, entry.split.validation, entry.split.record)
+    )
+    name, bands = validation.output_name, None if entry.bands is None else entry.bands.outputs[place]
+    own = entry.bands is not None and entry.bands.ensemble is None
+    residual = steps.attempt(f"residual tests of {name}", partial(entry.measure_residual, place))
+    left_out = steps.attempt(
+        f"gross errors of {name}",
+        lambda: measure_left_out(
+            whole, lambda: free_run(entry.model, entry.split.record, entry.warm_up).y[:, place]
+        ),
+    )
+    return {
+        "name": name,
+        "unit": validation.output_unit,
+        "folder": list_folders(entry.model.output_names)[place],
+        "rank": entry.ranks[place],
+        "bands": bands_document(bands),
+        **({"ensemble": ensemble_document(bands.ensemble)} if own and bands else {}),
+        "data": {
+            "noise": measure_output_noise(estimation),
+            "output_range": validation.output_range,
+            "left_out": left_out,
+        },
+        "residual": residual_structure_document(residual or missing_structure()),
+        "metrics": {
+            part: {mode: asdict(each) for mode, each in by_mode.items()}
+            for part, by_mode in entry.metrics[name].items()
+        },
+    }
+
+
+def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, Any]:
+    model, written = entry.model, entry.model.equation()
+    ensemble = None if entry.bands is None else entry.bands.ensemble
+    signals = coupled_signals(model)
+    return {
+        "kind": model.kind,
+        "rank": rank,
+        "recommended": rank == 1,
+        "size": model.size,
+        "equation": written.named,
+        "latex": written.latex,
+        "signals": signals,
+        "named_signals": signals,
+        "terms": terms_in_result(model, ensemble),
+        "refined": entry.refined,
+        "metrics": {
+            part: {
+                mode: _average([parts[part][mode] for parts in entry.metrics.values()])
+                for mode in ("one_step_ahead", "free_run")
+            }
+            for part in PARTS
+        },
+        "warm_up": entry.warm_up,
+    }
+
+
+def _average(errors: Sequence[Metrics]) -> dict[str, float]:
+    """Return the means over the outputs of the errors that have no unit."""
+    return {
+        name: float(np.mean([getattr(each, name) for each in errors]))
+        for name in ("mape", "r2", "fit_percent")
+    }
+
+
+def list_folders(outputs: Sequence[str]) -> list[str]:
+    """Return the folder of the separate result of every output, such as ``outputs/1-level_cm``."""
+    return [
+        f"outputs/{place}-{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}" for place, name in enumerate(outputs, 1)
+    ]
 
 
 def _list_not_computed(found: SearchResult) -> list[dict[str, str]]:
@@ -124,15 +231,21 @@ def list_failures(not_computed: Mapping[str, str]) -> list[dict[str, str]]:
     return [{"step": step, "reason": reason} for step, reason in not_computed.items()]
 
 
-def record_document(record: Dataset) -> dict[str, Any]:
-    """Return the description of a record as JSON values."""
+def record_document(recorded: AnyRecord) -> dict[str, Any]:
+    """Return the description of a record of one or several outputs as JSON values."""
+    record, *others = recorded.records
+    names: dict[str, Any] = {"output": record.output_name}
+    units: dict[str, Any] = {"output": record.output_unit}
+    if others:
+        names = {"outputs": list(recorded.output_names)}
+        units = {"outputs": [each.output_unit for each in recorded.records]}
     return {
         "sha256": record.sha256 or content_sha256(record),
         "samples": record.samples,
         "dt": record.dt,
         "start": record.start,
-        "names": {"inputs": list(record.input_names), "output": record.output_name},
-        "units": {"inputs": list(record.input_units), "output": record.output_unit},
+        "names": {"inputs": list(record.input_names), **names},
+        "units": {"inputs": list(record.input_units), **units},
         "segments": list(record.segments),
         "recordings": list(record.recordings),
         "reading": list(record.reading),
@@ -328,24 +441,24 @@ def residual_structure_document(structure: ResidualStructure) -> dict[str, Any]:
     }
 
 
-def write_result(found: SearchResult, folder: Path) -> None:
-    """Write ``models/NN.json``, ``summary.txt``, ``method.txt`` and, last, ``result.json``.
+def write_result(found: AnySearchResult, folder: Path) -> None:
+    """Write ``models/NN.json``, ``summary.txt``, ``method.txt`` of one output and, last, ``result.json``.
 
     Remove the model files of an earlier result in the same folder. A text that fails is an optional step.
     """
     models = folder / "models"
     models.mkdir(parents=True, exist_ok=True)
-    for rank, entry in enumerate(found.models, start=1):
+    entries: Sequence[Assessment | CoupledAssessment] = found.models
+    for rank, entry in enumerate(entries, start=1):
         write_model(entry.final_model, models / f"{rank:02d}.json")
     for path in models.glob("[0-9][0-9]*.json"):
         if int(path.stem) > len(found.models):
             path.unlink()
     steps = Steps()
     document, best = result_document(found), found.recommended.final_model
-    texts = {
-        "summary.txt": partial(summary, document, best),
-        "method.txt": partial(method_text, found),
-    }
+    texts = {"summary.txt": partial(summary, document, best)}
+    if isinstance(found, SearchResult):
+        texts["method.txt"] = partial(method_text, found)
     for name, write in texts.items():
         text = steps.attempt(name, write)
         if text is None:

@@ -1,5 +1,7 @@
 """Measured and simulated output over time, and the residual."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -96,6 +98,25 @@ def draw_free_run(
     axes[0].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
     axes[1].set_title(_format_errors(record, yhat), loc="right", fontsize=8.0)
     figure.align_ylabels()
+    return finish(figure)
+
+
+@house_style()
+def draw_free_runs(records: Sequence[Dataset], simulated: Sequence[NDArray[np.float64]]) -> Figure:
+    """Draw the measured output and the free run of several outputs, one below the other.
+
+    Parameters
+    ----------
+    records : sequence of Dataset
+        Record of each output.
+    simulated : sequence of ndarray
+        Simulation of each output, of shape (samples,).
+    """
+    figure = blank(0.6 + 2.0 * len(records))
+    panels = figure.subplots(len(records), sharex=True, squeeze=False)[:, 0]
+    for axes, record, run in zip(panels, records, simulated, strict=True):
+        draw_free_run_panel(axes, record, run)
+        axes.label_outer()
     return finish(figure)
 
 

@@ -57,3 +57,8 @@ def parse_figures(text: str) -> tuple[str, ...]:
             known = ", ".join((*ALL_FIGURES, "all", "none"))
             raise SettingsError(f"there is no figure {name!r}: take one or several of {known}")
     return tuple(dict.fromkeys(names))
+
+
+def name_free_runs(outputs: int) -> list[str]:
+    """Return the names of the figures of the free run, of each of several outputs."""
+    return [FREE_RUN] if outputs == 1 else [f"{FREE_RUN}-{place + 1}" for place in range(outputs)]

@@ -659,7 +659,7 @@ class OutputFacts(RunFacts):
         super().__init__(output["metrics"], output["unit"], bands, residual, output["data"])
 
 
-class CoupledFacts:
+class OutputsFacts:
     """Quantities of a result of several outputs that the statements read.
 
     Parameters
@@ -686,15 +686,15 @@ class CoupledFacts:
     @cached_property
     def extrapolation(self) -> list[str]:
         """Inputs of the validation data that leave the range of the estimation data."""
-        record, ranges = self.document["estimation"], self.document["inputs"]
+        record, ranges = self.document["record"], self.document["data"]["inputs"]
         columns = record["names"]["inputs"], record["units"]["inputs"]
         return compare_input_ranges(*columns, ranges["estimation"], ranges["validation"])
 
     @cached_property
     def limits(self) -> list[str]:
         """Checks that an output or the model fails. A divergence of the free run concerns every output."""
-        failed = [text for each in self.outputs for text in write("coupled", "limit", output=each)]
-        return list(dict.fromkeys([*failed, *write("coupled", "extrapolation", f=self)]))
+        failed = [text for each in self.outputs for text in write("outputs", "limit", output=each)]
+        return list(dict.fromkeys([*failed, *write("outputs", "extrapolation", f=self)]))
 
     @property
     def simulates(self) -> bool:

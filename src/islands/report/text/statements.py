@@ -4,7 +4,7 @@ A run, its folder, the REST service, the page, the report and a notebook state t
 """
 
 from islands.report.text.diagnosis_facts import DiagnosisFacts
-from islands.report.text.facts import CoupledFacts, Document, ResultFacts
+from islands.report.text.facts import Document, OutputsFacts, ResultFacts
 from islands.sentences import write, write_named, write_one
 
 
@@ -18,6 +18,8 @@ def describe(document: Document) -> list[str]:
     document : mapping
         Content of ``result.json``.
     """
+    if "outputs" in document:
+        return _describe_outputs(document)
     facts = ResultFacts(document)
     return [
         *write("result", "essence", f=facts),
@@ -28,14 +30,14 @@ def describe(document: Document) -> list[str]:
     ]
 
 
-def describe_coupled(document: Document) -> list[str]:
-    """Describe a result of several outputs in sentences; the equations are indented."""
-    facts = CoupledFacts(document)
+def _describe_outputs(document: Document) -> list[str]:
+    """Describe the model of several outputs in sentences; its equations are indented."""
+    facts = OutputsFacts(document)
     return [
-        *write("coupled", "essence", f=facts),
-        write_one("coupled", "equations", f=facts),
-        f"    {'; '.join(document['equation'].splitlines())}",
-        *write("coupled", "finding", f=facts),
+        *write("outputs", "essence", f=facts),
+        write_one("outputs", "equations", f=facts),
+        f"    {'; '.join(facts.model['equation'].splitlines())}",
+        *write("outputs", "finding", f=facts),
     ]
 
 

@@ -9,6 +9,7 @@ from islands.estimation.latent_models import ORDERS
 from islands.evolution.latent_variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
 from islands.evolution.search_result import SearchResult
 from islands.evolution.settings import LATENT
+from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals
 from islands.models.equations import named_signals
 from islands.models.latent import STRUCTURE_SUMMARIES
 from islands.models.linearisation import find_rest
@@ -16,9 +17,9 @@ from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.persistence.saved_documents import find_recommended
-from islands.report.text.facts import Document, ResultFacts
+from islands.report.text.facts import Document, OutputFacts, OutputsFacts, ResultFacts
 from islands.report.text.layout import LEGEND, MARK, term_table, wrap
-from islands.sentences import write, write_one
+from islands.sentences import write, write_named, write_one
 from islands.validation.assessment import PARTS
 
 #: Columns of every table.
@@ -28,16 +29,18 @@ _COLUMNS = ("rank", "terms", "MAPE est. %", "MAPE val. %", "R2 val.", "residuals
 _HYSTERESIS_COLUMNS = ("drift %", "Property 1")
 
 
-def summary(document: Document, model: DynamicModel) -> str:
+def summary(document: Document, model: AnyModel) -> str:
     """Return the summary as lines of at most 80 characters, unless a name is longer.
 
     Parameters
     ----------
     document : mapping
         Content of ``result.json``.
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
         The recommended model.
     """
+    if isinstance(model, CoupledModel):
+        return _summarise_outputs(document, model)
     facts = ResultFacts(document)
     lines = [
         *(line for sentence in write("result", "essence", f=facts) for line in wrap(sentence)),
@@ -54,6 +57,38 @@ def summary(document: Document, model: DynamicModel) -> str:
         LEGEND,
     ]
     return "\n".join(lines) + "\n"
+
+
+def _summarise_outputs(document: Document, model: CoupledModel) -> str:
+    """Return the summary of a result of several outputs; their errors are in a table."""
+    facts = OutputsFacts(document)
+    named = dict(write_named("outputs", "essence", f=facts))
+    head = [text for name, text in named.items() if name != "essence_errors"]
+    signals = coupled_signals(model) or f"k counts samples of {document['preprocessing']['dt']:g} s"
+    lines = [
+        *(line for text in head for part in text.splitlines() for line in wrap(part)),
+        "",
+        *wrap(write_one("outputs", "equations", f=facts)),
+        "",
+        *(line for single in model.models for line in [*term_table(single), ""]),
+        *wrap(f"{signals}."),
+        "",
+        "Validation data; all outputs are simulated together, from the inputs alone:",
+        f"{'output':20} {'free-run RMSE':>18} {'% of range':>10} {'R2':>8} {'one-step RMSE':>18}",
+        *map(_describe_output, facts.outputs),
+        "",
+        *(line for text in write("outputs", "finding", f=facts) for line in wrap(text)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _describe_output(output: OutputFacts) -> str:
+    """Return the errors of an output on the validation data as a row of the summary."""
+    free, ahead = (output.error(mode, "validation") for mode in ("free_run", "one_step_ahead"))
+    unit = f" {output.unit}".rstrip()
+    errors = [number(each["rmse"], "{:.4g}" + unit, each["rmse"] is not None) for each in (free, ahead)]
+    percent, r2 = (number(free[key], form, True) for key, form in (("mape", "{:.3g}"), ("r2", "{:.4f}")))
+    return f"{output.name:20} {errors[0]:>18} {percent:>10} {r2:>8} {errors[1]:>18}"
 
 
 def table(facts: ResultFacts) -> list[str]:

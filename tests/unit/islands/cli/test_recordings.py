@@ -24,7 +24,7 @@ def files(tmp_path):
 
 
 def recordings(files, *names):
-    return Recordings([files / name for name in names], ["u_V"], "y_um")
+    return Recordings([files / name for name in names], ["u_V"], ["y_um"])
 
 
 def test_recordings_are_joined_in_the_given_order(files):
@@ -53,8 +53,8 @@ def test_validation_is_a_file_a_fraction_or_rows(files):
 def test_an_input_is_read_early_behind_the_filter(files, steps):
     """A model of ``u_V+1`` filters a measured record and advances the input after it."""
     paths, given = [files / "r.csv"], PreprocessingSteps(**steps)
-    found = Recordings(paths, ["u_V+1"], "y_um", steps=given)
-    expected = Recordings(paths, ["u_V"], "y_um", steps=given)
+    found = Recordings(paths, ["u_V+1"], ["y_um"], steps=given)
+    expected = Recordings(paths, ["u_V"], ["y_um"], steps=given)
     for own, other in (
         (found.read(), expected.read()),
         (found.read_held_out("80:", "0:80"), expected.read_held_out("80:", "0:80")),

@@ -34,13 +34,13 @@ def both(samples: int) -> CoupledRecord:
 RUNS: dict[str, Callable[[int, Stop], object]] = {
     "fit": lambda samples, stop: islands.fit(record(samples), stop=stop),
     "identify": lambda samples, stop: islands.identify(record(samples), stop=stop, **SEARCH),
-    "fit_coupled": lambda samples, stop: islands.fit_coupled(both(samples), max_terms=4, stop=stop),
-    "identify_coupled": lambda samples, stop: islands.identify_coupled(both(samples), stop=stop, **SEARCH),
+    "fit of several outputs": lambda samples, stop: islands.fit(both(samples), max_terms=4, stop=stop),
+    "identify of several outputs": lambda samples, stop: islands.identify(both(samples), stop=stop, **SEARCH),
 }
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("name", nightly_but(("fit", "identify_coupled"), RUNS))
+@pytest.mark.parametrize("name", nightly_but(("fit", "identify of several outputs"), RUNS))
 def test_stop_function_is_called_at_least_every_second(name: str) -> None:
     calls = [process_time()]
 

@@ -186,4 +186,4 @@ def test_a_refit_is_all_or_none_and_of_one_output():
         islands.identify(record, preset="narx", refit="every")
     frame = {"u": record.u[:, 0], "y": record.y, "z": record.y}
     with pytest.raises(SettingsError, match="refit is 'none' with several outputs"):
-        islands.fit_coupled(frame, inputs="u", outputs=("y", "z"), dt=1.0, refit="all")
+        islands.fit(frame, inputs="u", output=("y", "z"), dt=1.0, refit="all")

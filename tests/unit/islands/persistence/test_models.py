@@ -14,7 +14,6 @@ from islands.persistence.models import (
     SCHEMA,
     model_from_json,
     model_json,
-    read_coupled_model,
     read_model,
     write_model,
 )
@@ -28,14 +27,12 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 @pytest.mark.parametrize("model", [TWO_MASSES, PREY])
 def test_a_model_is_read_as_it_was_written(model, tmp_path) -> None:
     write_model(model, tmp_path / "model.json")
-    assert read_coupled_model(tmp_path / "model.json") == model
-    assert read_coupled_model(tmp_path) == model
+    assert read_model(tmp_path / "model.json") == model
 
 
-def test_other_files_are_not_coupled_models(tmp_path) -> None:
-    write_model(PREY.models[0], tmp_path / "single.json")
-    with pytest.raises(ModelError, match="not a coupled model of schema"):
-        read_coupled_model(tmp_path / "single.json")
+def test_a_reader_of_one_output_refuses_several() -> None:
+    with pytest.raises(ModelError, match="has the outputs y1, y2: give a model of one output"):
+        model_from_json(model_json(PREY), "prey")
 
 
 @pytest.mark.parametrize(
@@ -50,7 +47,7 @@ def test_a_damaged_file_names_the_field(change, message, tmp_path) -> None:
     file = tmp_path / "model.json"
     file.write_text(json.dumps(json.loads(model_json(PREY)) | change))
     with pytest.raises(ModelError, match=message):
-        read_coupled_model(file)
+        read_model(file)
 
 
 def document(**changes):

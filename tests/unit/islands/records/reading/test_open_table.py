@@ -117,7 +117,8 @@ def _fit(record, **changes):
 
 def _fit_outputs(record):
     other = replace(record, y=np.nan_to_num(record.y) ** 2, measured=None, output_name="z")
-    return islands.fit_coupled(CoupledRecord((record, other)), **LINEAR).document()["outputs"][0]["data"]
+    found = islands.fit(CoupledRecord((record, other)), **LINEAR).search_result
+    return result_document(found)["outputs"][0]["data"]
 
 
 @pytest.mark.ci  # searches

@@ -8,8 +8,8 @@ import pytest
 import islands
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
-from islands.report.text.facts import CoupledFacts, DryFriction, ResultFacts, find_dry_friction
-from islands.report.text.statements import describe, describe_coupled
+from islands.report.text.facts import DryFriction, OutputsFacts, ResultFacts, find_dry_friction
+from islands.report.text.statements import describe
 from islands.sentences import write
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.searches import record
@@ -197,14 +197,14 @@ COUPLED = {
     "limit_wide_band": [{"bands.width": 100.0}],
     "limit_error_ratio": [{"metrics.estimation.free_run.rmse": 1e-4}],
     "limit_estimation_error": [{"metrics.estimation.free_run.rmse": 10.0}],
-    "extrapolation": [{"inputs.validation": [[-3.0, 3.0]]}],
+    "extrapolation": [{"data.inputs.validation": [[-3.0, 3.0]]}],
     "use_simulation": [{}],
     "use_adequate_residual": [ADEQUATE],
     "next_other_terms": [
         {"residual.verdict": "inadequate"},
         {"residual.verdict": "inadequate", "models.0.kind": "coupled-latent"},
     ],
-    "next_wider_record": [{"inputs.validation": [[-3.0, 3.0]]}],
+    "next_wider_record": [{"data.inputs.validation": [[-3.0, 3.0]]}],
     "next_insignificant": [{"models.0.terms.0.standard_error": 9.0, "models.0.terms.1.standard_error": 9.0}],
     "next_check": [{}],
 }
@@ -228,8 +228,8 @@ def result():
 @cache
 def coupled_result():
     data = make_coupled_record(TWO_MASSES, samples=400, noise=0.01)
-    fitted = islands.fit_coupled(data, library="polynomial", degree=1, max_terms=4, certificate=0, average=1)
-    return fitted.document()
+    fitted = islands.fit(data, library="polynomial", degree=1, max_terms=4, certificate=0, average=1)
+    return result_document(fitted.search_result)
 
 
 def change(document, changes, outputs=()):
@@ -237,7 +237,8 @@ def change(document, changes, outputs=()):
     changed = deepcopy(document)
     for path, value in changes.items():
         *folders, name = path.split(".")
-        place = changed["outputs"][1] if path.split(".")[0] in outputs else changed
+        is_of_output = path.split(".")[0] in outputs and not path.startswith("data.inputs")
+        place = changed["outputs"][1] if is_of_output else changed
         for folder in folders:
             place = place[int(folder) if folder.isdigit() else folder]
         place[int(name) if name.isdigit() else name] = deepcopy(value)
@@ -254,7 +255,7 @@ def make_result_facts(changes):
 
 
 def make_coupled_facts(changes):
-    facts = CoupledFacts(change(coupled_result(), changes, ("metrics", "residual", "bands", "data")))
+    facts = OutputsFacts(change(coupled_result(), changes, ("metrics", "residual", "bands", "data")))
     return {"f": facts, "output": facts.outputs[1]}
 
 
@@ -262,7 +263,7 @@ def make_coupled_facts(changes):
     ("template", "cases", "make", "state"),
     [
         ("result", RESULTS, make_result_facts, describe),
-        ("coupled", COUPLED, make_coupled_facts, describe_coupled),
+        ("outputs", COUPLED, make_coupled_facts, describe),
     ],
 )
 def test_each_statement_is_written_where_it_holds_and_contradicts_no_other_one(template, cases, make, state):

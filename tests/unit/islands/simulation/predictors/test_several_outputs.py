@@ -9,7 +9,7 @@ import islands
 from islands.errors import RecordError, SettingsError
 from islands.export import export
 from islands.models.coupled_narx import CoupledModel, measured_coupled_model
-from islands.persistence.models import read_coupled_model, write_model
+from islands.persistence.models import read_model, write_model
 from islands.records.averaging import average_samples
 from islands.records.coupled import CoupledRecord, match_coupled
 from islands.records.dataset import Dataset
@@ -120,7 +120,7 @@ def preprocessed(steps, average=1):
 
 def written_and_read(model, folder):
     write_model(model, folder / "model.json")
-    return read_coupled_model(folder / "model.json")
+    return read_model(folder / "model.json")
 
 
 def run_python(model, record, _folder):
@@ -156,8 +156,8 @@ def test_every_path_gives_the_outputs_of_the_search(steps, average, path, tmp_pa
 
 def test_a_coupled_fit_of_deviations_simulates_the_measured_record() -> None:
     prepared = measured_record().map(lambda each: preprocess(each, detrend="constant"))
-    result = islands.fit_coupled(prepared, validation=0.25, max_terms=3, certificate=0)
-    assert any(result.model.preprocessing.input_offsets)
+    result = islands.fit(prepared, validation=0.25, max_terms=3, certificate=0)
+    assert any(result.best.model.preprocessing.input_offsets)
     offsets = [each.preprocessing.output_offset for each in prepared.records]
     expected = result.simulate(prepared).y + offsets
     np.testing.assert_allclose(result.simulate(measured_record()).y, expected, rtol=1e-9)

@@ -34,7 +34,7 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
     with undrawn_figures():
         printed = succeed("fit", record, *COLUMNS, *SMALL, "--out", folder)
     assert "* y2(k-1)" in printed
-    assert json.loads((folder / "result.json").read_text())["schema"] == "islands.coupled-result/1"
+    assert json.loads((folder / "result.json").read_text())["schema"] == "islands.result/1"
     out = tmp_path / "simulated.csv"
     parsed = list_parsed(monkeypatch)
     printed = succeed("simulate", folder, record, "--out", out)
@@ -51,7 +51,9 @@ def test_a_fitted_model_is_simulated_and_shown(record, tmp_path, monkeypatch) ->
     succeed("show", folder, "--format", "fmu", "--out", tmp_path / "masses.fmu")
     assert (tmp_path / "masses.fmu").read_bytes()[:2] == b"PK"
     assert "write a file with --out" in fail("show", folder, "--format", "fmu")
-    assert "free runs only" in fail("simulate", folder, record, "--mode", "one-step")
+    assert "y1: MAPE 0.0000 %" in succeed("simulate", folder, record, "--mode", "one-step")
+    succeed("show", folder, "--figure", "free-run", "--record", record, "--out", tmp_path / "runs.svg")
+    assert "y2" in (tmp_path / "runs.svg").read_text()
     assert "as many --output" in fail("simulate", folder, record, "--output", "y1")
 
 
@@ -69,7 +71,7 @@ def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(recor
         ]
         assert [search["ended_by"] for search in searches] == ["stopped", "stopped"]
         succeed("identify", "--resume", part, "--engine", "serial")
-    assert (part / "model.json").read_bytes() == (whole / "model.json").read_bytes()
+    assert (part / "models" / "01.json").read_bytes() == (whole / "models" / "01.json").read_bytes()
 
 
 @pytest.mark.parametrize(
