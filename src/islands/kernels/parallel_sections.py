@@ -33,6 +33,7 @@ def factor_sections(
     u,  # float64 [input, sample]
     y,  # float64 [sample]
     ends,  # int64 [recording]: the sample after the last one
+    before,  # float64 [recording, input]: values of the inputs before the recordings
     skipped,  # samples of every recording that are not counted; the initial states apply after them
     sections,  # float64 [section, 2]: coefficients; the second one of a first-order section is 0
     sizes,  # int64 [section]: 1 or 2
@@ -86,7 +87,8 @@ def factor_sections(
             rows = min(BLOCK, (counted if at < counted else end) - at)
             for place in range(inputs):
                 for k in range(rows):
-                    sources[place * BLOCK + k] = u[place, max(at + k - delays[place], begin)]
+                    late = at + k - delays[place]
+                    sources[place * BLOCK + k] = u[place, late] if late >= begin else before[recording, place]
             _divide(places, quotients, states, sources, x, stride, origin, rows, 0, last)
             for k in range(rows):
                 x[target + k] = y[at + k]

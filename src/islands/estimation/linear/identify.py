@@ -10,10 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from islands.errors import RecordError
 from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
+from islands.estimation.linear.noise import WHITE, fit_noises
 from islands.estimation.linear.regression import Fit, Structure, minimise, project
 from islands.estimation.linear.sections import Signal, Signals, find_poles, pair_poles
 from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
-from islands.records.noise_model import fit_noise
 
 #: Samples of the part of a record on which starts and dead times are searched.
 _PART = 6000
@@ -32,9 +32,6 @@ _SMALL = 2
 
 #: Changes of a structure that are minimised, those of the least criterion first.
 _NEIGHBOURS = 5
-
-#: Largest order of the autoregression of the noise.
-_NOISE_ORDER = 16
 
 
 def identify_linear(
@@ -87,9 +84,9 @@ def identify_linear(
     longest = min(max_dead_time, min(lengths) // 6)
     # On small matrices, several threads take a hundred times as long, and sums have other bits.
     with threadpool_limits(1, user_api="blas"):
-        fits = _search(signals, longest, max_order, feedthrough)
-        best = minimise(signals, min(fits, key=attrgetter("criterion")), 20, 1e-9)
-        return make_model(signals, best, scales, list(map(_describe, fits)))
+        fits, rivals = _search(signals, longest, max_order, feedthrough)
+        best = min(fits, key=attrgetter("criterion"))
+        return make_model(signals, best, scales, list(map(_describe, fits)), rivals)
 
 
 def _describe(fit: Fit) -> LinearCandidate:
@@ -117,19 +114,23 @@ def scale_signals(
     return Signals(u, y, ends), Scales(u0, u_unit, y0, y_unit, dt)
 
 
-def _search(signals: Signals, longest: int, max_order: int, feedthrough: bool) -> list[Fit]:
-    """Return the best fit of every order, on a part of a long record first."""
+def _search(signals: Signals, longest: int, max_order: int, feedthrough: bool) -> tuple[list[Fit], list[Fit]]:
+    """Return the best fit of every order, on a part of a long record first, and rivals of the best one."""
     search = Search(_take_part(signals), longest, max_order, feedthrough)
     found = search.run()
-    best = search.improve(min(found, key=attrgetter("criterion")))
+    best, rivals = search.improve(min(found, key=attrgetter("criterion")))
     found = [each for each in found if each.structure.order != best.structure.order] + [best]
     if signals.samples <= _PART:
-        return found
+        return found, rivals
     # More samples show more: orders that a part rejects are compared again.
-    larger = [
-        project(signals, each.structure) for each in found if each.structure.order >= best.structure.order
-    ]
-    return [minimise(signals, each, 20, 1e-2) for each in larger if each is not None]
+    larger = [each for each in found if each.structure.order >= best.structure.order]
+    return _extend_to(signals, larger), _extend_to(signals, rivals)
+
+
+def _extend_to(signals: Signals, fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fits of a part after steps on all samples."""
+    starts = [project(signals, each.structure) for each in fits]
+    return [minimise(signals, each, 20, 1e-2) for each in starts if each is not None]
 
 
 def _take_part(signals: Signals) -> Signals:
@@ -168,7 +169,9 @@ class Search:
         """Return the best fit of every order that was reached."""
         shape = len(self.signals.y), len(self.signals.u)
         self.high = fit_high_order(self.signals, self.longest)
-        static = Structure((), 0, np.zeros(shape, np.int64), np.ones(shape, bool), (np.zeros(0),) * shape[0])
+        static = Structure(
+            (), 0, np.zeros(shape, np.int64), np.ones(shape, bool), (WHITE,) * shape[0], self.signals.first
+        )
         self._keep(self._fit([static]))
         for order in range(1, min(_SMALL, self.max_order) + 1):
             self._keep(self._fit(list(self._starts(order))))
@@ -196,7 +199,7 @@ class Search:
             structure = self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
             start = project(self.signals, structure)
             # Without the noise, poles of a closed loop would move away from the consistent ones.
-            start = start and project(self.signals, replace(structure, noise=self._fit_noise(start)))
+            start = start and project(self.signals, replace(structure, noise=self._list_noises(start)[0]))
             if start is not None:
                 found.append(minimise(self.signals, start, 6, 1.0))
         return sorted(found, key=attrgetter("criterion"))[:2]
@@ -236,10 +239,12 @@ class Search:
         if structure.order == 0:
             leads = np.zeros_like(leads)
             delays = np.maximum(delays - structure.leads, 0) if delays is structure.delays else delays
-        noise = (np.zeros(0),) * len(structure.noise)
+        noise = (WHITE,) * len(structure.noise)
         kind = structure.integrators if integrators is None else integrators
         sections = tuple(pair_poles([*kept, *poles]))
-        return Structure(sections, kind, delays, leads & (delays > 0), noise, structure.held)
+        # Of a transient, a small model without its first samples would be a free decay.
+        before = self.signals.first if structure.order < _SMALL else structure.before
+        return Structure(sections, kind, delays, leads & (delays > 0), noise, before)
 
     def _fit(self, structures: Sequence[Structure]) -> Fit | None:
         """Return the best fit that the most promising structures lead to."""
@@ -251,33 +256,36 @@ class Search:
         refined = [self._move_delays(minimise(self.signals, each, 8, 1.0)) for each in tried[:_MINIMISED]]
         return self._colour(min(refined, key=attrgetter("deviance"))) if refined else None
 
-    def improve(self, fit: Fit) -> Fit:
-        """Return the fit after changes of its structure, as long as one reduces the criterion."""
-        improved = True
+    def improve(self, fit: Fit) -> tuple[Fit, list[Fit]]:
+        """Return the fit after changes of its structure that reduce the criterion, and those that do not."""
+        improved, rivals = True, list[Fit]()
         while improved:
-            improved = False
+            improved, rivals = False, []
             tried = [project(self.signals, each) for each in self._list_neighbours(fit.structure)]
             for start in sorted(filter(None, tried), key=attrgetter("criterion"))[:_NEIGHBOURS]:
                 found = minimise(self.signals, start, 15, 0.1)
                 # An order that is too large hides a wrong dead time.
                 if found.structure.order < fit.structure.order:
                     found = self._move_delays(found)
+                rivals.append(found)
                 if found.criterion < fit.criterion - 1e-6:
                     fit, improved = self._colour(found), True
                     break
-        return fit
+        return fit, rivals
 
     def _list_neighbours(self, structure: Structure) -> Iterator[Structure]:
         """Yield a smaller structure, one with an integrator, and those with other fractions of dead times."""
-        poles = find_poles(structure.sections)
+        poles, white = find_poles(structure.sections), (WHITE,) * len(structure.noise)
+        if any(noise.size for noise in structure.noise):
+            yield replace(structure, noise=white)
         modes = [pole for pole in poles if pole.imag >= 0.0]
         for mode in sorted(modes, key=abs):
             left = [pole for pole in poles if pole not in (mode, mode.conjugate())]
             smaller = replace(structure, sections=tuple(pair_poles(left)))
             yield smaller
             # A mode may describe the response to other inputs before the recordings.
-            if structure.held and (structure.delays <= self.signals.rest).all():
-                yield replace(smaller, held=False)
+            if structure.before is not None and structure.delays.any():
+                yield replace(smaller, before=None)
             # With a pole near 0, an order reads the lags of the order below and a fraction.
             if left:
                 delays = structure.delays + ~structure.leads
@@ -285,16 +293,27 @@ class Search:
         real = [pole for pole in poles if pole.imag == 0.0 and pole.real > 0.0]
         if real and not structure.integrators:
             left = [pole for pole in poles if pole != max(real, key=abs)]
-            yield replace(structure, sections=tuple(pair_poles(left)), integrators=1)
+            integrating = replace(structure, sections=tuple(pair_poles(left)), integrators=1)
+            yield from (integrating, replace(integrating, noise=white))
         if structure.order == 0:
             return
         for place in np.ndindex(structure.delays.shape):
+            for change in (-1, 1, -structure.delays[place]):
+                delays = structure.delays.copy()
+                delays[place] += change
+                if self._is_causal(structure.leads, delays):
+                    yield replace(structure, delays=delays)
             for change in (-1,) if structure.leads[place] else (0, 1):
                 leads, delays = structure.leads.copy(), structure.delays.copy()
                 leads[place] = not leads[place]
                 delays[place] += max(change, 0)
-                if not leads[place] or delays[place] > 0 or self.feedthrough:
+                if self._is_causal(leads, delays):
                     yield replace(structure, leads=leads, delays=delays)
+
+    def _is_causal(self, leads: NDArray[np.bool_], delays: NDArray[np.int64]) -> bool:
+        """Return whether no output reads a later input, nor one of the same sample without a direct path."""
+        least = 0 if self.feedthrough else leads
+        return bool((delays >= least).all() and (delays <= self.longest).all())
 
     def _place(self, fit: Fit) -> list[Fit]:
         """Return fits with a few dead times of every input, one after the other from the best one so far."""
@@ -333,30 +352,39 @@ class Search:
     def _colour(self, fit: Fit) -> Fit:
         """Return the minimum with the noise of its residual, and with other inputs before the recordings."""
         best = minimise(self.signals, fit, 20, 1e-2)
-        if best.structure.delays.any() and (best.structure.delays <= self.signals.rest).all():
-            found = project(self.signals, replace(best.structure, held=not best.structure.held))
-            if found is not None:
-                found = self._move_delays(minimise(self.signals, found, 20, 1e-2))
-                best = min(best, found, key=attrgetter("criterion"))
-        sizes = [each.size for each in best.structure.noise]
-        for _ in range(2):
-            noise = self._fit_noise(best)
-            if [each.size for each in noise] == sizes:
-                break
-            sizes = [each.size for each in noise]
+        for before in self._list_before(best):
+            start = project(self.signals, replace(best.structure, before=before))
+            if start is not None:
+                best = min(best, minimise(self.signals, start, 8, 0.1), key=attrgetter("criterion"))
+        for noise in self._list_noises(best):
             start = project(self.signals, replace(best.structure, noise=noise))
-            if start is None:
-                break
-            found = minimise(self.signals, self._move_delays(minimise(self.signals, start, 8, 0.1)), 20, 1e-2)
-            if found.criterion >= best.criterion:
-                break
-            best = found
+            found = start and minimise(self.signals, start, 8, 0.1)
+            if found is not None and found.criterion < best.criterion:
+                best = minimise(self.signals, self._move_delays(found), 20, 1e-2)
         return best
 
-    def _fit_noise(self, fit: Fit) -> tuple[Signal, ...]:
-        """Return the autoregression of the residual of every output."""
+    def _list_before(self, fit: Fit) -> list[Signal | None]:
+        """Return values of the inputs before the recordings: unknown, the first ones, and constant ones."""
+        if not fit.structure.delays.any():
+            return []
+        levels = self.signals.first.copy()
+        for place in np.argwhere(fit.structure.delays.any(axis=0) & np.ones(levels.shape, bool)):
+            # The error is linear in a value before a recording.
+            change, squares = np.zeros_like(levels), []
+            change[tuple(place)] = 1.0
+            for side in (-1.0, 0.0, 1.0):
+                found = project(self.signals, replace(fit.structure, before=levels + side * change))
+                squares.append(np.inf if found is None else float((found.squares / fit.squares).sum()))
+            below, here, above = squares
+            curvature = above - 2.0 * here + below
+            if np.isfinite(curvature) and curvature > 0.0:
+                levels[tuple(place)] += 0.5 * (below - above) / curvature
+        return [None, self.signals.first, levels]
+
+    def _list_noises(self, fit: Fit) -> list[tuple[Signal, ...]]:
+        """Return noise of every output from its residual: added to it, and driving the states."""
         intervals = fit.structure.find_intervals(self.signals)
         lengths = [end - begin for begin, end in intervals]
         kept = np.concatenate([np.arange(begin, end) for begin, end in intervals])
-        limit = min(_NOISE_ORDER, min(lengths) // 10)
-        return tuple([fit_noise(each[kept], limit, lengths, ()).coefficients for each in fit.residual])
+        poles = find_poles(fit.structure.parts)
+        return list(zip(*(fit_noises(each[kept], lengths, poles) for each in fit.residual), strict=True))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,14 +63,15 @@ class LinearModel:
         States of every recording at its sample number ``first``.
     first : int
         0, or the largest dead time if inputs before the recordings had other values than their first ones.
-    noise : tuple of ndarray
-        Autoregression of the noise of every output.
+    noise : tuple of ndarray, each of shape (2, states)
+        Noise of every output: coefficients of its past values, and of the past white noise.
     deviations : ndarray, shape (outputs,)
         Standard deviation of the white noise behind it.
     quantities : tuple of (tuple of Quantity)
         Of every output: time constants, frequencies and damping ratios, gains and dead times.
     errors : tuple of (tuple of float)
-        Their standard errors; NaN where there is none, as of a double pole.
+        Their standard errors, over the dead times that the record does not exclude; NaN where there is none,
+        as of a double pole.
     parameters : ndarray, shape (parameters,)
         Numerators and noise of every output, then the denominators.
     covariance : ndarray, shape (parameters, parameters)
@@ -160,27 +162,26 @@ class Scales:
 
 
 def make_model(
-    signals: Signals, fit: Fit, scales: Scales, candidates: Sequence[LinearCandidate]
+    signals: Signals,
+    fit: Fit,
+    scales: Scales,
+    candidates: Sequence[LinearCandidate] = (),
+    rivals: Sequence[Fit] = (),
 ) -> LinearModel:
-    """Return the model of a fit in the units of the record, with standard errors."""
+    """Return the model of a fit in the units of the record, with standard errors.
+
+    Rivals are fits of other structures. Those with the same modes add to the standard errors by the weight
+    that their criterion gives them (Hoeting et al. 1999).
+    """
     structure, outputs = fit.structure, len(fit.coefficients)
-    theta = _pack(fit)
-    covariance = estimate_covariance(signals, fit)
+    best, theta = _estimate(signals, fit, scales), _pack(fit)
+    others = [_estimate(signals, each, scales) for each in rivals]
+    weights = [np.exp(0.5 * (fit.criterion - each.criterion)) for each in rivals]
     parts = [
         _realise(fit.coefficients[output], structure, output, scales, signals.samples)
         for output in range(outputs)
     ]
     a, c = _realise_poles(structure.parts)
-    quantities = tuple(
-        tuple(_measure(structure, fit.coefficients[output], output, scales)) for output in range(outputs)
-    )
-
-    def measure(values: Signal) -> list[list[Quantity]]:
-        sections, coefficients = _unpack(values, fit)
-        moved = replace(structure, sections=sections)
-        return [list(_measure(moved, coefficients[output], output, scales)) for output in range(outputs)]
-
-    errors = _propagate(measure, quantities, theta, covariance)
     starts = np.array(
         [_scale_starts(fit.starts[output], structure) * scales.y_unit[output] for output in range(outputs)]
     )
@@ -197,15 +198,56 @@ def make_model(
         structure.delays,
         scales.dt,
         starts,
-        fit.skipped,
+        structure.skipped,
         structure.noise,
         np.sqrt(fit.squares / degrees) * scales.y_unit,
-        quantities,
-        errors,
+        best.quantities,
+        _average(best, others, weights),
         theta,
-        covariance,
+        best.covariance,
         tuple(candidates),
     )
+
+
+class _Estimate(NamedTuple):
+    """Quantities of every output, their standard errors, and the covariance of the parameters."""
+
+    quantities: tuple[tuple[Quantity, ...], ...]
+    errors: tuple[tuple[float, ...], ...]
+    covariance: Signal
+
+    @property
+    def kinds(self) -> list[tuple[str, int | None]]:
+        """What the quantities are."""
+        return [(each.name, each.input) for own in self.quantities for each in own]
+
+
+def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _Estimate:
+    covariance, outputs = estimate_covariance(signals, fit), range(len(fit.coefficients))
+
+    def measure(values: Signal) -> list[list[Quantity]]:
+        sections, coefficients = _unpack(values, fit)
+        moved = replace(fit.structure, sections=sections)
+        return [list(_measure(moved, coefficients[output], output, scales)) for output in outputs]
+
+    theta = _pack(fit)
+    quantities = tuple(map(tuple, measure(theta)))
+    return _Estimate(quantities, _propagate(measure, quantities, theta, covariance), covariance)
+
+
+def _average(
+    best: _Estimate, others: Sequence[_Estimate], weights: Sequence[float]
+) -> tuple[tuple[float, ...], ...]:
+    """Return the standard errors of the best estimate over the structures that may be the true one."""
+    variances: list[Signal] = [np.square(each) for each in best.errors]
+    total = 1.0
+    for other, weight in zip(others, weights, strict=True):
+        if other.kinds == best.kinds and np.isfinite(np.concatenate(other.errors)).all():
+            total += weight
+            for output, (one, two) in enumerate(zip(best.quantities, other.quantities, strict=True)):
+                moved = [x.value - y.value for x, y in zip(one, two, strict=True)]
+                variances[output] += weight * (np.square(other.errors[output]) + np.square(moved))
+    return tuple(tuple(np.sqrt(each / total).tolist()) for each in variances)
 
 
 def estimate_covariance(signals: Signals, fit: Fit) -> Signal:
@@ -232,7 +274,7 @@ def estimate_covariance(signals: Signals, fit: Fit) -> Signal:
 
 
 def _pack(fit: Fit) -> Signal:
-    own = [np.concatenate([c, n]) for c, n in zip(fit.coefficients, fit.structure.noise, strict=True)]
+    own = [np.concatenate([c, n.ravel()]) for c, n in zip(fit.coefficients, fit.structure.noise, strict=True)]
     return np.concatenate([*own, np.zeros(fit.structure.free)])
 
 

@@ -2,9 +2,8 @@
 
 For given poles, dead times and noise, the output is linear in the numerators, the initial states and the
 operating point, which are eliminated (variable projection, Golub and Pereyra 1973). Gauss-Newton steps move
-the poles and the autoregression of the noise together: a Box-Jenkins model with C = 1, whose estimate is also
-consistent in closed loop (Ljung 1999, sections 4.2 and 13.4). All sums are triangular factors of blocks of
-samples.
+the poles and the noise together: a Box-Jenkins model, whose estimate is also consistent in closed loop (Ljung
+1999, sections 4.2 and 13.4). All sums are triangular factors of blocks of samples.
 """
 
 from collections.abc import Sequence
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.estimation.linear.noise import limit_zeros
 from islands.estimation.linear.sections import (
     INTEGRATOR,
     Section,
@@ -50,11 +50,11 @@ class Structure:
         Whole samples before the response to an input begins: it reads lag ``delay + 1`` first.
     leads : ndarray of bool, shape (outputs, inputs)
         Whether it reads lag ``delay`` as well: the dead time is not a whole number of samples.
-    noise : tuple of ndarray
-        Autoregression of the noise of every output: ``v(k) = c1 v(k-1) + ... + e(k)``.
-    held : bool
-        Whether an input that begins at rest had its first value before a recording. If not, outputs that read
-        inputs before it are not counted.
+    noise : tuple of ndarray, each of shape (2, states)
+        Noise of every output: ``v(k) = d1 v(k-1) + ... + e(k) + c1 e(k-1) + ...``, d in the first row.
+    before : ndarray, shape (recordings, inputs), optional
+        Values of the inputs before every recording. If they are not known, outputs that read them are not
+        counted.
     """
 
     sections: tuple[Section, ...]
@@ -62,20 +62,16 @@ class Structure:
     delays: NDArray[np.int64]
     leads: NDArray[np.bool_]
     noise: tuple[Signal, ...]
-    held: bool = True
+    before: Signal | None
 
-    def count_skipped(self, signals: Signals) -> int:
-        """Return the samples of every recording that are not counted; the initial states apply after them.
-
-        An input that changes before its dead time has passed was not at rest before the recording.
-        """
-        at_rest = self.held and bool((self.delays <= signals.rest).all())
-        return 0 if at_rest else int(self.delays.max(initial=0))
+    @property
+    def skipped(self) -> int:
+        """Samples of every recording that are not counted; the initial states apply after them."""
+        return int(self.delays.max(initial=0)) if self.before is None else 0
 
     def find_intervals(self, signals: Signals) -> list[tuple[int, int]]:
         """Return the first sample that is counted of every recording, and the sample after its last one."""
-        skipped = self.count_skipped(signals)
-        return [(begin + skipped, end) for begin, end in signals.bounds]
+        return [(begin + self.skipped, end) for begin, end in signals.bounds]
 
     def count_coefficients(self, output: int) -> int:
         """Return the number of the coefficients of an output."""
@@ -123,8 +119,6 @@ class Fit:
         Sum of squares of the whitened error.
     counts : ndarray, shape (outputs,)
         Samples of the whitened error.
-    skipped : int
-        Samples of every recording that are not counted.
     """
 
     signals: Signals
@@ -133,7 +127,6 @@ class Fit:
     states: tuple[Signal, ...]
     squares: Signal
     counts: Signal
-    skipped: int
 
     @cached_property
     def residual(self) -> Signal:
@@ -153,42 +146,43 @@ class Fit:
     def deviance(self) -> float:
         """Minus twice the logarithm of the likelihood of all samples, up to a constant.
 
-        Models whose whitening takes different numbers of samples are compared by the mean square. A sample
-        that is not counted costs 2, as a parameter does in the criterion of Akaike: the information on an
-        input before a recording does not grow with the number of samples.
+        Models that count different numbers of samples are compared by the mean square. An initial state, an
+        input before a recording and a sample that is not counted cost 2, as a parameter does in the criterion
+        of Akaike: the information on them does not grow with the number of samples.
         """
         mean_squares = np.maximum(self.squares, np.finfo(float).tiny) / self.counts
-        outputs, samples = self.signals.y.shape
-        free = outputs * self.skipped * len(self.starts[0])
-        return float(samples * np.log(mean_squares).sum() + 2.0 * free)
+        before, first = self.structure.before, self.signals.first
+        levels = 0 if before is None else np.count_nonzero(before != first)
+        free = sum(each.size for each in self.starts) + levels
+        free += len(self.starts) * self.structure.skipped * len(first)
+        return float(self.signals.samples * np.log(mean_squares).sum() + 2.0 * free)
 
     @property
     def criterion(self) -> float:
-        """Information criterion of Schwarz, with the initial states and a dead time as parameters."""
+        """Information criterion of Schwarz, with a dead time as a parameter."""
         structure, samples = self.structure, self.signals.samples
-        sizes = [each.size for each in (*self.coefficients, *structure.noise, *self.starts)]
+        sizes = [each.size for each in (*self.coefficients, *structure.noise)]
         count = structure.free + sum(sizes) + int(np.count_nonzero(structure.delays))
         return self.deviance + float(np.log(samples)) * count
 
 
 def project(signals: Signals, structure: Structure) -> Fit | None:
     """Return the fit with the best numerators; None if it is not finite."""
-    skipped, recordings = structure.count_skipped(signals), signals.ends.size
-    coefficients, states = [], []
-    squares, counts = np.empty(len(structure.noise)), np.empty(len(structure.noise))
+    recordings, coefficients, states = signals.ends.size, [], []
+    squares = np.empty(len(structure.noise))
     for output, noise in enumerate(structure.noise):
         zero = np.zeros(structure.count_coefficients(output))
         factor, own = _factor(
-            signals, structure, output, zero, np.zeros((recordings, noise.size + structure.order))
+            signals, structure, output, zero, np.zeros((recordings, noise.shape[1] + structure.order))
         )
         found = solve(factor[:, :-1], factor[:, -1], _measure_columns(factor, own)[:-1])
         squares[output] = found.squares
         coefficients.append(found.values)
         states.append(np.array([_solve_states(rows, found.values) for rows in own]))
-        counts[output] = signals.samples - (skipped + noise.size) * recordings
     if not np.isfinite(squares).all():
         return None
-    return Fit(signals, structure, tuple(coefficients), tuple(states), squares, counts, skipped)
+    counts = np.full(squares.size, float(signals.samples - structure.skipped * recordings))
+    return Fit(signals, structure, tuple(coefficients), tuple(states), squares, counts)
 
 
 def _factor(
@@ -218,15 +212,33 @@ def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> Non
         signals.u,
         signals.y[output],
         signals.ends,
-        structure.count_skipped(signals),
+        signals.first if structure.before is None else structure.before,
+        structure.skipped,
         *structure.filters,
         structure.integrators,
         structure.delays[output],
         structure.leads[output],
-        noise[None],
-        np.zeros((noise.size, noise.size)),
+        noise,
+        _weigh_past(noise),
         *rest,
     )
+
+
+def _weigh_past(noise: Signal) -> Signal:
+    """Return equations whose squares are the deviance of the noise before a recording, if it is stationary.
+
+    Without it, noise could follow the response of the system as a decay from its own states.
+    """
+    states = noise.shape[1]
+    a = np.eye(states, k=1)
+    a[:, :1] = noise[0][:, None]
+    if np.abs(np.linalg.eigvals(a)).max(initial=0.0) >= 1.0:
+        return np.zeros((states, states))
+    gain = noise.sum(axis=0)
+    covariance = np.linalg.solve(np.eye(states**2) - np.kron(a, a), np.outer(gain, gain).ravel())
+    values, vectors = np.linalg.eigh(covariance.reshape(states, states))
+    weighted = vectors.T / np.sqrt(np.maximum(values, _DEPENDENT))[:, None]
+    return np.asarray(np.linalg.qr(weighted, mode="r"))
 
 
 def _measure_columns(factor: Signal, own: Signal) -> Signal:
@@ -306,7 +318,7 @@ def _find_step(signals: Signals, fit: Fit) -> _Step:
     for each, before in zip(factors, fit.structure.noise, strict=True):
         moment = each.factor[:, -1] - each.factor[:, each.own : -1] @ poles
         own = solve(each.factor[: each.own, : each.own], moment[: each.own])
-        noise.append(own.values[each.own - before.size :])
+        noise.append(own.values[each.own - before.size :].reshape(before.shape))
         squares.append(own.squares + float(moment[each.own :] @ moment[each.own :]))
     return _Step(poles, noise, replace(fit, squares=np.array(squares)).deviance)
 
@@ -317,9 +329,10 @@ def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
     for halving in range(_MAX_HALVINGS):
         scale = 0.5**halving
         sections = _join_neighbours(move(structure.sections, scale * step.poles))
-        if not all(map(is_stable, sections)):
-            continue
         noise = tuple([old + scale * new for old, new in zip(structure.noise, step.noise, strict=True)])
+        invertible = [is_invertible(each, signals.samples) for each in noise]
+        if not all(map(is_stable, sections)) or not all(invertible):
+            continue
         found = project(signals, replace(structure, sections=sections, noise=noise))
         if found is not None and found.deviance < fit.deviance:
             return found
@@ -342,6 +355,11 @@ def _join_neighbours(sections: Sequence[Section]) -> tuple[Section, ...]:
     """Return sections of neighbouring real poles, so that a double pole stays in one of them."""
     poles = find_poles(sections)
     return tuple(pair_poles(poles)) if np.count_nonzero(poles.imag == 0.0) > 2 else tuple(sections)
+
+
+def is_invertible(noise: Signal, samples: int) -> bool:
+    """Return whether the zeros of the noise are inside of the unit circle, as far as a record can show."""
+    return bool(np.abs(np.roots([1.0, *noise[1]])).max(initial=0.0) <= limit_zeros(samples))
 
 
 def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3) -> Fit:

@@ -52,14 +52,9 @@ class Signals:
         return int(self.y.shape[1])
 
     @cached_property
-    def rest(self) -> NDArray[np.int64]:
-        """Samples for which every input keeps the first value of a recording, at least, shape (inputs,)."""
-        kept = [
-            [int(np.argmax(np.append(x[begin:end] != x[begin], True))) for x in self.u]
-            for begin, end in self.bounds
-        ]
-        least: NDArray[np.int64] = np.min(np.array(kept, np.int64), axis=0)
-        return least
+    def first(self) -> Signal:
+        """First values of the inputs of every recording, shape (recordings, inputs)."""
+        return np.ascontiguousarray(self.u[:, [begin for begin, _ in self.bounds]].T)
 
     def keep(self, begin: int, end: int) -> "Signals":
         """Return the samples of an interval."""

@@ -9,6 +9,7 @@ SIZES = np.array([2, 1, 1])
 ENDS = np.array([BLOCK + 17, 3 * BLOCK])
 DELAYS, LEADS = np.array([2, 0]), np.array([True, False])
 NOISE = np.array([[0.5, -0.2], [0.6, 0.1]])
+BEFORE = np.array([[0.3, -1.0], [2.0, 0.7]])
 PRIOR = np.array([[1.0, 0.3], [0.0, 2.0]])
 
 
@@ -31,7 +32,7 @@ def make_columns(u, sections, skipped, begin, end):
     free = [c[1:] for each in zip(sections, SIZES, strict=True) for c in respond(*each, pulse)]
     columns = []
     for place, delay in enumerate(DELAYS):
-        late = u[place, np.maximum(np.arange(begin, end) - delay, begin)]
+        late = np.r_[np.full(delay, BEFORE[int(begin > 0), place]), u[place, begin : end - delay]]
         columns += [c for each in zip(sections, SIZES, strict=True) for c in respond(*each, late)]
         columns += [late] if LEADS[place] else []
     columns.append(np.arange(end - begin) / u.shape[1])
@@ -43,7 +44,7 @@ def factor(u, y, skipped, coefficients, starts, derivatives=False):
     residual, found = np.zeros(y.size), np.zeros((size, size))
     own = np.zeros((2, 6, 6 + size))
     factor_sections(
-        *(u, y, ENDS, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE, PRIOR),
+        *(u, y, ENDS, BEFORE, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE, PRIOR),
         *(coefficients, starts, derivatives, residual, found, own),
     )
     return residual, found, own
