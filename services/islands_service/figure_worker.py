@@ -29,7 +29,7 @@ from islands.persistence.saved_documents import read_criterion, read_shooting_in
 from islands.progress import Failure, attempt
 from islands.records.coupled import AnyRecord, CoupledRecord, split_coupled
 from islands.records.dataset import Dataset
-from islands.records.split import Split, average_split, match_split, split_data
+from islands.records.split import average_split, match_split, split_data
 from islands.report.documents.result_folder import result_document
 from islands.report.figures.drawn_numbers import tabulate_lines
 from islands.report.figures.linear_system import LINEAR_FIGURES
@@ -39,7 +39,7 @@ from islands.report.figures.style import save, write_text_figure
 from islands.report.pages.comparison import ComparedModel, comparison_report
 from islands.report.pages.identification import identification_report
 from islands.report.pages.origin import Origin
-from islands.validation.assessment import Assessment, assess, with_refit
+from islands.validation.assessment import assess, with_refit
 from islands_service.domain.fitted_models import read_fitted
 from islands_service.domain.free_runs import write_free_runs
 from islands_service.domain.job import FMU, REPORT, Job, name_free_run_artefacts
@@ -217,20 +217,9 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
         bands = bands_from_document(entry.document["bands"], ensemble)
         assessed.append(replace(assessment, bands=bands))
     search = _search(document, store.results.history(job.id))
-    # The comparison is part of the report on all models only.
-    linear = _read_linear_comparison(document, split, shooting) if rank is None else None
     return SearchResult(
-        record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average, linear
+        record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average
     )
-
-
-def _read_linear_comparison(document: Mapping[str, Any], split: Split, shooting: int) -> Assessment | None:
-    """Return the linear model of the same data; None in results without one."""
-    entry = document.get("linear")
-    if entry is None:
-        return None
-    model = model_from_json(json.dumps(entry["model"]), "the linear model of the result")
-    return assess(model, split, shooting, criterion=read_criterion(entry))
 
 
 def _read_result(

@@ -8,6 +8,9 @@ def with_changes(entry, physics=None, residual_tests=None, residual_structure=No
     """Return an assessment with other values of its fields, and with other results of its checks."""
     residual = residual_tests or entry.residual_tests, residual_structure or entry.residual_structure
     checks = SimpleNamespace(
-        physics=physics or entry.physics, residual=residual, has_estimated_start=entry.has_estimated_start
+        split=entry.checks.split,
+        physics=physics or entry.physics,
+        residual=residual,
+        has_estimated_start=entry.has_estimated_start,
     )
     return replace(entry, checks=checks, **changes)

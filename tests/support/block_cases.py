@@ -205,7 +205,7 @@ def start_from_record(name):
         mapped = map_coupled_signals if isinstance(exported, CoupledModel) else map_signals
         states = make_simulator(exported, mapped(exported, data)[0], None, first).states[0].tolist()
         names = block.signals[block.computed :]
-        states += [float(u[first - 1 - lag, names.index(input)]) for input, lag in block.late_inputs]
+        states += [float(u[first - 1 - lag, names.index(of)]) for of, lag in block.late_inputs]
         block = block.expand_delays()
     elif block.starts:
         states = [

@@ -45,9 +45,7 @@ _RIPPLE = 0.05
 _SAMPLES_PER_STATE = 3
 
 
-def search_shared_models(
-    record: CoupledRecord, seed: int, steps: Steps
-) -> list[tuple[LatentModel, ...]]:
+def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list[tuple[LatentModel, ...]]:
     """Search state spaces whose states all outputs share.
 
     Parameters
@@ -68,9 +66,9 @@ def search_shared_models(
         return []
     scales = [SignalScales.measure(each) for each in record.records]
     u = scales[0].scale_inputs(record.u)
-    y = np.column_stack([
-        scale.scale_outputs(each.y) for scale, each in zip(scales, record.records, strict=True)
-    ])
+    y = np.column_stack(
+        [scale.scale_outputs(each.y) for scale, each in zip(scales, record.records, strict=True)]
+    )
     steps.report("linear state space with shared states", 0.0)
     # The sums of a matrix product depend on the number of threads of the library.
     with threadpool_limits(1, user_api="blas"):
@@ -192,7 +190,9 @@ def _make_models(
             for begin, sign in ((inputs, 1.0), (inputs + signals, -1.0)):
                 blocks["F"][begin : begin + signals] = sign * 0.25 * products * system.f[place]
         models.append(
-            _make_model(own.use_record_units(layout, of_output), layout, units, radius, own, each, system.is_direct)
+            _make_model(
+                own.use_record_units(layout, of_output), layout, units, radius, own, each, system.is_direct
+            )
         )
     return tuple(models)
 

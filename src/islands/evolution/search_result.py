@@ -27,9 +27,15 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.linear_comparison import fit_linear_comparison, is_linear
+from islands.validation.linear_comparison import assess_linear_model
 from islands.validation.prediction_bands import calibrate_bands
-from islands.validation.recommendation import Recommendation, measure_size, recommend, recommend_fittest
+from islands.validation.recommendation import (
+    Recommendation,
+    is_linear,
+    measure_size,
+    recommend,
+    recommend_fittest,
+)
 
 #: Result of the same search.
 FoundT = TypeVar("FoundT", bound="SearchResult | CoupledSearchResult")
@@ -37,8 +43,8 @@ FoundT = TypeVar("FoundT", bound="SearchResult | CoupledSearchResult")
 #: Name of the step that makes the ensemble and the prediction bands.
 BANDS = "prediction bands"
 
-#: Name of the step that fits a linear model of the same data.
-COMPARISON = "linear model for comparison"
+#: Name of the step that identifies the linear model of the same data.
+LINEAR_MODEL = "linear model"
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +126,6 @@ class SearchResult:
     average : int
         Number of samples of the record whose mean is one sample of the estimation data and of the validation
         data.
-    linear : Assessment or None
-        Linear model of the same data, for comparison. None if the recommended model is linear.
     """
 
     record: Dataset
@@ -132,7 +136,6 @@ class SearchResult:
     models: tuple[Assessment, ...]
     ensemble: Ensemble | None = None
     average: int = 1
-    linear: Assessment | None = None
 
     @property
     def shooting_interval(self) -> int:
@@ -168,6 +171,13 @@ class SearchResult:
     def recommended(self) -> Assessment:
         """Recommended model."""
         return self.models[self.recommendation.rank - 1]
+
+    @property
+    def linear(self) -> Assessment | None:
+        """Best linear model on the validation data; None if the recommended model is linear."""
+        if is_linear(self.recommended.model):
+            return None
+        return next((entry for entry in self.models if is_linear(entry.model)), None)
 
 
 def list_direct_inputs(names: Sequence[str]) -> tuple[str, ...]:
@@ -280,25 +290,27 @@ def ignore_result(_found: SearchResult, /) -> None:
     """Ignore a result."""
 
 
-def with_linear_comparison(
-    found: SearchResult, delays: Sequence[int], shooting: int, steps: Steps
-) -> SearchResult:
-    """Return a search result with a linear model of the same data, unless the recommended model is linear.
+def list_linear_models(
+    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
+) -> list[Assessment]:
+    """Return the linear model of the data of a search, which is one of its models; empty without one.
 
     Parameters
     ----------
-    found : SearchResult
-    delays : sequence of int
-        Dead time of each input in samples of the split; none if empty.
-    shooting : int
-        Length of a multiple-shooting interval in samples of the split.
+    split, shooting, warm_up, constraints
+        As for `assess_linear_model`.
     steps : Steps
-        The comparison is an optional step.
+        The identification is an optional step.
     """
-    if is_linear(found.recommended.model):
-        return found
-    compare = partial(fit_linear_comparison, found.split, delays, shooting)
-    return replace(found, linear=steps.attempt(COMPARISON, compare))
+    steps.report(LINEAR_MODEL, None)
+    found = steps.attempt(LINEAR_MODEL, partial(assess_linear_model, split, shooting, warm_up, constraints))
+    return [found] if found else []
+
+
+def as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
+    """Return an assessed model that was estimated as a candidate of an ensemble."""
+    assert entry.criterion is not None, "the models of a search are estimated"
+    return ValidatedModel(entry.model, entry.criterion, entry.metrics["validation"]["free_run"].rmse ** 2)
 
 
 def with_bands(
@@ -348,16 +360,14 @@ def without_optional_steps(found: SearchResult, reason: str) -> SearchResult:
         Why the other steps have no values yet.
     """
     models = tuple(replace(entry, checks=entry.checks.without(reason)) for entry in found.models)
-    steps = dict.fromkeys((COMPARISON, BANDS), reason)
-    search = replace(found.search, not_computed={**found.search.not_computed, **steps})
+    search = replace(found.search, not_computed={**found.search.not_computed, BANDS: reason})
     return replace(found, search=search, models=models)
 
 
 def with_average(found: SearchResult, average: int) -> SearchResult:
     """Return a search result on means of samples; its models state the number of samples of a mean."""
     models = tuple(_average(entry, average) for entry in found.models)
-    linear = None if found.linear is None else _average(found.linear, average)
-    return replace(found, models=models, average=average, linear=linear)
+    return replace(found, models=models, average=average)
 
 
 def _average(entry: Assessment, average: int) -> Assessment:
@@ -375,10 +385,10 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
 
 
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
-    """Return the best model of every size, best first; see `rank_models`."""
-    best: dict[int, Assessment] = {}
+    """Return the best model of every class and size, best first; see `rank_models`."""
+    best: dict[tuple[str, int], Assessment] = {}
     for entry in rank_models(models):
-        best.setdefault(entry.model.size, entry)
+        best.setdefault((entry.model.kind, entry.model.size), entry)
     return tuple(best.values())
 
 

@@ -11,10 +11,11 @@ from islands.evolution.search_result import (
     ResultCallback,
     SearchResult,
     SearchStatistics,
+    as_candidate,
     ignore_result,
+    list_linear_models,
     rank_models,
     with_bands,
-    with_linear_comparison,
 )
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import LATENT, Settings
@@ -24,15 +25,12 @@ from islands.facade.latent_identification import complete_latent, search_latent
 from islands.facade.results.model_simulation import SHOOTING
 from islands.models.latent import LatentModel
 from islands.models.parametric import ParametricModel
-from islands.models.protocol import DynamicModel
 from islands.persistence.models import MODEL_CLASSES
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
-from islands.validation.ensemble import ValidatedModel
 
 #: Largest number of accepted steps from a starting model.
 _STEPS = 100
@@ -101,14 +99,11 @@ def fit_class(
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
     counts = {"ok": len(models)}
     search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
+    assessed += list_linear_models(split, interval, 0, "none", steps)
     result = SearchResult(record, split, seed, settings, search, rank_models(assessed))
     on_models(result)
-    validated: list[ValidatedModel[DynamicModel]] = [
-        ValidatedModel(model, _CRITERION, free_run(model, split.validation).mean_squared_error)
-        for model in models
-    ]
-    warm_up = max(model.maximum_lag for model in models)
-    result = with_linear_comparison(result, (), interval, steps)
+    validated = [as_candidate(entry) for entry in assessed]
+    warm_up = max(entry.model.maximum_lag for entry in assessed)
     return with_bands(result, validated, "none", warm_up, steps)
 
 

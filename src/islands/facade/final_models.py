@@ -23,7 +23,6 @@ from islands.evolution.individual import Individual, require_genes, unique_struc
 from islands.evolution.problem import Problem
 from islands.evolution.search_result import rank_models
 from islands.evolution.settings import FITNESSES, Settings
-from islands.facade.trials.library import make_trial_library
 from islands.models.narx import require_narx
 from islands.models.protocol import DynamicModel
 from islands.progress import Steps
@@ -171,8 +170,7 @@ def estimate_candidates(
             count = count[::-1]
         kept = screen(compared, validation, settings.maximum_lag, *count)
         found += _estimate_models(kept, settings, split, offsets, steps)
-    # A search without a model reports why it has none.
-    return [*found, *_fit_simulations(settings, split, steps)] if found else []
+    return found
 
 
 def completed_parts(sizes: Sequence[int], samples: int) -> list[float]:
@@ -187,22 +185,6 @@ def completed_parts(sizes: Sequence[int], samples: int) -> list[float]:
     """
     seconds = [1.0 + _SQUARE_SECONDS * samples * size**2 for size in sizes]
     return [sum(seconds[:place]) / sum(seconds) for place in range(len(seconds))]
-
-
-def _fit_simulations(settings: Settings, split: Split, steps: Steps) -> list[Candidate]:
-    """Return the linear models of the free run, if the settings refine parameters."""
-    library = make_trial_library(settings)
-    is_other = settings.select == "fitness" or settings.estimator not in ("", "free-run")
-    if is_other or not (settings.library and library.has_simulations and settings.refine):
-        return []
-    fit = partial(library.fit_simulations, split.estimation, settings.max_terms)
-    fitted = steps.attempt(_REFINEMENT, fit) or []
-    return _without_diverged(
-        each
-        for found in fitted
-        if found.criterion is not None
-        for each in _validate([found.model], found.criterion, split.validation, settings.maximum_lag)
-    )
 
 
 def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[Individual, ...]:

@@ -25,10 +25,12 @@ from islands.evolution.search_result import (
     ResultCallback,
     SearchResult,
     SearchStatistics,
+    as_candidate,
     ignore_result,
+    list_linear_models,
+    rank_models,
     with_average,
     with_bands,
-    with_linear_comparison,
 )
 from islands.evolution.search_state import SearchState, stop_reason
 from islands.evolution.settings import LATENT, Settings
@@ -62,9 +64,10 @@ from islands.records.coupled import AnyRecord, CoupledRecord, split_coupled, spl
 from islands.records.dataset import Dataset
 from islands.records.reading.data_frames import read_data
 from islands.records.reading.options import DEFAULT_READING
-from islands.records.split import split_data, warn_of_extrapolation
+from islands.records.split import Split, split_data, warn_of_extrapolation
 from islands.report.documents.result_folder import record_document
 from islands.settings_schema import document_settings
+from islands.validation.assessment import Assessment
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
@@ -280,11 +283,20 @@ def identify_record(
         )
     described = {**_describe_preset(preset), **_describe(settings), "validation": held_out}
     statistics = _make_statistics(state, hall_of_fame, search_problem)
+    linear = _list_linear_models(split, scaled, steps)
+    models, candidates = rank_models([*models, *linear]), [*candidates, *map(as_candidate, linear)]
+    warm_up = max([settings.maximum_lag, *(entry.model.maximum_lag for entry in linear)])
     found = SearchResult(record, split, seed, described, statistics, models)
     on_models(with_average(found, count))
-    found = with_linear_comparison(found, scaled.library_delays, scaled.shooting, steps)
-    banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag, steps)
+    banded = with_bands(found, candidates, settings.constraints, warm_up, steps)
     return Result.from_search(refit_models(with_average(banded, count), validation, steps))
+
+
+def _list_linear_models(split: Split, settings: Settings, steps: Steps) -> list[Assessment]:
+    """Return the linear model, unless the settings select by another error or state the noise."""
+    if settings.select == "fitness" or settings.estimator not in ("", "free-run"):
+        return []
+    return list_linear_models(split, settings.shooting, settings.maximum_lag, settings.constraints, steps)
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:

@@ -17,9 +17,10 @@ from islands.evolution.presets import LATENT_SETTINGS
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
+    as_candidate,
+    list_linear_models,
     rank_models,
     with_bands,
-    with_linear_comparison,
 )
 from islands.evolution.search_state import SearchState, stop_reason
 from islands.evolution.settings import Settings
@@ -33,7 +34,6 @@ from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_all_inputs
 from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
-from islands.validation.ensemble import ValidatedModel
 
 #: Gain of the held-out error, as a fraction, that justifies a larger model of the result, and most models.
 _GAIN, _MOST_MODELS = 0.15, 10
@@ -107,6 +107,7 @@ def search_latent(
         assess(model, split, interval, constraints=settings.constraints, criterion=_CRITERION)
         for model in models
     ]
+    assessed += list_linear_models(split, interval, 0, settings.constraints, steps)
     described |= {name: getattr(settings, name) for name in sorted(LATENT_SETTINGS)}
     described |= {"average": 1, "shooting": interval}
     search = SearchStatistics(
@@ -130,15 +131,14 @@ def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
     add = partial(_add_errors, record=data, constraints=str(found.settings["constraints"]))
     models = steps.attempt(_ERRORS, lambda: tuple(map_over_record(add, found.models, data.samples)))
     found = found if models is None else replace(found, models=models)
-    found = with_linear_comparison(found, (), found.shooting_interval, steps)
-    validated = [ValidatedModel(entry.model, _CRITERION, entry.validation_error**2) for entry in found.models]
+    validated = [as_candidate(entry) for entry in found.models]
     warm_up = max(entry.model.maximum_lag for entry in found.models)
     return with_bands(found, validated, str(found.settings["constraints"]), warm_up, steps)
 
 
 def _add_errors(entry: Assessment, record: Dataset, constraints: str) -> Assessment:
     model = entry.model
-    if not isinstance(model, LatentModel):
+    if not isinstance(model, LatentModel) or model.quantity_errors is not None:
         return entry
     return replace(entry, model=with_quantity_errors(model, record, entry.warm_up, constraints))
 

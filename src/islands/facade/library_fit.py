@@ -34,11 +34,12 @@ from islands.evolution.individual import Individual, Population
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
+    as_candidate,
     keep_best_of_sizes,
+    list_linear_models,
     state_steps,
     with_average,
     with_bands,
-    with_linear_comparison,
 )
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
@@ -68,11 +69,8 @@ _SCREENED = 150
 #: Name of the step that computes bounds on the error of all models.
 CERTIFICATES = "bounds of the errors of all models"
 
-#: Estimators to which linear models of the free run are added: others state the noise.
+#: Estimators to which the linear model is added: others state the noise.
 _SIMULATING = "least-squares", "free-run"
-
-#: Name of the step that adds linear models of the free run.
-_SIMULATIONS = "linear models of the free run"
 
 #: Name of the step that fits a library again.
 _REFIT = "fit of better subsets"
@@ -154,9 +152,6 @@ class LibraryFit:
         found = state_steps(fit.found, fit.steps)
         search = replace(found.search, certificates=certificates)
         found = replace(found, search=search, settings=settings)
-        delays = [delay // fit.average for delay in settings["delays"]]
-        shooting = count_means(settings["shooting"], fit.average)
-        found = with_linear_comparison(found, delays, shooting, steps)
         banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, steps)
         return with_average(banded, fit.average)
 
@@ -226,9 +221,8 @@ def fit_library(
     exchange = bool(settings.certificate)
     structures, searches, started, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
-    simulated = _fit_simulations(split, rated, settings, swaps, warm_up, steps)
-    models += simulated
-    outcomes["ok"] += len(simulated)
+    if settings.selecting_estimator in _SIMULATING:
+        models += list_linear_models(split, interval, warm_up, library.constraints, steps)
     rows = sum(max(0, length - warm_up) for length in split.estimation.segments)
     count = full_set(library.degree, library.lags, library.lags, record.inputs)
     search = SearchStatistics(
@@ -251,18 +245,14 @@ def fit_library(
         refine_all = partial(refine_models, result, interval, warm_up, library.constraints, steps)
         result, refined = steps.attempt(REFINEMENT, refine_all) or (result, [])
         models += refined
-    estimates = [_as_candidate(entry) for entry in models]
+    estimates = [as_candidate(entry) for entry in models]
+    warm_up = max(warm_up, *(entry.model.maximum_lag for entry in models))
 
     def report_again(text: str, _fraction: float | None = None, /) -> None:
         progress(text, None)  # the fraction never falls
 
     refit = partial(fit_library, record, start, library, settings, seed, report_again, stop)
     return LibraryFit(result, samples, estimates, warm_up, searches, started, refit, steps)
-
-
-def _as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
-    assert entry.criterion is not None, "the models of a fit are estimated"
-    return ValidatedModel(entry.model, entry.criterion, entry.metrics["validation"]["free_run"].rmse ** 2)
 
 
 def _estimate(
@@ -319,26 +309,6 @@ def _estimate(
             "record"
         )
     return models, outcomes
-
-
-def _fit_simulations(
-    split: Split, library: TrialLibrary, settings: FitSettings, swaps: Settings, warm_up: int, steps: Steps
-) -> list[Assessment]:
-    """Return the linear models of the free run, which do not minimise the error of one step.
-
-    Measurement noise hides slow modes from the one-step-ahead error, by which structures are selected.
-    """
-    if not library.has_simulations or settings.selecting_estimator not in _SIMULATING:
-        return []
-
-    def fit() -> list[Assessment]:
-        return [
-            assess(found.model, split, swaps.shooting, warm_up, library.constraints, found.criterion)
-            for found in library.fit_simulations(split.estimation, settings.max_terms)
-        ]
-
-    steps.report(_SIMULATIONS, None)
-    return steps.attempt(_SIMULATIONS, fit) or []
 
 
 def _describe_outcomes(outcomes: Mapping[str, int]) -> str:

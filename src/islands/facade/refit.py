@@ -10,10 +10,9 @@ from functools import partial
 
 from islands.estimation.constraints.checks import check_constraints
 from islands.estimation.estimate import FittedStructure, estimate
-from islands.estimation.estimator_table import BOX_JENKINS, OUTPUT_ERROR, Criterion
+from islands.estimation.estimator_table import Criterion
 from islands.estimation.estimators import estimate_with
 from islands.estimation.latent_refit import refit_latent
-from islands.estimation.output_error import refit_output_error
 from islands.estimation.quantity_errors import with_quantity_errors
 from islands.estimation.refinement import RefinedModel, refine
 from islands.evolution.search_result import SearchResult, state_steps
@@ -130,10 +129,8 @@ def _estimate(
     if isinstance(model, LatentModel):
         refitted = refit_latent(model, data, _STEPS, stop, constraints)
         return refitted if isinstance(refitted, LatentModel) else f"the estimation fails ({refitted.reason})"
-    found: FittedStructure | RefinedModel[DynamicModel] | EvaluationOutcome | None
-    if criterion in (OUTPUT_ERROR, BOX_JENKINS):
-        found = refit_output_error(require_narx(model), data, criterion)
-    elif criterion.estimator in _REGRESSIONS:
+    found: FittedStructure | RefinedModel[DynamicModel] | EvaluationOutcome
+    if criterion.estimator in _REGRESSIONS:
         found = estimate(require_narx(model).regressors, data, *limits)
         if isinstance(found, FittedStructure):
             found = estimate_with(criterion.estimator, found, data, *limits)
@@ -142,8 +139,8 @@ def _estimate(
         found = refine(
             model, data, criterion.interval, *limits, _STEPS, standard_errors=has_errors, stop=stop
         )
-    if found is None or isinstance(found, EvaluationOutcome):
-        return "the estimation fails" if found is None else f"the estimation fails ({found.reason})"
+    if isinstance(found, EvaluationOutcome):
+        return f"the estimation fails ({found.reason})"
     if found.model.parameter_names != model.parameter_names:
         return "the constraints would remove a term"
     return found.model

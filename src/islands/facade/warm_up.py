@@ -15,7 +15,6 @@ from islands.available_cpus import count_cpus
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import SelectionProblem, make_selection_problem, select_forward
 from islands.estimation.linear.identify import identify_linear
-from islands.estimation.output_error import fit_output_error
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution.evaluation import Evaluator, Limits
 from islands.evolution.presets import resolve_settings
@@ -83,7 +82,6 @@ def _use_all_kernels() -> None:
         for constraints in ("none", "hysteresis"):
             identify_record(record, preset="hysteresis", constraints=constraints, **SMALL)
     fit_record(record, library="phi-polynomial", max_terms=3)
-    fit_output_error(record)
     identify_linear(record.u, record.y, max_order=1)
     _simulate_two_outputs(record)
 
@@ -107,7 +105,6 @@ def use_other_kernels() -> None:
         row_address(primitive)
     free_run(model, record)
     estimate(model.regressors, record)
-    fit_output_error(record)
     identify_linear(record.u, record.y, max_order=1)
     _simulate_two_outputs(record)
 

@@ -182,8 +182,8 @@ class Block:
     def is_state_space(self) -> bool:
         """Whether the states at one sample, and the inputs, determine all outputs.
 
-        An equation of a state reads the states one sample back, that of an output reads those of sample k, and
-        no measured output determines a state.
+        An equation of a state reads the states one sample back, that of an output reads those of sample
+        k, and no measured output determines a state.
         """
         channels = {name: channel for channel, name in enumerate(self.signals)}
         reads_states = all(

@@ -90,6 +90,6 @@ def find_rest(
         x = x + step
         if not np.isfinite(x).all():
             return None
-        if np.abs(step).max() <= _STILL * max(1.0, np.abs(x).max()):
+        if np.abs(step).max(initial=0.0) <= _STILL * np.abs(x).max(initial=1.0):
             return x
     return None

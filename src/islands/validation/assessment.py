@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isnan, nan
+from math import inf, isnan, isqrt, nan
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from islands.models.protocol import DynamicModel
 from islands.progress import Failure, attempt
 from islands.records.dataset import Dataset
 from islands.records.split import Split
+from islands.rounding import RESOLUTION
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
@@ -60,6 +61,11 @@ class Checks:
 
     def __init__(self, model: DynamicModel, split: Split, warm_up: int | None, missing: str = "") -> None:
         self._model, self._split, self._warm_up, self._missing = model, split, warm_up, missing
+
+    @property
+    def split(self) -> Split:
+        """Estimation data and validation data."""
+        return self._split
 
     def without(self, reason: str) -> "Checks":
         """Return checks that are not made, for a reason."""
@@ -182,6 +188,37 @@ class Assessment:
         """RMSE of the free run on the validation data; infinite if it diverges."""
         error = self.metrics["validation"]["free_run"].rmse
         return inf if isnan(error) else error
+
+    @property
+    def mean_square(self) -> float:
+        """Mean squared error of the free run on all data, relative to the squared output range.
+
+        Errors below the resolution of files are equal; infinite after a divergence.
+        """
+        split = self.checks.split
+        parts = zip(PARTS, (split.estimation, split.validation), strict=True)
+        squares = [self.metrics[part]["free_run"].rmse ** 2 * record.samples for part, record in parts]
+        samples, scale = (
+            split.estimation.samples + split.validation.samples,
+            split.estimation.output_range or 1.0,
+        )
+        mean = sum(squares) / samples / scale**2
+        return inf if isnan(mean) else max(mean, RESOLUTION**2)
+
+    @property
+    def effective_samples(self) -> float:
+        """Number of independent samples of all data, by the autocorrelation of the validation error.
+
+        The variance of a mean of squares of correlated normal values is that of so many independent ones.
+        """
+        known = self.errors[~np.isnan(self.errors)]
+        split = self.checks.split
+        samples = float(split.estimation.samples + split.validation.samples)
+        power, lags = float(np.add.reduce(known**2)), range(1, isqrt(known.size) + 1)
+        if not power > 0.0:
+            return samples
+        correlations = [float(np.add.reduce(known[lag:] * known[:-lag])) / power for lag in lags]
+        return max(2.0, samples / (1.0 + 2.0 * sum(each**2 for each in correlations)))
 
     @property
     def squared_errors(self) -> NDArray[np.float64]:

@@ -1,52 +1,40 @@
-"""Linear model of the same data, whose error shows what the nonlinear terms of a model contribute."""
+"""Linear model of the data of a search, which competes with the other models and shows what they gain."""
 
-from collections.abc import Sequence
-
-from islands.estimation.output_error import fit_output_error
-from islands.expressions.tree import Constant, Lagged
-from islands.models.latent import LatentModel
-from islands.models.narx import Model
-from islands.models.protocol import DynamicModel
+from islands.errors import RecordError
+from islands.estimation.estimator_table import BOX_JENKINS
+from islands.estimation.linear.latent import identify_linear_model
+from islands.estimation.parameter_constraints import constraint
 from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
-from islands.validation.recommendation import measure_size, recommend
-
-#: Largest lag of an input and of the output, and largest number of terms.
-_LAGS, _MAX_TERMS = 4, 40
 
 
-def is_linear(model: DynamicModel) -> bool:
-    """Return whether the next output of a model is linear in its inputs and its states."""
-    if isinstance(model, LatentModel):
-        return not model.units
-    return isinstance(model, Model) and all(
-        isinstance(item.expression, Lagged | Constant) for item in model.regressors
-    )
-
-
-def fit_linear_comparison(split: Split, delays: Sequence[int], shooting: int) -> Assessment | None:
-    """Fit linear models of increasing order to the free run, and return the recommended one.
+def assess_linear_model(
+    split: Split, shooting: int, warm_up: int = 0, constraints: str = "none"
+) -> Assessment | None:
+    """Identify the linear model of the estimation data and assess it.
 
     Parameters
     ----------
     split : Split
-        Estimation data, and validation data that select the order.
-    delays : sequence of int
-        Dead time of each input in samples; none if empty.
     shooting : int
         Length of a multiple-shooting interval in samples.
+    warm_up : int
+        Number of samples before the first prediction, at least.
+    constraints : str
+        Statements that the model must meet.
 
     Returns
     -------
     Assessment or None
-        None if the data are too short, or if every free run diverges.
+        None if the data are too short, or if the model does not meet the constraints: one of hysteresis is
+        not linear.
     """
-    found = [
-        assess(each.model, split, shooting, criterion=each.criterion)
-        for each in fit_output_error(split.estimation, delays, _LAGS, _MAX_TERMS)
-    ]
-    bounded = [each for each in found if each.outcomes["validation"]["free_run"]]
-    if not bounded:
+    if constraint(constraints).sums:
         return None
-    sizes = [measure_size(each.model) for each in bounded]
-    return bounded[recommend(sizes, bounded, hysteresis=False).rank - 1]
+    try:
+        model = identify_linear_model(split.estimation)
+        first = max(warm_up, model.maximum_lag)
+        found = assess(model, split, shooting, first, constraints, BOX_JENKINS)
+    except RecordError:
+        return None
+    return found if all(check.met for check in found.constraints) else None

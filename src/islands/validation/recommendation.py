@@ -6,6 +6,11 @@ Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984,
 differences. Blocks of the validation data take the correlation of the errors into account. Models with
 different warm-ups are compared over the samples that both predict. Decision 0017 compares rules.
 
+A linear model comes before a nonlinear one. A nonlinear model is compared only if its information criterion
+of the free run on all data is less than that of the linear one: one step or one bump leaves no excitation
+for the validation data, on which all models are then as good. The criterion is that of Schwarz with the
+penalty of a choice among many terms (Chen & Chen, Biometrika 95 (2008) 759-771).
+
 A model may be good on the validation data by chance. Its error on the estimation data is then large, or no
 smaller than that of a smaller model.
 
@@ -18,12 +23,13 @@ The setting ``select`` can replace this rule by the paper's choice of Appendix A
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isinf, isnan, sqrt
+from math import inf, isinf, isnan, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.expressions.tree import Constant
+from islands.expressions.tree import Constant, Lagged
+from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.rounding import RESOLUTION
@@ -55,6 +61,7 @@ _STILL = 0.01
 
 #: Reasons to exclude models, in the order of the criteria.
 DIVERGENCE = "validation-divergence"
+INFORMATION = "information-criterion"
 PROPERTY_1 = "property-1"
 VALIDATION_ERROR = "validation-error"
 ESTIMATION_ERROR = "estimation-error"
@@ -66,7 +73,7 @@ CHECKS = "physics-checks"
 _OF_EQUALS = (EQUALS_ESTIMATION_ERROR, CHECKS)
 
 #: Reasons that may exclude a model whose error on the validation data is the least.
-_BESIDES_ERROR = (PROPERTY_1, ESTIMATION_ERROR, *_OF_EQUALS)
+_BESIDES_ERROR = (INFORMATION, PROPERTY_1, ESTIMATION_ERROR, *_OF_EQUALS)
 
 #: Largest number of consecutive blocks of the validation data whose errors are compared between models.
 BLOCKS = 20
@@ -81,8 +88,8 @@ class Exclusion:
     Attributes
     ----------
     reason : str
-        ``validation-divergence``, ``property-1``, ``validation-error``, ``estimation-error``,
-        ``worse-than-reference``, ``estimation-error-of-equals`` or ``physics-checks``.
+        ``validation-divergence``, ``information-criterion``, ``property-1``, ``validation-error``,
+        ``estimation-error``, ``worse-than-reference``, ``estimation-error-of-equals`` or ``physics-checks``.
     ranks : tuple of int
     """
 
@@ -127,12 +134,24 @@ class _Selection:
             self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
+def is_linear(model: DynamicModel) -> bool:
+    """Return whether the next output of a model is linear in its inputs and its states."""
+    if isinstance(model, LatentModel):
+        return not model.units
+    return isinstance(model, Model) and all(
+        isinstance(item.expression, Lagged | Constant) for item in model.regressors
+    )
+
+
 def measure_size(model: DynamicModel) -> float:
     """Return the number of terms by which models are compared; a constant is half a term.
 
     The zero of a unit decides whether a law has a constant: in another unit, the law with one more term is
-    still larger, and without an offset the law without a constant is smaller.
+    still larger, and without an offset the law without a constant is smaller. Of a linear state space, the
+    coordinates of the states are no terms: its law has the poles, and the numerators of every input.
     """
+    if isinstance(model, LatentModel) and not model.units:
+        return model.order + sum(name[0] in "bd" for name in model.wiring) + 0.5
     has_constant = isinstance(model, Model) and any(item.expression == _ONE for item in model.regressors)
     return model.size - 0.5 * has_constant
 
@@ -140,19 +159,21 @@ def measure_size(model: DynamicModel) -> float:
 def recommend(
     sizes: Sequence[float], assessments: Sequence[Assessment], hysteresis: bool, unit: str = ""
 ) -> Recommendation:
-    """Choose the smallest model that is as good as the best one.
+    """Choose the linear model, or the smallest nonlinear model that is as good as the best one.
 
-    Candidates are the models whose free run on the validation data is bounded and, if the search constrains
-    models of hysteresis, that have Property 1. Those whose error on the validation data exceeds twice the
-    least are excluded, and of the others those whose free-run error on the estimation data exceeds twice the
-    least of them. Of the rest, the one with the least RMSE is the reference. A model is as good as the
-    reference if its RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range,
-    or if it exceeds that of the reference by at most 20 % and the mean squared errors differ by at most three
+    Candidates are the models whose free run on the validation data is bounded. Of the linear ones, that
+    with the least information criterion on all data is recommended, unless nonlinear ones have a smaller
+    criterion. Only these are compared then and, if the search constrains models of hysteresis, of them
+    those that have Property 1. Those whose error on the validation data exceeds twice the least are
+    excluded, and of the others those whose free-run error on the estimation data exceeds twice the least of
+    them. Of the rest, the one with the least RMSE is the reference. A model is as good as the reference if
+    its RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it
+    exceeds that of the reference by at most 20 % and the mean squared errors differ by at most three
     standard errors. The standard error is that of the mean difference over blocks of the validation data. A
-    model is also as good if its RMSE on the estimation data exceeds that of the reference by at most 1 %, and
-    that on the validation data by at most 50 %. Of these models, those whose free-run error on the estimation
-    data exceeds 1.5 times the least of them are excluded, and of the rest those that diverge in holds or
-    excursions. A criterion that no model meets excludes none.
+    model is also as good if its RMSE on the estimation data exceeds that of the reference by at most 1 %,
+    and that on the validation data by at most 50 %. Of these models, those whose free-run error on the
+    estimation data exceeds 1.5 times the least of them are excluded, and of the rest those that diverge in
+    holds or excursions. A criterion that no model meets excludes none.
 
     Parameters
     ----------
@@ -172,6 +193,7 @@ def recommend(
         )
     selection = _Selection(len(assessments))
     selection.keep(DIVERGENCE, bounded)
+    selection.keep(INFORMATION, _keep_informative(bounded, sizes, assessments))
     if hysteresis:
         selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
     selection.keep(
@@ -190,6 +212,37 @@ def recommend(
         _describe_physics(found, assessments, hysteresis, unit),
     )
     return replace(found, reasons=tuple(filter(None, reasons)))
+
+
+def _keep_informative(
+    places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Assessment]
+) -> list[int]:
+    """Return the nonlinear models with a smaller criterion than every linear one, or the best linear one."""
+    linear = [at for at in places if is_linear(assessments[at].model)]
+    if not linear:
+        return list(places)
+    terms = {
+        name
+        for entry in assessments
+        if isinstance(entry.model, Model)
+        for name in entry.model.parameter_names
+    }
+    choice = 2.0 * log(max(1, len(terms)))
+
+    def gain(at: int, other: int) -> float:
+        """Return by how much the criterion of a model is smaller than that of another one."""
+        errors = [assessments[each].mean_square for each in (at, other)]
+        samples = assessments[at if errors[0] < errors[1] else other].effective_samples
+        penalties = [
+            sizes[each] * (log(samples) + choice * (not is_linear(assessments[each].model)))
+            for each in (at, other)
+        ]
+        return samples * (log(errors[1]) - log(errors[0])) + penalties[1] - penalties[0]
+
+    best = linear[0]
+    for at in linear[1:]:
+        best = at if gain(at, best) > 0.0 else best
+    return [at for at in places if at not in linear and gain(at, best) > 0.0] or [best]
 
 
 def recommend_fittest(
@@ -245,6 +298,8 @@ def describe_exclusion(exclusion: Exclusion, assessments: Sequence[Assessment]) 
     """State what excludes some models, to be read after their names."""
     if exclusion.reason == PROPERTY_1:
         return "without Property 1"
+    if exclusion.reason == INFORMATION:
+        return "with a larger information criterion on all data"
     if exclusion.reason == CHECKS:
         return _describe_divergence([assessments[rank - 1].physics for rank in exclusion.ranks])
     of_equals = exclusion.reason in _OF_EQUALS
@@ -362,6 +417,11 @@ def _describe_choice(
     """State the criterion, the errors, and the excluded models that the criterion would prefer."""
     chosen, best = (assessments[rank - 1] for rank in (found.rank, found.reference or found.rank))
     error, least = (_write_error(entry.validation_error, unit) for entry in (chosen, best))
+    if is_linear(chosen.model) and any(not is_linear(each.model) for each in assessments):
+        return (
+            "linear: no nonlinear model has a smaller information criterion of the free run on all data, "
+            f"estimation and validation; RMSE on the validation data {error}"
+        )
     rivals = list_rivals(found, sizes, assessments)
     equals, others = (
         [

@@ -1,10 +1,11 @@
-"""Linear model of a record as a latent model without units, which simulates, exports and is saved as others."""
+"""Linear model of a record as a latent model without units, which every use of a model takes."""
 
 from dataclasses import replace
 from functools import lru_cache
 from math import inf, isfinite, log, nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.estimation.linear.identify import identify_linear
@@ -17,7 +18,7 @@ from islands.models.state_space import Quantity
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
 
-#: Samples for each state, samples, and part of the shortest recording from which initial states are estimated.
+#: Samples for each state, samples, and part of the shortest recording that give initial states.
 _SAMPLES_PER_STATE, _LARGEST_MEMORY, _LARGEST_PART = 3, 100, 0.05
 
 #: Part to which a mode decays in these samples.
@@ -86,7 +87,7 @@ def make_latent_model(found: LinearModel, record: Dataset, u: Signal) -> LatentM
     model = LatentModel(
         order=found.order,
         wiring=tuple(name for name, _ in named),
-        memory=_choose_memory(found.poles, record) + max(found.delays[0] + early),
+        memory=_choose_memory(found.poles, record) + int(max(found.delays[0] + early)),
         operating_inputs=tuple(found.u0.tolist()),
         delays=tuple(found.delays[0].tolist()),
         parameters=tuple(value for _, value in named),
@@ -99,7 +100,7 @@ def make_latent_model(found: LinearModel, record: Dataset, u: Signal) -> LatentM
 
 
 def _measure_states(a: Signal, b: Signal, u: Signal) -> Signal:
-    """Return the standard deviation of each state for an input, 1 of one that does not move; pairs have one."""
+    """Return the standard deviation of each state, 1 of one that does not move; a pair has one."""
     order = len(a)
     theta = np.concatenate([a.ravel(), b.ravel(), np.zeros(2 * order + u.shape[1] + 1)])
     states = np.empty((len(u), order))
@@ -110,7 +111,7 @@ def _measure_states(a: Signal, b: Signal, u: Signal) -> Signal:
     return np.where(found > 0.0, found, 1.0)
 
 
-def _choose_memory(poles: Signal, record: Dataset) -> int:
+def _choose_memory(poles: NDArray[np.complex128], record: Dataset) -> int:
     """Return the number of samples from which initial states are estimated."""
     radius = float(np.abs(poles).max(initial=0.0))
     decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
@@ -127,8 +128,8 @@ def _match_errors(quantities: tuple[Quantity, ...], found: LinearModel) -> tuple
             abs(other.value - each.value) if (other.name, other.input) == (each.name, each.input) else inf
             for other, _ in left
         ]
-        nearest = min(range(len(left)), key=distances.__getitem__, default=None)
-        is_known = nearest is not None and isfinite(distances[nearest])
+        nearest = min(range(len(left)), key=distances.__getitem__, default=0)
+        is_known = bool(left) and isfinite(distances[nearest])
         error = float(left.pop(nearest)[1]) if is_known else nan
         # A dead time of whole samples is chosen, not estimated.
         errors.append(error if error > 0.0 else nan)

@@ -9,7 +9,7 @@ from functools import partial
 from math import inf, isfinite
 from types import MappingProxyType
 
-from islands.facade.trials.held_out_error import hold_out, measure_library, measure_output_error
+from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import TrialLibrary
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
@@ -83,12 +83,6 @@ def try_kinds(
         delays = steps.attempt(DEAD_TIMES, partial(_estimate_delays, record)) or ()
     chosen = tuple(delays) if any(delays) else ()
     errors = {kind: measure(kind, chosen) for kind in libraries}
-    simplest = next(iter(libraries))
-    if libraries[simplest].has_simulations and errors[simplest] > PROMISING * min(errors.values()):
-        # Measurement noise may hide slow modes from the one-step-ahead error of the small models.
-        steps("preset auto: trial of linear models of the free run", None)
-        library = libraries[simplest].with_delays(chosen)
-        errors[simplest] = min(errors[simplest], summarise(measure_output_error(splits, library)))
     return KindTrials(chosen, MappingProxyType(errors))
 
 

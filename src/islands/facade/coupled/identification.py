@@ -30,7 +30,7 @@ from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import require_narx
+from islands.models.narx import Model, require_narx
 from islands.progress import AnswerFoundError, ProgressCallback, Steps, StoppedError
 from islands.records.averaging import AUTO, average_samples
 from islands.records.coupled import CoupledSplit
@@ -230,6 +230,13 @@ def _search_outputs(
     return results
 
 
+def _take_equations(result: Result) -> Result:
+    """Return the result without state spaces, which do not read the other outputs sample by sample."""
+    found = require_one_output(result.search_result)
+    models = tuple(entry for entry in found.models if isinstance(entry.model, Model))
+    return Result.from_search(replace(found, models=models))
+
+
 def _couple_latent(
     data: CoupledSplit, options: dict[str, Any], seed: int, steps: Steps, find: FindOutput
 ) -> Result:
@@ -258,7 +265,7 @@ def _couple(
     # The equations have one sampling time: the shortest that one of them needs.
     average = options.get("average", AUTO)
     options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
-    results = _search_outputs(names, splits, options, steps, find)
+    results = [_take_equations(each) for each in _search_outputs(names, splits, options, steps, find)]
     steps.report("choice of the equations", 0.0)
     record, data = data.record, data.map(partial(average_samples, count=options["average"]))
     warm_up = max(entry.warm_up for result in results for entry in result.models)

@@ -20,7 +20,6 @@ from islands.models.regressor import Regressor
 from islands.progress import Steps, StoppedError
 from islands.records.dataset import Dataset, join
 from islands.records.split import Split
-from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run_error
 
@@ -78,24 +77,6 @@ def measure_library(
     """
     checked = steps or Steps()
     return tuple(_find_least_error(split, library, checked) ** 0.5 for split in splits)
-
-
-def measure_output_error(splits: Sequence[Split], library: TrialLibrary) -> tuple[float, ...]:
-    """Return the root mean squared error of the best linear model of the free run on each held-out part.
-
-    It is infinite without such a model.
-    """
-    return tuple(
-        min(
-            (
-                simulate_freely(found.model, split.validation).mean_squared_error ** 0.5
-                for found in library.fit_simulations(split.estimation, _SWAP_TERMS)
-                if split.validation.samples > found.model.maximum_lag
-            ),
-            default=inf,
-        )
-        for split in splits
-    )
 
 
 def _find_least_error(split: Split, library: TrialLibrary, steps: Steps) -> float:

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from islands.errors import check_integers
-from islands.estimation.estimate import FittedStructure
-from islands.estimation.output_error import fit_output_error
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.settings import Settings
@@ -34,17 +32,6 @@ class TrialLibrary:
         """Return the library for means of ``count`` samples, with the same intervals of time."""
         shooting = None if self.shooting is None else count_means(self.shooting, count)
         return replace(self, shooting=shooting, delays=tuple(delay // count for delay in self.delays))
-
-    @property
-    def has_simulations(self) -> bool:
-        """Whether linear models of the free run belong to the library."""
-        return self.name == "polynomial" and self.constraints == "none"
-
-    def fit_simulations(self, record: Dataset, max_terms: int) -> list[FittedStructure]:
-        """Fit the linear models of the free run; none if the library has none."""
-        if not self.has_simulations:
-            return []
-        return fit_output_error(record, self.delays, self.lags, max_terms)
 
     def with_delays(self, delays: Sequence[int]) -> "TrialLibrary":
         """Return the library with other dead times."""

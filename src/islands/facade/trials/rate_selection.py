@@ -26,6 +26,7 @@ from islands.records.split import Split, average_split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
+from islands.validation.linear_comparison import assess_linear_model
 
 #: Samples are averaged if the error is at most this fraction of the error without averaging.
 CLEAR_GAIN = 0.8
@@ -96,6 +97,12 @@ def _choose_count(split: Split, library: TrialLibrary, least: int, steps: Steps)
         errors_at.append(
             compute_errors(average_split(split, count), library.at_rate(count), interval // count)
         )
+    # Means reduce the noise that least squares takes for dynamics, which a linear model separates itself.
+    linear = assess_linear_model(split, 1, constraints=library.constraints)
+    if linear is not None and linear.validation_error < _root_mean_square(errors_at[0]):
+        predicted = simulate_freely(linear.model, split.validation, linear.warm_up).y
+        residual = replace(split.validation, y=split.validation.y - predicted)
+        errors_at[0] = average_samples(residual, interval).y
     squares = np.array(errors_at) ** 2
     # Coarse rates have a longer warm-up: compare the intervals that all of them predict.
     compared = squares[:, ~np.isnan(squares).any(axis=0)]
@@ -103,6 +110,10 @@ def _choose_count(split: Split, library: TrialLibrary, least: int, steps: Steps)
     best = int(np.argmin(errors))
     gain = CLEAR_GAIN if library.shooting is None else CLEAR_GAIN_REFINED
     return counts[best] if errors[best] <= gain * errors[0] else 1
+
+
+def _root_mean_square(errors: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.nanmean(errors**2)))
 
 
 def _permits(split: Split, count: int, least: int) -> bool:
@@ -146,11 +157,10 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
     pool = library.screen(estimation)
     structures = forward_selection(pool, estimation, library.constraints, _TERMS)
     warm_up = max(item.maximum_lag for item in pool)
-    estimated: list[FittedStructure | EvaluationOutcome] = [
+    estimated = [
         estimate(structure, estimation, library.constraints, warm_up, standard_errors=False)
         for structure in (() if isinstance(structures, EvaluationOutcome) else structures)
     ]
-    estimated += library.fit_simulations(estimation, _TERMS)
     best = min(_simulate(estimated, validation, warm_up), key=_squared_error, default=None)
     if best is None:
         return np.full(sum(length // count for length in validation.segments), inf)

@@ -54,9 +54,6 @@ _LARGEST_RATIO = 5.0
 #: Normal quantile of 5 %: a likely error is one that is exceeded in one of twenty cases.
 _LOWER_QUANTILE = -1.645
 
-#: Error of a linear model relative to that of the model below which the model is no better.
-_BETTER_THAN_LINEAR = 1.05
-
 #: Inclusion probability from which a term is certain.
 CERTAIN = 0.9
 
@@ -595,11 +592,6 @@ class ResultFacts(RunFacts):
         """Whether the output of a model of hysteresis drifts at constant input."""
         is_known = self.physics["hold_drift_percent"] is not None
         return self.requires_property_1 and not self.physics["property_1"] and is_known
-
-    @property
-    def is_linear_as_good(self) -> bool:
-        """Whether a linear model has about the same error."""
-        return self.linear_ratio is not None and self.linear_ratio < _BETTER_THAN_LINEAR
 
     @property
     def largest_size(self) -> int:

@@ -92,9 +92,8 @@ def _describe_output(output: OutputFacts) -> str:
 
 
 def table(facts: ResultFacts) -> list[str]:
-    """Return the table of models and of the linear one as lines of equal width, with free-run errors."""
-    linear = [_row("lin.", facts.linear, facts.claims_hysteresis)] if facts.linear else []
-    lines = [columns(facts), *rows(facts), *linear]
+    """Return the table of models as lines of equal width, with free-run errors."""
+    lines = [columns(facts), *rows(facts)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
 

@@ -128,7 +128,6 @@ RESULTS = {
             {"bounded": True, "ranges": None},
         )
     ],
-    "limit_no_better_than_linear": [{"linear.metrics.validation.free_run.rmse": 0.001}],
     "limit_drift": [{"models.0.physics.property_1": False, "models.0.physics.hold_drift_percent": 7.5}],
     "limit_open_loops": [{"models.0.physics.excursions.0.closure_percent": 6.0}],
     "limit_predictable_residual": [STRUCTURE],

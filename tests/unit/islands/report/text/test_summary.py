@@ -45,7 +45,7 @@ def test_the_summary_begins_with_sentences_and_contains_the_table(findings):
     lines = text.splitlines()
     for sentence in (each for each in describe(findings) if "(k) = " not in each):
         assert sentence.strip() in " ".join(text.split())
-    assert lines[-7:-1] == table(facts_of(findings))
+    assert lines[-1 - len(table(facts_of(findings))) : -1] == table(facts_of(findings))
     assert lines[-1].startswith("* recommended; ranked by")
     assert max(map(len, lines)) <= 80
 
@@ -171,8 +171,7 @@ def first_cells(findings, **changes):
 def test_the_table_has_a_row_per_model_and_aligned_columns(findings):
     head, *lines = table(facts_of(findings))
     assert head.split("  ")[0] == "rank"
-    assert len(lines) == len(findings.models) + 1
-    assert lines[-1].split()[:2] == ["lin.", str(findings.linear.model.size)]
+    assert len(lines) == len(findings.models)
     assert len({len(line) for line in (head, *lines)}) == 1
     first = findings.models[0]
     cells = first_cells(findings)
