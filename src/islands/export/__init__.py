@@ -54,6 +54,9 @@ def _of_block(write: Callable[[Block], Text]) -> Callable[[Exported], Text]:
     return write_model
 
 
+#: Format of model files, which also have the uncertainty of a model of a result.
+MODEL_FILE = "json"
+
 #: Text formats by name. Equations may be in deviations; programs have the offsets in their equations.
 EXPORTS: Mapping[str, Callable[[Exported], str]] = MappingProxyType(
     {
@@ -66,7 +69,7 @@ EXPORTS: Mapping[str, Callable[[Exported], str]] = MappingProxyType(
         "matlab-system": _of_block(matlab_system_source),
         "s-function": _of_block(s_function_source),
         "modelica": _of_block(modelica_source),
-        "json": model_json,
+        MODEL_FILE: model_json,
     }
 )
 
@@ -123,4 +126,12 @@ def export_or_write(model: Exported, kind: str, path: str | Path | None) -> str 
     if path is None:
         return export(model, kind)
     write_export(model, kind, path)
+    return None
+
+
+def return_or_write(text: str, path: str | Path | None) -> str | None:
+    """Return a text, or write it to a file if there is a path."""
+    if path is None:
+        return text
+    Path(path).write_text(text, encoding="utf-8")
     return None

@@ -12,6 +12,7 @@ from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
 from islands.facade.results.reader import read_result
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
+from islands.persistence.ensembles import bands_of_file
 from islands.persistence.models import read_model
 from islands.persistence.saved_documents import KINDS, open_document
 from islands.simulators.specification.code import FmuSpec
@@ -77,14 +78,15 @@ def _load_result(file: Path, _document: _Document, primitives: Mapping[str, Prim
     return read_result(file.parent, primitives)
 
 
-def _load_model(file: Path, _document: _Document, primitives: Mapping[str, Primitive]) -> FittedModel:
+def _load_model(file: Path, document: _Document, primitives: Mapping[str, Primitive]) -> FittedModel:
     """Read a model file; a model of a result folder has the errors and the bands of the result."""
     folder = file.absolute().parent.parent
     if file.absolute().parent.name == "models" and (folder / "result.json").is_file():
         for each in read_result(folder, primitives).models:
             if f"{each.rank:02d}.json" == file.name:
                 return each
-    return FittedModel.from_model(read_model(file, primitives))
+    model = read_model(file, primitives)
+    return FittedModel.from_model(model, bands_of_file(document, model, primitives))
 
 
 def _load_extended(file: Path, _document: _Document, _primitives: Mapping[str, Primitive]) -> SavedSimulation:

@@ -76,8 +76,8 @@ class LinearResponse:
         """
         if not len(self.members):
             raise ModelError(
-                "the uncertainty of this system is not known: linearise a model of a result, whose ensemble "
-                "has it"
+                "the uncertainty of this system is not known: linearise a result, or a model that was loaded "
+                "from its folder or file"
             )
         return measure_band(of(self.members), self.weights, level)
 

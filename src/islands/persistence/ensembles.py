@@ -1,4 +1,4 @@
-"""Ensemble and prediction bands of a result as JSON values."""
+"""Ensemble and prediction bands of a result as JSON values, also in the file of a model."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from islands.models.regressor import Regressor, regressor
 from islands.persistence.models import model_from_json, model_json, read_coupled
 from islands.validation.data_range import DataRange
 from islands.validation.ensemble import Ensemble, EnsembleStructure
-from islands.validation.prediction_bands import OutputBands, PredictionBands
+from islands.validation.prediction_bands import AnyBands, OutputBands, PredictionBands
 
 
 class StructureDocument(BaseModel):
@@ -203,3 +203,56 @@ def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionB
         )
     except ValueError as error:
         raise ModelError(f"the bands of the result are damaged: {error}") from error
+
+
+def model_file(model: AnyModel, bands: AnyBands | None) -> str:
+    """Return the text of the file of a model with its uncertainty: the ensemble and the prediction bands.
+
+    The file then has the same bands without the folder of its result.
+
+    Raises
+    ------
+    ModelError
+        A number of the model is not finite.
+    """
+    text = model_json(model)
+    if bands is None:
+        return text
+    shared = bands.ensemble
+    uncertainty = {
+        "ensemble": ensemble_document(shared),
+        "outputs": [
+            {
+                "bands": bands_document(each),
+                **({} if shared else {"ensemble": ensemble_document(each.ensemble)}),
+            }
+            for each in bands.outputs
+        ],
+    }
+    # In one line, since the numbers are for programs.
+    content = text.rstrip().removesuffix("}").rstrip()
+    return f'{content},\n  "uncertainty": {json.dumps(uncertainty)}\n}}\n'
+
+
+def bands_of_file(
+    document: Mapping[str, Any], model: AnyModel, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> AnyBands | None:
+    """Return the bands in the document of a model file; None if it has none.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    found = document.get("uncertainty")
+    if not found:
+        return None
+    try:
+        shared, outputs = ensemble_from_document(found["ensemble"], model, primitives), found["outputs"]
+        if isinstance(model, CoupledModel):
+            return output_bands_from_document(outputs, shared, model, primitives)
+        return bands_from_document(outputs[0]["bands"], shared)
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise ModelError(
+            f"the uncertainty of the model file is damaged: {error!r} is missing or wrong"
+        ) from error

@@ -60,6 +60,8 @@ class ModelDocument(BaseModel):
     equation: str = ""
     latex: str = ""
     terms: Annotated[tuple[TermDocument, ...], Field(min_length=1)]
+    #: See `islands.persistence.ensembles`.
+    uncertainty: Annotated[dict[str, Any] | None, Field(exclude=True)] = None
 
 
 def narx_json(model: Model) -> str:

@@ -1,10 +1,11 @@
 """Models of a job (metrics, physics checks, exports), and the whole result."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Response
 
-from islands.export import EXPORTS, Exported, export
+from islands.export import EXPORTS, MODEL_FILE, Exported, export
 from islands.persistence.models import any_model_from_json
 from islands.records.averaging import average_samples
 from islands.records.dataset import Dataset
@@ -112,8 +113,12 @@ async def exported(
 ) -> Response:
     """Export a model as a program, a block for a simulator, an equation, or a model file."""
     found = await get_model(state, caller, job, rank)
+    name = f"model-{rank:02d}"
+    if form == MODEL_FILE:
+        document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
+        return _text_response(await state.run_blocking(_write_model_file, job, found, document), form, name)
     model = any_model_from_json(found.file, f"model {rank}")
-    return await export_response(state, model, form, f"model-{rank:02d}")
+    return await export_response(state, model, form, name)
 
 
 @router.get(
@@ -155,7 +160,17 @@ async def export_response(state: AppState, model: Exported, form: str, name: str
     SettingsError, ModelError
         There is no such format, or the model cannot be written in it.
     """
-    text = await state.run_blocking(export, model, form)
+    return _text_response(await state.run_blocking(export, model, form), form, name)
+
+
+def _write_model_file(job: str, found: StoredModel, document: Mapping[str, Any]) -> str:
+    # The classes of results import the search.
+    from islands_service.domain.fitted_models import read_fitted  # noqa: PLC0415
+
+    return read_fitted(job, found.file, found.document, document).export(MODEL_FILE) or ""
+
+
+def _text_response(text: str, form: str, name: str) -> Response:
     file = f"{name}.{_SUFFIXES.get(form, 'txt')}"
     return Response(
         text,

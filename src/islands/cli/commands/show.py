@@ -10,7 +10,7 @@ from islands.cli import options
 from islands.cli.console import output
 from islands.cli.settings_options import with_settings
 from islands.errors import SettingsError, lookup
-from islands.export import EXPORTS, FILE_EXPORTS, export_or_write
+from islands.export import EXPORTS, FILE_EXPORTS, MODEL_FILE, export_or_write
 from islands.export.linear_system import find_notation, write_linear_system
 from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
@@ -94,11 +94,13 @@ def show(
     if kind == REPORT:
         _write_report(Path(model), out)
         return
-    # `load` imports the search and its kernels, which takes longer than everything else.
-    found = read_saved_model(open_document(model)) if Path(model).exists() else None
+    # `load` imports the search and its kernels, which takes longer than everything else. A model file has the
+    # uncertainty of a result.
+    is_plain = Path(model).exists() and kind != MODEL_FILE
+    found = read_saved_model(open_document(model)) if is_plain else None
     if found is None:
         loaded = islands.load(model)
-        if not isinstance(loaded, islands.FittedModel):
+        if kind == MODEL_FILE or not isinstance(loaded, islands.FittedModel):
             _print(loaded.export(kind or "plain", out))
             return
         found = loaded.model

@@ -12,7 +12,7 @@ from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import AnySearchResult, require_one_output
-from islands.export import export_or_write
+from islands.export import MODEL_FILE, export_or_write, return_or_write
 from islands.facade.results.model_analysis import find_rest_of_data, linearise
 from islands.facade.results.model_simulation import (
     SHOOTING,
@@ -29,6 +29,7 @@ from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.models.state_space import StateSpace
 from islands.models.sympy_expression import to_sympy
+from islands.persistence.ensembles import model_file
 from islands.records.coupled import AnyRecord
 from islands.report.figures.names import FREE_RUN
 from islands.report.text.facts import BEFORE_REFIT, is_refitted
@@ -75,7 +76,7 @@ class FittedModel:
         Steps of the model in each interval of multiple shooting.
     prediction_bands : PredictionBands, OutputBands or None
         Prediction bands of every level, of every output. None if the free run of the model diverged, the
-        search was stopped before them, or outside of a result folder.
+        search was stopped before them, or a file has none.
     output_units : tuple of str
         Units of the outputs; each is empty if it is unknown.
     document : mapping
@@ -107,9 +108,9 @@ class FittedModel:
         )
 
     @classmethod
-    def from_model(cls, model: AnyModel) -> "FittedModel":
-        """Return a model outside of a result."""
-        return cls(model, None, {}, model.maximum_lag, SHOOTING, None, ("",) * len(list_models(model)))
+    def from_model(cls, model: AnyModel, bands: AnyBands | None = None) -> "FittedModel":
+        """Return a model outside of a result, with the bands of its file."""
+        return cls(model, None, {}, model.maximum_lag, SHOOTING, bands, ("",) * len(list_models(model)))
 
     @property
     def assessment(self) -> Assessment:
@@ -433,7 +434,10 @@ class FittedModel:
             The level is out of range.
         """
         if self.prediction_bands is None and self.rank is None:
-            raise ModelError("prediction bands need a model of a result folder: give its folder or file")
+            raise ModelError(
+                "this model file has no prediction bands: give the folder of its result, or a file that "
+                "'islands show FOLDER --format json' wrote"
+            )
         if self.prediction_bands is None:
             raise ModelError(
                 f"model {self.rank} has no prediction bands: its free run diverged, or the search was "
@@ -534,7 +538,8 @@ class FittedModel:
         Parameters
         ----------
         kind : str
-            plain, latex, mathml, python, c, matlab or json; with a path also fmu (FMI 3.0) or fmu2.
+            plain, latex, mathml, python, c, matlab or json, which has the uncertainty of the model; with a
+            path also fmu (FMI 3.0) or fmu2.
         path : str or Path, optional
             File to write; nothing is returned then.
 
@@ -543,6 +548,8 @@ class FittedModel:
         SettingsError
             The format is unknown, or is not text and no path is given.
         """
+        if kind == MODEL_FILE:
+            return return_or_write(model_file(self.model, self.prediction_bands), path)
         return export_or_write(self.model, kind, path)
 
     def __str__(self) -> str:

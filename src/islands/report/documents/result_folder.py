@@ -32,8 +32,8 @@ from islands.models.protocol import DynamicModel
 from islands.models.signal_statement import describe_signals
 from islands.parallel import map_over_record
 from islands.persistence.checkpoints import replace_file
-from islands.persistence.ensembles import bands_document, ensemble_document
-from islands.persistence.models import model_json, terms_document, write_model
+from islands.persistence.ensembles import bands_document, ensemble_document, model_file
+from islands.persistence.models import model_json, terms_document
 from islands.progress import Steps
 from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset
@@ -450,7 +450,8 @@ def write_result(found: AnySearchResult, folder: Path) -> None:
     models.mkdir(parents=True, exist_ok=True)
     entries: Sequence[Assessment | CoupledAssessment] = found.models
     for rank, entry in enumerate(entries, start=1):
-        write_model(entry.final_model, models / f"{rank:02d}.json")
+        content = model_file(entry.final_model, entry.bands)
+        (models / f"{rank:02d}.json").write_text(content, encoding="utf-8")
     for path in models.glob("[0-9][0-9]*.json"):
         if int(path.stem) > len(found.models):
             path.unlink()

@@ -142,9 +142,21 @@ def test_simulate_writes_prediction_bands(run, fitted):
     ):
         code, _, error = run(*arguments, *changes)
         assert (code, reason in error) == (2, True)
-    shutil.copyfile("out/models/01.json", "model.json")
-    code, _, error = run("simulate", "model.json", "r.csv", "--bands", "0.9")
-    assert (code, "need a model of a result folder" in error) == (2, True)
+
+
+def test_a_model_file_alone_has_the_bands_of_its_result(run, fitted):
+    succeed("show", "out", "--format", "json", "--out", "model.json")
+    rank = json.loads(Path("out/result.json").read_text())["recommended"]["rank"]
+    assert Path("model.json").read_text() == Path(f"out/models/{rank:02d}.json").read_text()
+    bands = ("r.csv", "--bands", "0.9", "--set", "warm_up=5")
+    outputs = [run("simulate", name, *bands)[1] for name in ("out", "model.json")]
+    widths = [each.partition("median half-width")[2].split()[0] for each in outputs]
+    assert widths[0] == widths[1]
+    document = json.loads(Path("model.json").read_text())
+    del document["uncertainty"]
+    Path("bare.json").write_text(json.dumps(document))
+    code, _, error = run("simulate", "bare.json", "r.csv", "--bands", "0.9")
+    assert (code, "this model file has no prediction bands" in " ".join(error.split())) == (2, True)
 
 
 @pytest.mark.parametrize("name", ["u_V", "u_V+1"])

@@ -106,7 +106,7 @@ def test_a_model_file_starts_after_its_lags_and_has_no_bands(base, tmp_path):
     assert (loaded.model, loaded.warm_up, loaded.rank) == (model, 2, None)
     (printed,) = command(tmp_path / "m.json", base / "r.csv", out=tmp_path / "s.csv")
     np.testing.assert_array_equal(loaded.simulate(read(base)).y, printed)
-    with pytest.raises(islands.ModelError, match="bands need a model of a result folder"):
+    with pytest.raises(islands.ModelError, match="this model file has no prediction bands"):
         loaded.bands(read(base))
     assert repr(loaded).startswith("<FittedModel: y_um(k) =")
     assert "</math>" in loaded._repr_html_()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import islands
-from islands.models.operating_point import find_equilibrium, static_characteristic
+from islands.errors import SettingsError
+from islands.models.operating_point import find_equilibrium, parse_levels, static_characteristic
 from islands.simulation.predictors import free_run
 
 
@@ -44,3 +45,10 @@ def test_the_characteristic_is_the_end_of_a_long_free_run(system):
 def test_models_without_a_unique_equilibrium_are_named(system, message):
     with pytest.raises(islands.ModelError, match=message):
         find_equilibrium(system, [0.4])
+
+
+def test_a_level_is_a_name_and_a_finite_number():
+    assert parse_levels(["u_V=0.5", "a=b=-1e3"], "--at") == {"u_V": 0.5, "a=b": -1000.0}
+    for text in ("u_V", "=1", "u_V=", "u_V=nan", "u_V=inf"):
+        with pytest.raises(SettingsError, match=r"--at .*: write NAME=VALUE"):
+            parse_levels([text], "--at")

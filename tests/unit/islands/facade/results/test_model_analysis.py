@@ -1,9 +1,15 @@
 """Analyses of the models of a result: equation, linear system, characteristic, step response."""
 
+import shutil
+
 import numpy as np
 import pytest
 
 import islands
+from islands.expressions.parsing import parse
+from islands.facade.results.model_analysis import split_point
+from islands.models.coupled_narx import CoupledModel
+from islands.models.narx import make_model
 
 
 def test_a_response_is_drawn_into_the_axes_of_the_user(result):
@@ -24,9 +30,25 @@ def test_the_members_of_a_linear_system_are_those_of_the_ensemble(result, tmp_pa
     low, high = system.frequency_response([0.1]).band()
     assert (low <= high).all()
     result.save(tmp_path, figures=())
-    again = islands.load(tmp_path).linearise()
-    assert again.A.tobytes() == system.A.tobytes()
-    assert [each.A.tobytes() for each in again.members] == [each.A.tobytes() for each in system.members]
+    # A model file alone has the same uncertainty, and the same operating point.
+    file = shutil.copy(tmp_path / "models" / f"{result.best.rank:02d}.json", tmp_path.parent / "alone.json")
+    for again in (islands.load(tmp_path).linearise(), islands.load(file).linearise()):
+        assert again.A.tobytes() == system.A.tobytes()
+        assert [each.A.tobytes() for each in again.members] == [each.A.tobytes() for each in system.members]
+        assert again.operating_inputs == system.operating_inputs
+
+
+def test_an_operating_point_has_the_level_of_every_output_or_of_none():
+    model = CoupledModel(
+        (
+            make_model([(parse("y(k-1)"), 0.5)], ("u", "b"), "a"),
+            make_model([(parse("u1(k-1)"), 0.5)], ("u", "a"), "b"),
+        )
+    )
+    assert split_point(model, {}) == (None, None)
+    assert split_point(model, {"b": 1.0, "u": 2.0, "a": 3.0}) == ({"u": 2.0}, [3.0, 1.0])
+    with pytest.raises(islands.ModelError, match="the level of each, or of none"):
+        split_point(model, {"a": 1.0})
 
 
 def test_inputs_alone_are_simulated_from_rest_as_an_array_a_frame_and_step_by_step(result):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.report.figures.linear_system import LINEAR_FIGURES, draw_bode, draw_linear_system
+from islands.models.state_space import StateSpace
+from islands.report.figures.linear_system import LINEAR_FIGURES, draw_bode, draw_linear_system, draw_pole_map
 from support.latent_systems import make_model
 
 # The kernels of state spaces are compiled at their first use.
@@ -43,3 +44,18 @@ def test_bands_are_drawn_of_a_system_whose_uncertainty_is_known(kind):
     axes = [draw_linear_system(each, kind).axes[0] for each in (system, unsure)]
     without, with_bands = (len(each.lines) + len(each.collections) for each in axes)
     assert with_bands > without
+
+
+def test_a_far_zero_is_named_and_does_not_set_the_scale_of_the_poles():
+    zero = -40.0
+    system = StateSpace(
+        A=np.array([[1.5, -0.56], [1.0, 0.0]]),
+        B=np.array([[1.0], [0.0]]),
+        C=np.array([[1.0, -zero]]),
+        D=np.zeros((1, 1)),
+        dt=0.1,
+    )
+    assert system.zeros == pytest.approx([zero])
+    axes = draw_pole_map(system).axes[0]
+    assert "zeros (outside: -40)" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert axes.get_xlim()[0] > zero
