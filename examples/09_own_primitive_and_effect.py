@@ -19,6 +19,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import islands
+from islands.effects import Effect, Parameter, Site
 
 parser = argparse.ArgumentParser(description="Add a primitive and an effect.")
 parser.add_argument("--out", type=Path, help="folder of the results; a temporary one by default")
@@ -127,12 +128,12 @@ def form(y, values, context):
     return y * (1.0 + values[0] * (supply - supply[0]))
 
 
-supply_gain = islands.Effect(
+supply_gain = Effect(
     name="supply-gain",
     summary="The sensitivity of the sensor changes with its supply: y (1 + k (s - s(0)))",
     family="change",
-    site=islands.Site.OUTPUT,
-    parameters=lambda _context: (islands.Parameter("k", "1/V", 0.0, 0.05),),
+    site=Site.OUTPUT,
+    parameters=lambda _context: (Parameter("k", "1/V", 0.0, 0.05),),
     starting_points=lambda _context, _residual: ((0.25,),),
     form=form,
     is_applicable=lambda context: "supply_V" in context.channels,

@@ -8,13 +8,37 @@ import islands
 import islands_api
 from islands_api.client.base import BaseClient, Endpoint
 
+#: Documented names that are reached by their submodule.
+FURTHER = (
+    "records.coupled.CoupledRecord",
+    "records.split.Split",
+    "models.coupled_narx.CoupledModel",
+    "models.operating_point.static_characteristic",
+    "models.sympy_expression.to_sympy",
+    "simulation.input_response.step_response",
+    "effects.Effect",
+    "effects.Parameter",
+    "effects.Site",
+    "evolution.migration.TOPOLOGIES",
+    "facade.results.saved_simulation.SavedDiagnosis",
+    "facade.results.saved_simulation.SavedSimulation",
+    "diagnosis.planning.experiment_plan.ExperimentPlan",
+    "report.documents.monitor_state.SavedMonitor",
+)
+
 
 def python() -> str:
     """Return the page of the package ``islands``."""
     return page(
         "Python API",
-        "The public names of the package `islands`, and its estimator of scikit-learn.",
+        "The public names of the package `islands`, further names of its submodules, and its estimator of "
+        "scikit-learn.",
         *_groups(islands),
+        section(
+            "By submodule",
+            "What these functions take and return, and what is needed less often.",
+            *(f"::: islands.{name}" for name in FURTHER),
+        ),
         section(
             "Scikit-learn",
             "`islands.sklearn` needs the extra `sklearn`. "

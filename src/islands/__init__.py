@@ -14,17 +14,12 @@ from islands.distribution import read_version
 #: Public names by defining module. A module is imported on first use, because the compiler of the kernels
 #: takes half a second to import. `__init__.pyi` is generated from this table.
 _PUBLIC = {
-    "records.coupled": ("CoupledRecord",),
     "records.dataset": ("Dataset", "join"),
     "records.preprocessing": ("preprocess",),
-    "records.split": ("Split", "split"),
-    "diagnosis.planning.experiment_plan": ("ExperimentPlan",),
+    "records.split": ("split",),
     "effects.catalogue": ("EFFECTS",),
-    "effects.interface.context": ("Parameter",),
-    "effects.interface.effect": ("Effect", "Site"),
     "errors": ("ExtrapolationWarning", "IslandsError", "ModelError", "RecordError", "SettingsError"),
     "estimation.estimator_table": ("ESTIMATORS",),
-    "evolution.migration": ("TOPOLOGIES",),
     "evolution.presets": ("PRESETS",),
     "evolution.settings": ("Settings",),
     "expressions.parsing": ("parse",),
@@ -43,19 +38,13 @@ _PUBLIC = {
     "facade.results.model_analysis": ("linearise",),
     "facade.results.model_simulation": ("simulate",),
     "facade.results.identification": ("Result",),
-    "facade.results.reader": ("read_result",),
-    "facade.results.saved_simulation": ("SavedDiagnosis", "SavedSimulation"),
-    "report.documents.monitor_state": ("SavedMonitor", "read_monitor", "write_monitor"),
+    "report.documents.monitor_state": ("read_monitor", "write_monitor"),
     "records.reading.data_frames": ("as_record",),
     "persistence.models": ("read_model", "write_model"),
     "records.reading": ("read_record",),
     "records.writer": ("write_record",),
     "models.narx": ("Model", "make_model"),
-    "models.operating_point": ("static_characteristic",),
-    "models.sympy_expression": ("to_sympy",),
-    "simulation.input_response": ("step_response",),
     "simulators.interface": ("Simulator",),
-    "models.coupled_narx": ("CoupledModel",),
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names}
 

@@ -1,16 +1,11 @@
 # Made by islands._make_stub().
-from islands.diagnosis.planning.experiment_plan import ExperimentPlan as ExperimentPlan
 from islands.effects.catalogue import EFFECTS as EFFECTS
-from islands.effects.interface.context import Parameter as Parameter
-from islands.effects.interface.effect import Effect as Effect
-from islands.effects.interface.effect import Site as Site
 from islands.errors import ExtrapolationWarning as ExtrapolationWarning
 from islands.errors import IslandsError as IslandsError
 from islands.errors import ModelError as ModelError
 from islands.errors import RecordError as RecordError
 from islands.errors import SettingsError as SettingsError
 from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
-from islands.evolution.migration import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
 from islands.expressions.parsing import parse as parse
@@ -32,29 +27,19 @@ from islands.facade.results.fitted_model import FittedModel as FittedModel
 from islands.facade.results.identification import Result as Result
 from islands.facade.results.model_analysis import linearise as linearise
 from islands.facade.results.model_simulation import simulate as simulate
-from islands.facade.results.reader import read_result as read_result
-from islands.facade.results.saved_simulation import SavedDiagnosis as SavedDiagnosis
-from islands.facade.results.saved_simulation import SavedSimulation as SavedSimulation
-from islands.models.coupled_narx import CoupledModel as CoupledModel
 from islands.models.narx import Model as Model
 from islands.models.narx import make_model as make_model
-from islands.models.operating_point import static_characteristic as static_characteristic
-from islands.models.sympy_expression import to_sympy as to_sympy
 from islands.persistence.models import read_model as read_model
 from islands.persistence.models import write_model as write_model
-from islands.records.coupled import CoupledRecord as CoupledRecord
 from islands.records.dataset import Dataset as Dataset
 from islands.records.dataset import join as join
 from islands.records.preprocessing import preprocess as preprocess
 from islands.records.reading import read_record as read_record
 from islands.records.reading.data_frames import as_record as as_record
-from islands.records.split import Split as Split
 from islands.records.split import split as split
 from islands.records.writer import write_record as write_record
-from islands.report.documents.monitor_state import SavedMonitor as SavedMonitor
 from islands.report.documents.monitor_state import read_monitor as read_monitor
 from islands.report.documents.monitor_state import write_monitor as write_monitor
-from islands.simulation.input_response import step_response as step_response
 from islands.simulators.interface import Simulator as Simulator
 
 __version__: str

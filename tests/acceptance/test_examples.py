@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import islands
+import islands.effects
 from docs._scripts import tutorials
 
 EXAMPLES = tutorials.list_examples()
@@ -18,6 +19,7 @@ IDS = [path.stem for path in EXAMPLES]
 #: Public names of the packages that examples may import.
 PUBLIC = {
     "islands": set(islands.__all__),
+    "islands.effects": set(islands.effects.__all__),
     "islands_api": {"Client", "AsyncClient"},
 }
 

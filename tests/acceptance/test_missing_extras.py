@@ -20,6 +20,7 @@ from islands.cli.engines import start_engine
 from islands.errors import IslandsError
 from islands.evolution.engine import SerialEngine
 from islands.facade.engine_choice import open_engine
+from islands.models.sympy_expression import to_sympy
 from islands.simulators.fmu.fmi_description import import_fmpy
 from islands_api.web.auth import make_verifier
 from islands_service.settings import ServiceSettings
@@ -98,7 +99,7 @@ USES = {
     "sklearn": Use(
         "scikit-learn", "sklearn.base", lambda _: import_module("islands.sklearn"), ("islands.sklearn",)
     ),
-    "sympy": Use("sympy", "sympy", lambda _: islands.to_sympy(model())),
+    "sympy": Use("sympy", "sympy", lambda _: to_sympy(model())),
     "tdms": Use("npTDMS", "nptdms", read("a.tdms")),
     "telemetry": Use("opentelemetry-sdk", "opentelemetry", lambda _: Traces("http://127.0.0.1:1", "api")),
 }

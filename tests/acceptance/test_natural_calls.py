@@ -10,6 +10,8 @@ import pytest
 
 import islands
 from islands.errors import IslandsError
+from islands.models.sympy_expression import to_sympy
+from islands.simulation.input_response import step_response
 
 N = 200
 U = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, N // 5), 5)
@@ -90,9 +92,9 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "a Dataset is no model: give result.best.model, or the name of a simulation",
     ),
     "text-to-linearise": (lambda: islands.linearise("y(k-1)", [0.0]), "a str is no model: give result.best"),
-    "record-as-formula": (lambda: islands.to_sympy(RECORD), "a Dataset is no model"),
+    "record-as-formula": (lambda: to_sympy(RECORD), "a Dataset is no model"),
     "text-as-step-response": (
-        lambda: islands.step_response("y(k-1)", 0.0, 1.0),
+        lambda: step_response("y(k-1)", 0.0, 1.0),
         "a str is no model",
     ),
     "effects": (

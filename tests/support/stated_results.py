@@ -12,6 +12,7 @@ import numpy as np
 import islands
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.facade.results.notebook_html import render_sentences
+from islands.facade.results.saved_simulation import SavedDiagnosis
 from islands.records.dataset import Dataset
 from islands.report.documents.result_folder import result_document
 from islands.report.pages.identification import identification_report
@@ -119,7 +120,7 @@ def list_texts(name: str, result: AnyResult) -> Mapping[str, str]:
     with tempfile.TemporaryDirectory() as folder:
         result.save(folder, figures=())
         (Path(folder) / "summary.txt").unlink()
-        stored = islands.read_result(folder)
+        stored = islands.load(folder)
         read, notebook = str(stored), stored._repr_html_()
     if read != str(result):
         raise AssertionError(f"{name}: the folder states something else than the run")
@@ -133,7 +134,7 @@ def _list_texts_of_diagnosis(name: str, result: DiagnosisResult) -> Mapping[str,
     with tempfile.TemporaryDirectory() as folder:
         report = (result.save(folder, name) / "report.html").read_text()
         stored = islands.load(folder)
-    if not isinstance(stored, islands.SavedDiagnosis) or stored.summary != result.summary:
+    if not isinstance(stored, SavedDiagnosis) or stored.summary != result.summary:
         raise AssertionError(f"{name}: the folder states something else than the run")
     shown = unescape(re.sub("</?code>", "`", report))
     # The report has the equations as MathML.

@@ -73,10 +73,10 @@ def write_simulation(
         each has the shape of ``simulated``.
     """
     names = ["y"] if len(record.records) == 1 else record.output_names
-    columns: dict[str, NDArray[np.float64]] = {}
-    for end, values in zip(("sim", "low", "high"), (simulated, *(band or ())), strict=False):
-        outputs = values.reshape(record.samples, -1).T
-        columns |= {f"{name}_{end}": y for name, y in zip(names, outputs, strict=True)}
+    split = [values.reshape(record.samples, -1).T for values in (simulated, *(band or ()))]
+    columns = {f"{name}_sim": y for name, y in zip(names, split[0], strict=True)}
+    for name, *limits in zip(names, *split[1:], strict=True):
+        columns |= {f"{name}_{end}": limit for end, limit in zip(("low", "high"), limits, strict=False)}
     rows = zip(_round_times(record.records[0]), *(each.tolist() for each in columns.values()), strict=True)
     _write(path, ("time", *columns), rows)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import islands
+from islands.effects import Effect, Parameter, Site
 from islands.effects.interface.context import Signal, SimulationContext
 from support import own_primitive
 
@@ -16,19 +17,19 @@ def _multiply(y: Signal, values: Signal, context: SimulationContext) -> Signal:
     return y * (1.0 + values[0] * (temperature - temperature[0]))
 
 
-def _coefficient(_context: SimulationContext) -> tuple[islands.Parameter, ...]:
-    return (islands.Parameter("k", "1/K", 0.0, 0.001),)
+def _coefficient(_context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("k", "1/K", 0.0, 0.001),)
 
 
 def _start(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.005,),)
 
 
-THERMAL_GAIN = islands.Effect(
+THERMAL_GAIN = Effect(
     name="thermal-gain",
     summary="The sensitivity of the sensor changes with the temperature: y (1 + k (T - T(0)))",
     family="change",
-    site=islands.Site.OUTPUT,
+    site=Site.OUTPUT,
     parameters=_coefficient,
     starting_points=_start,
     form=_multiply,

@@ -7,6 +7,7 @@ import pytest
 
 import islands
 from islands.diagnosis.calibration.record_simulation import simulate_spec
+from islands.effects import Effect
 from islands.effects.catalogue import CATALOGUE
 from islands.effects.filters import low_pass
 from islands.effects.free_forms import FREE_FORMS
@@ -98,7 +99,7 @@ def assert_uneven_lag(found: islands.DiagnosisResult, name: str, falling: float,
 
 
 @pytest.mark.parametrize("form", FREE_FORMS, ids=lambda form: form.name)
-def test_free_form_vanishes_at_its_nominal_values(form: islands.Effect) -> None:
+def test_free_form_vanishes_at_its_nominal_values(form: Effect) -> None:
     assert CATALOGUE[form.name] is form
     context = SimulationContext(U, 0.01, {}, {}, 2.0, 2.0, "V", "V", 15.0)
     simulation = ExtendedSimulator(RecordedOutput("theirs", U), (form,), context)

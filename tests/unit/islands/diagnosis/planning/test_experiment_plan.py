@@ -9,6 +9,7 @@ import pytest
 import islands
 from islands.diagnosis.inference import noise_floor
 from islands.diagnosis.planning import decisive_experiment
+from islands.diagnosis.planning.experiment_plan import ExperimentPlan
 from islands.effects.catalogue import CATALOGUE
 from islands.errors import RecordError, SettingsError
 from islands.report.documents.diagnosis_json import as_json
@@ -31,7 +32,7 @@ def _short_optimisation() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def plan() -> islands.ExperimentPlan:
+def plan() -> ExperimentPlan:
     """Plan with an input that separates neither delay and lag nor shows a wrong gain."""
     return islands.plan_experiment(
         input_record(wave((0.25,))), amplifier(), noise_std=0.2, effects=EFFECTS, amplitude=2.0, rate=60.0
@@ -40,7 +41,7 @@ def plan() -> islands.ExperimentPlan:
 
 @pytest.mark.ci
 def test_the_decisive_experiment_is_for_inseparable_pairs(
-    plan: islands.ExperimentPlan,
+    plan: ExperimentPlan,
 ) -> None:
     assert plan.decisive is not None
     assert [pair.names for pair in plan.decisive.pairs] == [("delay", "sensor-lag")]
@@ -49,7 +50,7 @@ def test_the_decisive_experiment_is_for_inseparable_pairs(
     assert plan.record.y[100] == pytest.approx(2.0 * plan.record.u[100, 0])
 
 
-def test_the_document_and_the_text_have_the_same_answers(plan: islands.ExperimentPlan) -> None:
+def test_the_document_and_the_text_have_the_same_answers(plan: ExperimentPlan) -> None:
     document = plan_document(plan)
     assert as_json(document).startswith("{")
     causes = {each["name"]: each for each in document["causes"]}
@@ -74,7 +75,7 @@ def test_a_sufficient_input_needs_no_decisive_experiment() -> None:
     assert "this input is sufficient" in plan_text(found)
 
 
-def test_the_figure_has_a_row_and_a_column_for_each_cause(plan: islands.ExperimentPlan) -> None:
+def test_the_figure_has_a_row_and_a_column_for_each_cause(plan: ExperimentPlan) -> None:
     axes = draw_separability(plan.isolability, "a title").axes[0]
     rows, columns = axes.get_yticklabels(), axes.get_xticklabels()
     assert [text.get_text() for text in rows] == [text.get_text() for text in columns]

@@ -6,12 +6,13 @@ import shutil
 import pytest
 
 import islands
+from islands.facade.results.reader import read_result
 from support.searches import record
 
 
 @pytest.fixture(scope="module")
 def stored(folder):
-    return islands.read_result(folder)
+    return read_result(folder)
 
 
 def test_a_folder_gives_the_models_errors_and_settings_of_the_result(result, stored):
@@ -57,12 +58,12 @@ def test_damaged_results_are_named(folder, tmp_path, damage, message):
     damage(document)
     file.write_text(json.dumps(document))
     with pytest.raises(islands.ModelError, match=message):
-        islands.read_result(tmp_path / "copy")
+        read_result(tmp_path / "copy")
 
 
 def test_a_folder_without_a_result_is_named(tmp_path):
     with pytest.raises(islands.ModelError, match=r"has no result\.json"):
-        islands.read_result(tmp_path)
+        read_result(tmp_path)
     (tmp_path / "result.json").write_text("{")
     with pytest.raises(islands.ModelError, match="cannot be read"):
-        islands.read_result(tmp_path)
+        read_result(tmp_path)
