@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag
 
 from islands_api.schemas import DATASET_ID, Envelope, ResponseModel
-from islands_service.domain.job_spec import Name, SimulatedRecord
+from islands_service.domain.job_spec import Name, Part, SimulatedRecord
 
 #: Largest numbers of characters of a text with equations and of a line: the parser of TOML takes time
 #: proportional to the square of the parts of a dotted key, which is in one line.
@@ -238,3 +238,48 @@ class SimulatedOutput(ResponseModel):
         description="Least and largest value of every input in the estimation data, if the result has them."
     )
     units: dict[str, str] = Field(description="Units of the inputs and of the output, by column.")
+
+
+class ScenarioRequest(BaseModel):
+    """Data sets that a model simulates, one after the other, and their common start."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        json_schema_extra={
+            "examples": [{"datasets": [{"dataset": DATASET_ID}], "start": {"y_um": 0.0}}],
+        },
+    )
+
+    datasets: Annotated[tuple[Part, ...], Field(min_length=1, max_length=16)] = Field(
+        description="Records of the inputs alone, or with the outputs, which have their names in the model."
+    )
+    start: Annotated[dict[Name, FiniteFloat], Field(max_length=64)] = Field(
+        default={},
+        description="Outputs before the first sample, or the states `x1`, `x2`, ... of a latent model at it. "
+        "By default the measured outputs, and without any the rest at the first inputs.",
+    )
+    dt: Annotated[FiniteFloat, Field(gt=0.0)] | None = Field(
+        default=None, description="Sampling time in seconds of data sets that do not state it."
+    )
+
+
+class Scenario(ResponseModel):
+    """Free run of a model on a data set."""
+
+    dataset: str
+    dt: float = Field(description="Sampling time of the model in seconds.")
+    time_s: tuple[float, ...]
+    outputs: dict[str, tuple[float | None, ...]] = Field(
+        description="By column. Null before the first prediction, and from a divergence on."
+    )
+    units: dict[str, str] = Field(description="Units of the outputs, by column.")
+    start: str = Field(description="Where the simulation starts, in words.")
+    outcome: str = Field(description="`ok`, or where the output diverged.")
+    warnings: tuple[str, ...] = Field(description="Inputs that leave the range of the estimation data.")
+
+
+class ScenarioPage(ResponseModel):
+    """Free runs in the order of the data sets."""
+
+    items: tuple[Scenario, ...]

@@ -109,6 +109,7 @@ class BaseClient(Generic[H]):
     export_linear_system = Endpoint(calls.export_linear_system)
     linear_figure = Endpoint(calls.linear_figure)
     simulate = Endpoint(calls.simulate)
+    simulate_datasets = Endpoint(calls.simulate_datasets)
     free_run = Endpoint(calls.free_run)
     fmu = Endpoint(calls.fmu)
     create_monitor = Endpoint(monitor_calls.create_monitor)

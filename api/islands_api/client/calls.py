@@ -31,7 +31,7 @@ from islands_api.schemas import (
     OwnedJobView,
     PresetPage,
 )
-from islands_api.simulation_schemas import SimulatedOutput
+from islands_api.simulation_schemas import Scenario, ScenarioPage, SimulatedOutput
 from islands_api.webhook_schemas import (
     CreatedWebhook,
     DeliveryPage,
@@ -474,6 +474,38 @@ def simulate(
     body = {name: value for name, value in given.items() if value is not None}
     path = f"/v1/jobs/{quote_id(which)}/models/{rank}/simulate"
     return RequestSpec("POST", path, read_as(SimulatedOutput), json=body)
+
+
+def simulate_datasets(
+    which: JobRef,
+    datasets: DatasetRef | Mapping[str, Any] | Sequence[DatasetRef | Mapping[str, Any]],
+    rank: int = 1,
+    *,
+    start: Mapping[str, float] | None = None,
+    dt: float | None = None,
+) -> RequestSpec[tuple[Scenario, ...]]:
+    """Simulate a model of a job on data sets, of inputs alone or with measured outputs.
+
+    Parameters
+    ----------
+    which : str or JobView
+    datasets : data set, mapping, or sequence of them
+        Data sets, or ``{"dataset": ID, "rows": "START:STOP"}``.
+    rank : int
+        Rank of the model.
+    start : mapping, optional
+        Outputs before the first sample, or the states ``x1``, ``x2``, ... of a latent model at it; by default
+        the measured outputs, and without any the rest at the first inputs.
+    dt : float, optional
+        Sampling time in seconds of data sets that do not state it.
+    """
+    listed = (
+        [datasets] if isinstance(datasets, str | Mapping) or not isinstance(datasets, Sequence) else datasets
+    )
+    given = {"datasets": [make_part(each) for each in listed], "start": dict(start or {}), "dt": dt}
+    body = {name: value for name, value in given.items() if value is not None}
+    path, page = f"/v1/jobs/{quote_id(which)}/models/{rank}/scenarios", read_as(ScenarioPage)
+    return RequestSpec("POST", path, lambda response: page(response).items, json=body)
 
 
 def free_run(which: JobRef) -> RequestSpec[SearchFreeRunView]:

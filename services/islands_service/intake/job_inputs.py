@@ -1,8 +1,9 @@
 """Inputs of jobs: the records of uploaded data sets, and the FMU, which the service may refuse to run."""
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 from islands.distribution import describe_missing_extra
 from islands.errors import SettingsError
 from islands.records.channel_names import parse_channel_name
-from islands.records.coupled import AnyRecord, couple
+from islands.records.coupled import AnyRecord, couple, unite
 from islands.records.dataset import Dataset, join
+from islands.records.reading.column_names import find_column
 from islands.records.reading.row_range import parse_rows
 from islands.records.split import hold_out
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
@@ -93,10 +95,54 @@ def _read_part(
     is_diagnosis = isinstance(spec, Discrepancy)
     signals = spec.recorded_columns if isinstance(spec, Discrepancy) else ()
     request = RecordRequest(*spec.columns, spec.dt, part.rows, reading, is_diagnosis, signals)
+    return _read_stored(stored, request, blobs)
+
+
+def _read_stored(stored: StoredDataset, request: RecordRequest, blobs: Blobs) -> Dataset:
     settings = service_settings()
     memory, seconds = settings.inspection_memory, settings.inspection_seconds
     with blobs.hold(stored.blob) as held, link_blob(held, stored.name) as path:
         return read_confined(path, request, memory, seconds)
+
+
+def read_scenario(
+    stored: StoredDataset,
+    columns: tuple[Sequence[str], Sequence[str]],
+    rows: str | None,
+    dt: float | None,
+    blobs: Blobs,
+) -> AnyRecord:
+    """Read a data set that a model simulates, which may lack the outputs.
+
+    Parameters
+    ----------
+    stored : StoredDataset
+    columns : pair of sequence of str
+        Inputs and outputs of the model.
+    rows : str or None
+        ``START:STOP``, the rows that are read.
+    dt : float or None
+        Sampling time in seconds, if the data set does not state it.
+    blobs : Blobs
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as specified.
+    BlobNotFoundError
+        The data folder has lost a file.
+    """
+    inputs, outputs = columns
+    known = [str(each["name"]) for each in stored.preview.get("columns", ())]
+    reading = stored.preview.get("reading", {})
+
+    def read_output(name: str) -> Dataset:
+        is_known = find_column(name, known) in known
+        request = RecordRequest(inputs, name if is_known else None, dt, rows, reading, missing_output=True)
+        found = _read_stored(stored, request, blobs)
+        return found if is_known else replace(found, output_name=name)
+
+    return unite([read_output(name) for name in outputs])
 
 
 def read_record_and_columns(

@@ -36,12 +36,13 @@ class RecordRequest:
     """Columns, rows and options of reading, as in `islands.records.reading.reader.read_dataset`."""
 
     inputs: Sequence[str]
-    output: str
+    output: str | None
     dt: float | None
     rows: str | None
     reading: dict[str, object]
     resting_inputs: bool = False
     signals: Sequence[str] = ()
+    missing_output: bool = False
 
 
 def read_confined(path: Path, request: RecordRequest, memory: int, seconds: float) -> Dataset:
@@ -111,6 +112,7 @@ def write_record() -> None:
             request.output,
             request.dt,
             rows,
+            missing_output=request.missing_output,
             options=options,
             resting_inputs=request.resting_inputs,
             signals=request.signals,

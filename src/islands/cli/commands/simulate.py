@@ -20,7 +20,12 @@ from islands.errors import ExtrapolationWarning, ModelError, SettingsError
 from islands.facade.load import Loaded, load
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
-from islands.facade.results.model_simulation import SHOOTING, match_columns
+from islands.facade.results.model_simulation import (
+    SHOOTING,
+    list_extrapolations,
+    match_columns,
+    split_start,
+)
 from islands.facade.results.saved_simulation import SavedDiagnosis, SavedSimulation
 from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals
 from islands.models.equations import named_signals
@@ -36,12 +41,10 @@ from islands.records.reading.open_table import read_table
 from islands.records.reading.options import ReadingOptions
 from islands.records.reading.reader import open_record
 from islands.records.reading.row_range import parse_rows
-from islands.records.split import compare_input_ranges, measure_input_ranges
 from islands.records.writer import write_simulation
 from islands.settings_schema import Integer, setting, settings_class
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.simulation.initial_states import find_first_states
-from islands.simulation.predictors import map_model_signals
 from islands.validation.metrics import metrics
 from islands.validation.prediction_bands import PredictionBand
 
@@ -82,20 +85,6 @@ class _Request:
     settings: SimulationSettings
     bands: float | None
     start: Mapping[str, float]
-
-    def split_start(self, model: AnyModel) -> tuple[list[float] | None, list[float] | None]:
-        """Return the outputs and the states of ``--start``; None for those that are not given."""
-        block = model.block()
-        outputs = block.columns[: block.outputs]
-        parts = [
-            [self.start[name] for name in names if name in self.start]
-            for names in (outputs, block.columns[block.outputs : block.computed])
-        ]
-        if len(self.start) != sum(map(len, parts)):
-            known = ", ".join(block.columns[: block.computed])
-            raise SettingsError(f"--start {', '.join(self.start)}: the model has {known}")
-        y, states = (part or None for part in parts)
-        return y, states
 
     def read(self, inputs: Sequence[str], names: Sequence[str]) -> AnyRecord:
         """Read a record of the outputs of a model, which may be missing; given columns replace them.
@@ -245,9 +234,10 @@ def _simulate_model(
         is_prepared = data.samples == prepared.samples
         output.print(_describe_preparation(model, data, is_prepared, statement), markup=False)
     if "estimation" in ranges:
-        _print_extrapolation(model, data, ranges["estimation"])
+        for statement in list_extrapolations(model, data, ranges["estimation"]):
+            output.print(f"extrapolation: {statement}", markup=False)
     compile_kernels()
-    y, states = request.split_start(model)
+    y, states = split_start(model, request.start)
     if y or states or not np.isfinite(data.y).any():
         if request.bands is not None:
             raise SettingsError("--bands need the measured output of the first samples: add it to the record")
@@ -285,16 +275,6 @@ def _describe_preparation(model: AnyModel, data: AnyRecord, is_prepared: bool, s
             f"they are; in the data of the model, {values}"
         )
     return f"as in the model, {statement}"
-
-
-def _print_extrapolation(model: AnyModel, data: AnyRecord, estimated: Sequence[Sequence[float]]) -> None:
-    """State the inputs that leave the range of the estimation data."""
-    (signals, *_) = map_model_signals(model, data)[0].records
-    found = measure_input_ranges(signals)
-    for statement in compare_input_ranges(
-        *(signals.input_names, signals.input_units, estimated, found), title="the record"
-    ):
-        output.print(f"extrapolation: {statement}", markup=False)
 
 
 def _print_first_states(model: AnyModel, data: AnyRecord, warm_up: int) -> None:

@@ -18,10 +18,11 @@ from islands.records.dataset import Dataset, join
 from islands.records.reading.column_names import find_column, take_outputs
 from islands.records.reading.data_frames import as_dataset, as_record, column_names, states_time
 from islands.records.signal_map import match_rate
+from islands.records.split import compare_input_ranges, measure_input_ranges
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.input_response import simulate_inputs
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import Simulation, multiple_shooting
+from islands.simulation.predictors import Simulation, map_model_signals, multiple_shooting
 
 if TYPE_CHECKING:
     from narwhals.typing import IntoSeries
@@ -163,6 +164,44 @@ def match_columns(model: AnyModel, record: AnyRecord) -> AnyRecord:
             "a record of all of them, as by as_record(frame, inputs=[...], output=[...])"
         )
     return match_coupled(model, data)
+
+
+def split_start(model: AnyModel, start: Mapping[str, float]) -> tuple[list[float] | None, list[float] | None]:
+    """Return the outputs and the states of a start by name; None for those that are not given.
+
+    Raises
+    ------
+    SettingsError
+        A name is neither an output nor a state of the model.
+    """
+    block = model.block()
+    computed = block.columns[: block.computed]
+    if unknown := start.keys() - set(computed):
+        raise SettingsError(f"the start of {', '.join(sorted(unknown))}: the model has {', '.join(computed)}")
+    y, states = (
+        [start[name] for name in names if name in start] or None
+        for names in (computed[: block.outputs], computed[block.outputs :])
+    )
+    return y, states
+
+
+def list_extrapolations(
+    model: AnyModel, record: AnyRecord, estimated: Sequence[Sequence[float]]
+) -> list[str]:
+    """State the inputs of a record that leave the range of the estimation data of a model.
+
+    Parameters
+    ----------
+    model : DynamicModel or CoupledModel
+    record : record
+        At the rate of the model.
+    estimated : sequence of (float, float)
+        Range of every input of the model in its estimation data.
+    """
+    (signals, *_) = map_model_signals(model, record)[0].records
+    found = measure_input_ranges(signals)
+    names, units = signals.input_names, signals.input_units
+    return compare_input_ranges(names, units, estimated, found, title="the record")
 
 
 def _read_output(
