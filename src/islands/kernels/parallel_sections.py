@@ -215,7 +215,7 @@ def _run_freely(
 
 @kernel
 def _whiten(x, noise, start, derived, columns, stride, origin, rows, begins, whitened):
-    """Filter a block by the inverse of the noise; a pulse, residual and error by that of the moving average."""
+    """Filter a block by the inverse of the noise; a pulse, residual and error by the moving average."""
     history = noise.shape[1]
     target, pulse = (columns - 1) * stride + origin, columns * stride + origin
     for row in range(history, columns):
