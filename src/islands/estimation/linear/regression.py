@@ -368,11 +368,15 @@ def is_invertible(noise: Signal, samples: int) -> bool:
     return bool(np.abs(np.roots([1.0, *noise[1]])).max(initial=0.0) <= limit_zeros(samples))
 
 
-def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3) -> Fit:
-    """Return the fit after steps that each reduce the deviance by at least a given amount."""
+def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: float = float("inf")) -> Fit:
+    """Return the fit after steps that each reduce the deviance by at least a given amount.
+
+    They end where a deviance is out of reach, for which a step would need twice its expected reduction.
+    """
     for _ in range(steps):
         step = _find_step(signals, fit)
-        if fit.deviance - step.deviance < min(least, _NEGLIGIBLE):
+        expected = fit.deviance - step.deviance
+        if expected < min(least, _NEGLIGIBLE) or fit.deviance - 2.0 * expected > goal:
             break
         found = _take_step(signals, fit, step)
         if found is None:
