@@ -6,6 +6,8 @@ derivatives are computed for a block of samples, filtered by the inverse of the 
 Householder reflections to a triangle, so that a record of any length needs the memory of a block.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from islands.kernels.jit_cache import kernel
@@ -26,6 +28,23 @@ BLOCK = 256
 
 #: States that are less are zero. Arithmetic on subnormal numbers takes a hundred times as long.
 _LEAST = 1e-150
+
+
+class Rows(NamedTuple):
+    """Rows of samples of a block, each after the last samples of the block before.
+
+    Attributes
+    ----------
+    values : ndarray, float64
+    stride : int
+        Values from the first one of a row to that of the next row.
+    origin : int
+        Samples of the block before.
+    """
+
+    values: Any
+    stride: Any
+    origin: Any
 
 
 @kernel
@@ -49,68 +68,63 @@ def factor_sections(
     factor,  # out, float64 [column, column] or empty: columns of the coefficients and so on; the residual
     own,  # out, float64 [recording, state, state + column]: the rows of the initial states
 ):
-    """Compute the factor of all recordings, and the rows of the initial states of each one."""
-    inputs, number, history, order = u.shape[0], sections.shape[0], noise.shape[1], starts.shape[1]
+    """Compute the factor of all recordings, and the rows of the initial states of each one.
+
+    Derivatives are those of the free run and of the noise. The coordinates of a section of second order are
+    ``a1 + a2`` and ``-a2``.
+    """
+    inputs, number, order = u.shape[0], sections.shape[0], starts.shape[1]
     free, after = number - integrators, order + coefficients.size
     columns = after + (noise.size + sizes[:free].sum() if derivatives else 0) + 1
-    places, quotients = _place_filters(
-        sections, sizes, integrators, leads, history, after, derivatives, noise.size
-    )
+    derived = after if derivatives else columns
+    places, quotients = _place_filters(sections, sizes, integrators, leads, noise, derived, columns)
     last = places.shape[0] - (free if derivatives else 0)
     states = np.empty((places.shape[0], 2))
-    # Rows of samples begin with those of the block before that the noise reads.
-    origin = -(-history // VECTOR) * VECTOR
-    stride = origin + BLOCK
     # The second response of a first-order section is in a row that nothing reads.
-    x = padded_size((columns + 1) * stride)
+    x = _allocate(columns + 1, noise.shape[1])
     # The inputs, a zero, a one, and the parts of the sections.
-    sources = padded_size((inputs + 2 + number) * BLOCK)
-    sources[:] = 0.0
-    sources[(inputs + 1) * BLOCK : (inputs + 2) * BLOCK] = 1.0
+    sources = _allocate(inputs + 2 + number, 0)
+    sources.values[(inputs + 1) * BLOCK : (inputs + 2) * BLOCK] = 1.0
     # After the columns: the responses of the noise to a pulse, to the residual and to the error.
-    whitened = padded_size((columns + 3) * stride) if history else x
-    w = padded_size((columns + 2) * BLOCK)
-    w[columns * BLOCK :] = 0.0
+    whitened = _allocate(columns + 3, noise.shape[1]) if noise.size else x
+    # Reflections change two columns at a time.
+    w = _allocate(columns + 2, 0).values
     triangle = np.zeros((columns, columns + 2))
-    target, begin = (columns - 1) * stride + origin, 0
+    target, begin = (columns - 1) * x.stride + x.origin, 0
     for recording in range(ends.size):
         end, counted = ends[recording], min(begin + skipped, ends[recording])
         states[:] = 0.0
         triangle[:order] = 0.0
-        triangle[:history, :history] = prior
+        triangle[: noise.shape[1], : noise.shape[1]] = prior
         at = begin
         while at < end:
             if at == counted:
                 states[inputs * number : (inputs + 1) * number, 0] = 1.0
-                x[:] = 0.0
-                whitened[:] = 0.0
+                x.values[:] = 0.0
+                whitened.values[:] = 0.0
             rows = min(BLOCK, (counted if at < counted else end) - at)
             for place in range(inputs):
                 for k in range(rows):
                     late = at + k - delays[place]
-                    sources[place * BLOCK + k] = u[place, late] if late >= begin else before[recording, place]
-            _divide(places, quotients, states, sources, x, stride, origin, rows, 0, last)
-            for k in range(rows):
-                x[target + k] = y[at + k]
+                    value = u[place, late] if late >= begin else before[recording, place]
+                    sources.values[place * BLOCK + k] = value
+            x.values[target : target + rows] = y[at : at + rows]
+            _divide(places, quotients, states, sources, x, rows, 0, last)
+            constant = 1.0 / y.size if integrators else 0.0
             _run_freely(
-                sources, x, stride, origin, rows, history, sizes, integrators, leads, coefficients,
-                starts[recording], target, y.size,
-            )  # fmt: skip
-            _divide(places, quotients, states, sources, x, stride, origin, rows, last, places.shape[0])
+                sources, x, rows, noise, sizes, constant, leads, coefficients, starts[recording], target
+            )
+            _divide(places, quotients, states, sources, x, rows, last, places.shape[0])
             if at >= counted:
                 if residual.size:
-                    residual[at : at + rows] = x[target : target + rows]
+                    residual[at : at + rows] = x.values[target : target + rows]
                 if factor.size:
-                    derived = after if derivatives else columns
-                    if history:
-                        _whiten(x, noise, starts[recording], derived, columns, stride, origin, rows,
-                                at == counted, whitened)  # fmt: skip
-                    noises = noise.size if derivatives else 0
-                    _fill(whitened, history, derived, noises, columns, stride, origin, rows, w)
+                    if noise.size:
+                        _whiten(x, noise, starts[recording], derived, columns, rows, at == counted, whitened)
+                    _fill(whitened, noise, derived, columns, rows, w)
                     _reflect(w, -(-rows // VECTOR) * VECTOR, columns, triangle)
-                if history:
-                    _keep_last(x, columns, stride, origin, history, rows)
-                    _keep_last(whitened, columns + 3, stride, origin, history, rows)
+                _keep_last(x, columns, noise.shape[1], rows)
+                _keep_last(whitened, columns + 3 if noise.size else 0, noise.shape[1], rows)
             at += rows
         if factor.size:
             own[recording] = triangle[:order, :columns]
@@ -120,60 +134,66 @@ def factor_sections(
 
 
 @kernel
-def _place_filters(sections, sizes, integrators, leads, history, after, derivatives, noises):
+def _allocate(rows, history):
+    origin = -(-history // VECTOR) * VECTOR
+    values = padded_size(rows * (origin + BLOCK))
+    values[:] = 0.0
+    return Rows(values, origin + BLOCK, origin)
+
+
+@kernel
+def _place_filters(sections, sizes, integrators, leads, noise, derived, columns):
     """Return the source and the two rows of every filter, and its coefficients."""
     inputs, number, free = leads.size, sections.shape[0], sections.shape[0] - integrators
-    filters = number * (inputs + 1) + integrators + (free if derivatives else 0)
+    derivatives = free if derived < columns else 0
+    filters = number * (inputs + 1) + integrators + derivatives
     places, quotients = np.zeros((filters, 3), np.int64), np.empty((filters, 2))
-    row, f, unread = history + sizes.sum(), 0, after + 1
-    if derivatives:
-        unread += noises + sizes[:free].sum()
+    row, f = noise.shape[1] + sizes.sum(), 0
     for place in range(inputs + 2):  # the inputs, the initial states, and the derivatives
         at = row
         if place == inputs:
-            at = history
-            constant = row
+            at = noise.shape[1]
         elif place == inputs + 1:
-            at = after + noises
-        for section in range(number if place <= inputs else free if derivatives else 0):
+            at = derived + noise.size
+        for section in range(number if place <= inputs else derivatives):
             places[f, 0] = place if place <= inputs else inputs + 2 + section
             places[f, 1] = at
-            places[f, 2] = at + 1 if sizes[section] == 2 else unread
+            places[f, 2] = at + 1 if sizes[section] == 2 else columns
             quotients[f] = sections[section]
             at += sizes[section]
             f += 1
         if place < inputs:
             row = at + leads[place]
-        if place == inputs and integrators:
-            places[f, 0], places[f, 1], places[f, 2] = inputs + 1, constant, unread
+        if place == inputs and integrators:  # the constant
+            places[f, 0], places[f, 1], places[f, 2] = inputs + 1, row, columns
             quotients[f] = sections[number - 1]
             f += 1
     return places, quotients
 
 
 @kernel
-def _divide(places, quotients, states, sources, x, stride, origin, rows, first, last):
+def _divide(places, quotients, states, sources, x, rows, first, last):
     """Compute a block of the responses of some filters."""
+    source, values = sources.values, x.values
     # A recursion waits for its last value. Four at a time take a third of the time of one after another.
     for f in range(first, last, 4):
         f1, f2, f3 = min(f + 1, last - 1), min(f + 2, last - 1), min(f + 3, last - 1)
-        s0, s1 = np.uint64(places[f, 0] * BLOCK), np.uint64(places[f1, 0] * BLOCK)
-        s2, s3 = np.uint64(places[f2, 0] * BLOCK), np.uint64(places[f3, 0] * BLOCK)
-        i0, i1 = np.uint64(places[f, 1] * stride + origin), np.uint64(places[f1, 1] * stride + origin)
-        i2, i3 = np.uint64(places[f2, 1] * stride + origin), np.uint64(places[f3, 1] * stride + origin)
-        j0, j1 = np.uint64(places[f, 2] * stride + origin), np.uint64(places[f1, 2] * stride + origin)
-        j2, j3 = np.uint64(places[f2, 2] * stride + origin), np.uint64(places[f3, 2] * stride + origin)
+        s0, i0, j0 = _find_rows(places, f, x)
+        s1, i1, j1 = _find_rows(places, f1, x)
+        s2, i2, j2 = _find_rows(places, f2, x)
+        s3, i3, j3 = _find_rows(places, f3, x)
         a0, a1, a2, a3 = quotients[f, 0], quotients[f1, 0], quotients[f2, 0], quotients[f3, 0]
         b0, b1, b2, b3 = quotients[f, 1], quotients[f1, 1], quotients[f2, 1], quotients[f3, 1]
         v0, v1, v2, v3 = states[f, 0], states[f1, 0], states[f2, 0], states[f3, 0]
         z0, z1, z2, z3 = states[f, 1], states[f1, 1], states[f2, 1], states[f3, 1]
         for k in range(np.uint64(rows)):
-            x[i0 + k], x[i1 + k], x[i2 + k], x[i3 + k] = v0, v1, v2, v3
-            x[j0 + k], x[j1 + k], x[j2 + k], x[j3 + k] = v0 - z0, v1 - z1, v2 - z2, v3 - z3
-            v0, z0 = sources[s0 + k] - b0 * z0 - a0 * v0, v0
-            v1, z1 = sources[s1 + k] - b1 * z1 - a1 * v1, v1
-            v2, z2 = sources[s2 + k] - b2 * z2 - a2 * v2, v2
-            v3, z3 = sources[s3 + k] - b3 * z3 - a3 * v3, v3
+            values[i0 + k], values[i1 + k], values[i2 + k], values[i3 + k] = v0, v1, v2, v3
+            values[j0 + k], values[j1 + k] = v0 - z0, v1 - z1
+            values[j2 + k], values[j3 + k] = v2 - z2, v3 - z3
+            v0, z0 = source[s0 + k] - b0 * z0 - a0 * v0, v0
+            v1, z1 = source[s1 + k] - b1 * z1 - a1 * v1, v1
+            v2, z2 = source[s2 + k] - b2 * z2 - a2 * v2, v2
+            v3, z3 = source[s3 + k] - b3 * z3 - a3 * v3, v3
         states[f, 0], states[f, 1] = v0, z0
         states[f1, 0], states[f1, 1] = v1, z1
         states[f2, 0], states[f2, 1] = v2, z2
@@ -184,112 +204,127 @@ def _divide(places, quotients, states, sources, x, stride, origin, rows, first, 
 
 
 @kernel
-def _run_freely(
-    sources, x, stride, origin, rows, history, sizes, integrators, leads, coefficients, start, target, samples
-):
+def _find_rows(places, f, x):
+    """Return where the source and the rows of a filter begin; a number without a sign needs no check."""
+    one, other = places[f, 1] * x.stride + x.origin, places[f, 2] * x.stride + x.origin
+    return np.uint64(places[f, 0] * BLOCK), np.uint64(one), np.uint64(other)
+
+
+@kernel
+def _run_freely(sources, x, rows, noise, sizes, constant, leads, coefficients, start, target):
     """Subtract the free run from a block of the output; write minus the part of every section."""
-    inputs, order = leads.size, start.size
+    values, inputs, order = x.values, leads.size, start.size
     first = (inputs + 2) * BLOCK
-    sources[first:] = 0.0
+    sources.values[first:] = 0.0
     row = order
     for place in range(inputs + 1):  # the inputs, and the initial states
-        source = row if place < inputs else history
+        source = row if place < inputs else noise.shape[1]
         for section in range(sizes.size):
             for _ in range(sizes[section]):
                 weight = coefficients[source - order] if place < inputs else start[source]
-                _subtract(sources, first + section * BLOCK, weight, x, source * stride + origin, rows)
+                part = first + section * BLOCK
+                _subtract(sources.values, part, weight, values, source * x.stride + x.origin, rows)
                 source += 1
         if place < inputs:
             row = source
             if leads[place]:
-                _copy(x, row * stride + origin, sources, place * BLOCK, rows)
-                _subtract(x, target, coefficients[row - order], sources, place * BLOCK, rows)
+                _copy(values, row * x.stride + x.origin, sources.values, place * BLOCK, rows)
+                _subtract(values, target, coefficients[row - order], sources.values, place * BLOCK, rows)
                 row += 1
     for section in range(sizes.size):
-        _subtract(x, target, -1.0, sources, first + section * BLOCK, rows)
-    at = row * stride + origin
+        _subtract(values, target, -1.0, sources.values, first + section * BLOCK, rows)
+    at = row * x.stride + x.origin
     for k in range(at, at + rows):
-        x[k] = x[k] / samples if integrators else 1.0
-    _subtract(x, target, coefficients[row - order], x, at, rows)
+        values[k] = values[k] * constant if constant else 1.0
+    _subtract(values, target, coefficients[row - order], values, at, rows)
 
 
 @kernel
-def _whiten(x, noise, start, derived, columns, stride, origin, rows, begins, whitened):
-    """Filter a block by the inverse of the noise; a pulse, residual and error by that of the moving average."""
-    history = noise.shape[1]
-    target, pulse = (columns - 1) * stride + origin, columns * stride + origin
+def _whiten(x, noise, start, derived, columns, rows, begins, whitened):
+    """Filter a block by the inverse of the noise; a pulse, residual and error by the moving average."""
+    history, values = noise.shape[1], whitened.values
+    target, pulse = (columns - 1) * x.stride + x.origin, columns * x.stride + x.origin
     for row in range(history, columns):
         if not derived <= row < derived + noise.size:
-            at = row * stride + origin
-            _copy(whitened, at, x, at, rows)
+            at = row * x.stride + x.origin
+            _copy(values, at, x.values, at, rows)
             for lag in range(1, history + 1):
-                _subtract(whitened, at, noise[0, lag - 1], x, at - lag, rows)
-    whitened[pulse : pulse + rows] = 0.0
+                _subtract(values, at, noise[0, lag - 1], x.values, at - lag, rows)
+    values[pulse : pulse + rows] = 0.0
     if begins:
-        whitened[pulse] = 1.0
-    _copy(whitened, pulse + stride, x, target, rows)
+        values[pulse] = 1.0
+    residual, error = pulse + x.stride, pulse + 2 * x.stride
+    _copy(values, residual, x.values, target, rows)
     if noise.shape[0] == 2:
-        _divide_by_average(noise[1], whitened, stride, origin, rows, history, columns + 2)
-    _copy(whitened, pulse + 2 * stride, whitened, target, rows)
+        _divide_by_average(noise[1], whitened, rows, history, columns + 2)
+    _copy(values, error, values, target, rows)
     for lag in range(history):
-        _subtract(whitened, pulse + 2 * stride, start[lag], whitened, pulse - lag, rows)
+        _subtract(values, error, start[lag], values, pulse - lag, rows)
     if noise.shape[0] == 2:
-        _divide_by_average(noise[1], whitened, stride, origin, rows, columns + 2, columns + 3)
+        _divide_by_average(noise[1], whitened, rows, columns + 2, columns + 3)
 
 
 @kernel
-def _divide_by_average(average, whitened, stride, origin, rows, first, last):
+def _divide_by_average(average, whitened, rows, first, last):
     """Divide rows by ``1 + c1 q^-1 + c2 q^-2 + ...`` in place."""
-    count = np.uint64(average.size)
+    values, count = whitened.values, np.uint64(average.size)
     for row in range(first, last, 4):
         # A row that is divided twice at the same time has the same values.
-        r0, r1 = np.uint64(row * stride + origin), np.uint64(min(row + 1, last - 1) * stride + origin)
-        r2 = np.uint64(min(row + 2, last - 1) * stride + origin)
-        r3 = np.uint64(min(row + 3, last - 1) * stride + origin)
+        r0, r1 = np.uint64(row), np.uint64(min(row + 1, last - 1))
+        r2, r3 = np.uint64(min(row + 2, last - 1)), np.uint64(min(row + 3, last - 1))
+        stride, origin = np.uint64(whitened.stride), np.uint64(whitened.origin)
+        r0, r1, r2, r3 = (
+            r0 * stride + origin,
+            r1 * stride + origin,
+            r2 * stride + origin,
+            r3 * stride + origin,
+        )
         for k in range(np.uint64(rows)):
-            y0, y1, y2, y3 = whitened[r0 + k], whitened[r1 + k], whitened[r2 + k], whitened[r3 + k]
+            y0, y1, y2, y3 = values[r0 + k], values[r1 + k], values[r2 + k], values[r3 + k]
             for index in range(count):
                 lag = count - index
                 c, before = average[lag - np.uint64(1)], k - lag
-                y0 -= c * whitened[r0 + before]
-                y1 -= c * whitened[r1 + before]
-                y2 -= c * whitened[r2 + before]
-                y3 -= c * whitened[r3 + before]
-            whitened[r0 + k], whitened[r1 + k], whitened[r2 + k], whitened[r3 + k] = y0, y1, y2, y3
+                y0 -= c * values[r0 + before]
+                y1 -= c * values[r1 + before]
+                y2 -= c * values[r2 + before]
+                y3 -= c * values[r3 + before]
+            values[r0 + k], values[r1 + k], values[r2 + k], values[r3 + k] = y0, y1, y2, y3
 
 
 @kernel
-def _fill(whitened, history, derived, noises, columns, stride, origin, rows, w):
+def _fill(whitened, noise, derived, columns, rows, w):
     """Copy a block of all columns, those of the noise from the lags of three rows."""
+    history = noise.shape[1]
     for column in range(columns):
         row, lag = column, 0
         if column < history:
             row, lag = columns, column
-        elif derived <= column < derived + noises:
+        elif derived <= column < derived + noise.size:
             row, lag = columns + 1 + (column - derived) // history, (column - derived) % history + 1
-        _copy(w, column * BLOCK, whitened, row * stride + origin - lag, rows)
+        _copy(w, column * BLOCK, whitened.values, row * whitened.stride + whitened.origin - lag, rows)
         for k in range(rows, -(-rows // VECTOR) * VECTOR):
             w[column * BLOCK + k] = 0.0
 
 
 @kernel
-def _keep_last(x, count, stride, origin, history, rows):
+def _keep_last(x, count, history, rows):
     """Move the last samples of a block before the next one; those that are not normal numbers are zero."""
     for row in range(count):
-        at = row * stride + origin
+        at = row * x.stride + x.origin
         for k in range(at - history, at):
-            x[k] = x[k + rows] if abs(x[k + rows]) > _LEAST else 0.0
+            x.values[k] = x.values[k + rows] if abs(x.values[k + rows]) > _LEAST else 0.0
 
 
 @kernel(_nrt=False)
 def _copy(x, x_at, y, y_at, rows):
+    """Copy up to the end of the last vector."""
     for i in range(0, rows, VECTOR):
         store(x, x_at + i, load(y, y_at + i, 1))
 
 
 @kernel(_nrt=False)
 def _subtract(x, x_at, weight, y, y_at, rows):
-    """Subtract in place: ``x -= weight * y``."""
+    """Subtract in place: ``x -= weight * y``, up to the end of the last vector."""
     if weight != 0.0:
         lanes = broadcast(weight, 1)
         for i in range(0, rows, VECTOR):

@@ -344,7 +344,7 @@ class Search:
                     moved = self._with_delay(fit, output, place, delay)
                     if moved is None:
                         continue
-                    moved = minimise(self.signals, moved, 4, 2.0)
+                    moved = minimise(self.signals, moved, 4, 2.0, fit.deviance)
                     if moved.deviance < fit.deviance - 1e-3:
                         fit, improved = moved, True
         return fit

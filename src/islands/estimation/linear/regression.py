@@ -150,7 +150,11 @@ class Fit:
         input before a recording and a sample that is not counted cost 2, as a parameter does in the criterion
         of Akaike: the information on them does not grow with the number of samples.
         """
-        mean_squares = np.maximum(self.squares, np.finfo(float).tiny) / self.counts
+        return self.measure_deviance(self.squares)
+
+    def measure_deviance(self, squares: Signal) -> float:
+        """Return the deviance for given sums of squares."""
+        mean_squares = np.maximum(squares, np.finfo(float).tiny) / self.counts
         before, first = self.structure.before, self.signals.first
         levels = 0 if before is None else np.count_nonzero(before != first)
         free = sum(each.size for each in self.starts) + levels
@@ -272,9 +276,11 @@ def solve(rows: Signal, moment: Signal, units: Signal | None = None) -> Solution
     units : ndarray, shape (unknowns,), optional
         Norms of the columns in the equations that the rows come from; by default those of the rows.
     """
-    values = np.empty(rows.shape[1])
+    count, unknowns = rows.shape
+    equations, values = np.empty((count, unknowns + 1)), np.empty(unknowns)
+    equations[:, :-1], equations[:, -1] = rows, moment
     norms = np.sqrt(np.square(rows).sum(axis=0)) if units is None else units
-    return Solution(values, solve_rows(np.column_stack([rows, moment]), norms, _DEPENDENT, values))
+    return Solution(values, solve_rows(equations, norms, _DEPENDENT, values))
 
 
 class OutputFactor(NamedTuple):
@@ -320,7 +326,7 @@ def _find_step(signals: Signals, fit: Fit) -> _Step:
         own = solve(each.factor[: each.own, : each.own], moment[: each.own])
         noise.append(own.values[each.own - before.size :].reshape(before.shape))
         squares.append(own.squares + float(moment[each.own :] @ moment[each.own :]))
-    return _Step(poles, noise, replace(fit, squares=np.array(squares)).deviance)
+    return _Step(poles, noise, fit.measure_deviance(np.array(squares)))
 
 
 def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
@@ -362,11 +368,15 @@ def is_invertible(noise: Signal, samples: int) -> bool:
     return bool(np.abs(np.roots([1.0, *noise[1]])).max(initial=0.0) <= limit_zeros(samples))
 
 
-def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3) -> Fit:
-    """Return the fit after steps that each reduce the deviance by at least a given amount."""
+def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: float = float("inf")) -> Fit:
+    """Return the fit after steps that each reduce the deviance by at least a given amount.
+
+    They end where a deviance is out of reach, for which a step would need twice its expected reduction.
+    """
     for _ in range(steps):
         step = _find_step(signals, fit)
-        if fit.deviance - step.deviance < min(least, _NEGLIGIBLE):
+        expected = fit.deviance - step.deviance
+        if expected < min(least, _NEGLIGIBLE) or fit.deviance - 2.0 * expected > goal:
             break
         found = _take_step(signals, fit, step)
         if found is None:

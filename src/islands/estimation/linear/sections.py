@@ -8,6 +8,7 @@ orders, where those of one polynomial do not.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import copysign, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,8 +76,20 @@ def pair_poles(poles: Iterable[complex]) -> list[Section]:
 
 def find_poles(sections: Sequence[Section]) -> NDArray[np.complex128]:
     """Return the poles of sections."""
-    found = [np.roots([1.0, *section]) for section in sections]
-    return np.concatenate([np.zeros(0), *found]).astype(np.complex128)
+    return np.array([pole for section in sections for pole in _find_roots(*section.tolist())], np.complex128)
+
+
+def _find_roots(first: float, last: float | None = None) -> tuple[complex, ...]:
+    """Return the poles of a section."""
+    if last is None:
+        return (-first,)
+    middle, square = -0.5 * first, 0.25 * first * first - last
+    if square < 0.0:
+        pole = complex(middle, sqrt(-square))
+        return pole, pole.conjugate()
+    # A sum of numbers of one sign; the difference of others would lose digits of the smaller pole.
+    larger = middle + copysign(sqrt(square), middle)
+    return larger, last / larger if larger else 0.0
 
 
 def is_stable(section: Section) -> bool:

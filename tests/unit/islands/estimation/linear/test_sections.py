@@ -4,7 +4,9 @@ import pytest
 from islands.estimation.linear.sections import find_poles, is_stable, pair_poles
 
 
-@pytest.mark.parametrize("poles", [[], [0.5], [0.9, 0.9, -0.2], [0.5 + 0.5j, 0.5 - 0.5j, 0.1, 0.99, 0.3]])
+@pytest.mark.parametrize(
+    "poles", [[], [0.5], [0.0, 0.3], [0.0, 0.0], [0.9, 0.9, -0.2], [0.5 + 0.5j, 0.5 - 0.5j, 0.1, 0.99, 0.3]]
+)
 def test_sections_keep_their_poles(poles):
     found = find_poles(pair_poles(poles))
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.array(poles, complex)), atol=1e-7)
