@@ -286,11 +286,9 @@ def _identify(
 
 def _make_progress(progress: ProgressCallback, spec: Identification, samples: int) -> PhasedProgress:
     if spec.model != NARX:
-        several = spec.outputs if len(spec.outputs) > 1 else ()
-        return PhasedProgress(progress, class_phases(spec.model, samples, several))
+        return PhasedProgress(progress, class_phases(spec.model, samples, spec.outputs))
     settings, *_ = resolve_job_settings(spec, maxsize, maxsize)
-    outputs = spec.outputs if len(spec.outputs) > 1 else ()
-    return IdentificationProgress(progress, spec.preset, samples, settings, outputs)
+    return IdentificationProgress(progress, spec.preset, samples, settings, spec.outputs)
 
 
 class ProgressReporter:

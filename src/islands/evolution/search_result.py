@@ -223,8 +223,8 @@ class CoupledSearchResult:
 
     @property
     def shooting_interval(self) -> int:
-        """Samples of the data in each shooting interval of the separate searches."""
-        return self.outputs[0].shooting_interval
+        """Samples of the data in each shooting interval; the setting counts samples of the record."""
+        return count_means(int(self.settings["shooting"]), self.average)
 
     @property
     def direct_inputs(self) -> tuple[str, ...]:

@@ -43,12 +43,11 @@ _CLASS = (Phase("estimation from starting model", 0.9, 3), Phase("assessment of 
 
 def fit_phases(library: str, outputs: Sequence[str]) -> tuple[Phase, ...]:
     """Return the phases of a fit with a library, with times in seconds; see `identification_phases`."""
-    several = len(outputs) > 1
     phases = (
-        *(_TRIALS if library == AUTO and not several else _LIBRARY),
+        *(_TRIALS if library == AUTO and len(outputs) < 2 else _LIBRARY),
         Phase("prediction bands", 0.1),
     )
-    return _repeat(phases, outputs) if several else phases
+    return _repeat(phases, outputs)
 
 
 def class_phases(model: str, samples: int, outputs: Sequence[str] = ()) -> tuple[Phase, ...]:
@@ -58,7 +57,7 @@ def class_phases(model: str, samples: int, outputs: Sequence[str] = ()) -> tuple
     """
     if model == LATENT:
         return identification_phases(LATENT, samples, resolve_settings(LATENT, {}), outputs)
-    return _repeat_searches(_CLASS, outputs) if outputs else _CLASS
+    return _repeat_searches(_CLASS, outputs)
 
 
 def identification_phases(
@@ -78,7 +77,7 @@ def identification_phases(
     settings : Settings
         Settings of the search, of one kind of record for the preset ``auto``.
     outputs : sequence of str
-        Names of several outputs, which are searched one after the other.
+        Names of the outputs; several are searched one after the other.
     """
     evaluations = settings.population * settings.islands * (settings.generations + 1)
     if settings.model_class == LATENT:
@@ -89,9 +88,9 @@ def identification_phases(
             Phase("assessment of the models", 0.3),
             Phase("prediction bands", 0.1 + 1e-5 * samples),
         )
-        return _repeat_searches(searched, outputs) if outputs else searched
+        return _repeat_searches(searched, outputs)
     phases = (
-        *(_CHOICE if preset == AUTO and not outputs else ()),
+        *(_CHOICE if preset == AUTO and len(outputs) < 2 else ()),
         Phase("forward selection among", 0.1),
         Phase("swap search among", 0.6, 15),
         Phase(SEARCH, _INDIVIDUAL * evaluations),
@@ -99,7 +98,7 @@ def identification_phases(
         Phase("assessment of the final models", 0.1),
         Phase("prediction bands", 0.2 + _BANDS * samples),
     )
-    return _repeat(phases, outputs) if outputs else phases
+    return _repeat(phases, outputs)
 
 
 def estimate_state_space_seconds(samples: int) -> float:
@@ -108,11 +107,16 @@ def estimate_state_space_seconds(samples: int) -> float:
 
 
 def _repeat_searches(phases: Sequence[Phase], outputs: Sequence[str]) -> tuple[Phase, ...]:
+    """Return the phases of each of several outputs, or those of one."""
+    if len(outputs) < 2:
+        return tuple(phases)
     return tuple(replace(each, beginning=f"{name}: {each.beginning}") for name in outputs for each in phases)
 
 
 def _repeat(phases: Sequence[Phase], outputs: Sequence[str]) -> tuple[Phase, ...]:
-    """Return the phases of several outputs, and those of the common model."""
+    """Return the phases of each of several outputs and those of the common model, or those of one output."""
+    if len(outputs) < 2:
+        return tuple(phases)
     return (
         *_repeat_searches(phases, outputs),
         Phase("choice of the equations", 0.1),

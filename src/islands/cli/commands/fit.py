@@ -53,12 +53,10 @@ def fit(
 
     with progress("fit") as show, stop_requests() as stop:
         began = perf_counter()
-        several = outputs if len(outputs) > 1 else ()
-        is_narx = settings.model == NARX
         phases = (
             fit_phases(settings.library, outputs)
-            if is_narx
-            else class_phases(settings.model, data.samples, several)
+            if settings.model == NARX
+            else class_phases(settings.model, data.samples, outputs)
         )
         search = partial(
             fit_record,

@@ -190,8 +190,7 @@ def _show_run(result: islands.Result, options: RunOptions, folder: Path, stop: S
 
 def _make_display(show: Display, job: dict[str, Any], data: AnyRecord, settings: Settings) -> SearchDisplay:
     preset = job.get("choice") or job["preset"]
-    several = data.output_names if len(data.output_names) > 1 else ()
-    return SearchDisplay(show, preset, data.samples, settings, several)
+    return SearchDisplay(show, preset, data.samples, settings, data.output_names)
 
 
 def _choose_preset(

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -325,8 +326,25 @@ class Result:
         if set(names).intersection(RESPONSES):
             steps.attempt("figures of responses", draw_all_responses)
 
-    def __str__(self) -> str:
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML file, which prints on A4; return its path.
+
+        That of a result from a folder has the figures of the folder.
+        """
+        from islands.report.pages.identification import report_saved_result  # noqa: PLC0415 - loads templates
+
+        path = Path(path)
+        with TemporaryDirectory() as made:
+            path.write_bytes(report_saved_result(self.folder or self.save(Path(made) / path.stem)))
+        return path
+
+    @property
+    def summary(self) -> str:
+        """Summary as text: verdict, errors, equation, findings and models."""
         return summary(self._describable_document(), self.best.model)
+
+    def __str__(self) -> str:
+        return self.summary
 
     def _repr_html_(self) -> str:
         figure = None if self._search_result is None else self.best.plot()
