@@ -20,7 +20,6 @@ from islands.facade.coupled import identification
 from islands.facade.fit import fit_record
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
-from islands.facade.trials.library import TrialLibrary
 from islands.report.documents.result_folder import write_interim_result
 from islands.report.figures import model_responses, registry
 from islands.report.figures.names import ALL_FIGURES
@@ -56,11 +55,10 @@ def fit(record, **options):
 
 #: Step as named in the result, the object that computes it, and its attribute.
 STEPS = {
-    "linear model for comparison": (search_result, "fit_linear_comparison"),
+    "linear model": (search_result, "assess_linear_model"),
     "prediction bands": (search_result, "calibrate_bands"),
     "bounds of the errors of all models": (SubsetSearch, "certify"),
     "estimation by the error of the free run": (islands.facade.library_fit, "refine_models"),
-    "linear models of the free run": (TrialLibrary, "fit_simulations"),
     "estimation of the parameters on all data": (refit, "_estimate"),
     "residual tests": (assessment, "assess_residual"),
     "physics checks": (assessment, "check_physics"),
@@ -127,7 +125,7 @@ def test_the_models_are_stored_before_the_optional_steps(monkeypatch, tmp_path):
     def end(*_arguments):
         raise EndOfProcess
 
-    monkeypatch.setattr(search_result, "fit_linear_comparison", end)
+    monkeypatch.setattr(search_result, "assess_linear_model", end)
     record, folder = make_record(), tmp_path / "result"
     with pytest.raises(EndOfProcess):
         fit_record(
@@ -158,7 +156,7 @@ COUPLED_STEPS = {
     "refinement of all equations": (identification, "_refine"),
     "residual tests of y": (CoupledAssessment, "measure_residual"),
     "figure free-run-1": (FittedModel, "plot"),
-    "y: linear model for comparison": (search_result, "fit_linear_comparison"),
+    "y: linear model": (search_result, "assess_linear_model"),
 }
 
 
@@ -167,7 +165,9 @@ def test_a_step_of_several_outputs_that_fails_leaves_a_line_and_the_model(step, 
     record = make_record()
     frame = {"u": record.u[:, 0], "y": record.y, "z": 1.0 + 2.0 * record.y + record.u[:, 0] ** 3}
     monkeypatch.setattr(*COUPLED_STEPS[step], fail)
-    result = fit(pd.DataFrame(frame), inputs="u", output=("y", "z"), dt=0.1, degree=2, lags=1, max_terms=4)
+    result = islands.fit(
+        pd.DataFrame(frame), inputs="u", output=("y", "z"), dt=0.1, degree=2, lags=1, max_terms=4
+    )
     folder = result.save(tmp_path / "result")
     document = json.loads((folder / "result.json").read_text())
     assert step in {each["step"] for each in document["not_computed"]}
