@@ -1,6 +1,7 @@
 """Response of a model to inputs of choice on the page of a job, while sliders move."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -35,7 +36,7 @@ def tried(opened: Callable[..., Any], finished: str, expect: Any) -> Callable[..
         button.click()
         expect(button).to_have_attribute("aria-expanded", "true")
         # The first simulation of a service loads the kernels.
-        expect(page.locator(".try [role=status]")).to_contain_text("y_um: ", timeout=60_000)
+        expect(page.locator(".responses [role=status]")).to_contain_text("y_um: ", timeout=60_000)
         return page
 
     return open_section
@@ -79,6 +80,27 @@ def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect
     assert len(asked) == 2
     assert asked[-1]["inputs"]["u_V"]["offset"] == typed
     expect(page.get_by_text("Before the first sample", exact=False)).to_be_visible()
+
+
+def test_files_of_inputs_alone_are_simulated_from_a_given_output(
+    tried: Callable[..., Any], expect: Any, tmp_path: Path
+) -> None:
+    page = tried()
+    files = [tmp_path / name for name in ("one.csv", "two.csv")]
+    for factor, path in enumerate(files, start=1):
+        rows = (f"{0.01 * k:.2f},{factor * (k % 50)}" for k in range(200))
+        path.write_text("\n".join(["t_s,u_V", *rows]))
+    form = page.locator(".scenarios")
+    form.locator("input[type=file]").set_input_files(files)
+    form.get_by_label("y_um before the first sample").fill("0.5")
+    form.get_by_role("button", name="Simulate", exact=True).click()
+    expect(form.get_by_role("status")).to_contain_text("two.csv: from y_um = 0.5", timeout=60_000)
+    lines = get_lines(form.locator("figure.chart").first)
+    assert set(lines) == {"one.csv", "two.csv"}
+    with page.expect_download() as saved:
+        form.get_by_role("button", name="Save one.csv simulated").click()
+    assert Path(saved.value.path()).read_text().startswith("t_s,y_um\n0,")
+    assert unreadable(page) == []
 
 
 @pytest.mark.nightly

@@ -50,6 +50,9 @@ _BISECTIONS = 80
 #: Newton steps to the rest of a block of several equations, and the relative step that ends them.
 _REST_STEPS, _STILL = 50, 1e-12
 
+#: Range of an output that is not bounded.
+EVERYWHERE = (-inf, inf)
+
 #: Inputs of an operating point: values in the order of the model, one value, or values by column.
 OperatingPoint = ArrayLike | Mapping[str, float]
 
@@ -210,7 +213,7 @@ def _measure_degree(expression: Expression) -> float:
     return 0.0
 
 
-def find_rest(block: Block, u: Sequence[float], within: tuple[float, float] = (-inf, inf)) -> list[float]:
+def find_rest(block: Block, u: Sequence[float], within: tuple[float, float] = EVERYWHERE) -> list[float]:
     """Return the outputs and the states of a block at rest at constant inputs.
 
     The equilibria of one equation are the roots of a polynomial, if it is one in the output; otherwise those
@@ -243,7 +246,7 @@ def find_rest(block: Block, u: Sequence[float], within: tuple[float, float] = (-
     inside = [root for root in stable if within[0] <= root <= within[1]]
     if len(inside) == 1:
         return inside
-    if within != (-inf, inf):
+    if within != EVERYWHERE:
         return find_rest(block, u)
     if stable:
         listed = ", ".join(f"{root:g}" for root in stable)
@@ -414,7 +417,7 @@ def _search_roots(
         return sum(p * value(each, lambda channel, _: levels[channel]) for p, each in pairs) - y
 
     whole = np.concatenate([-_MAGNITUDES[:0:-1], _MAGNITUDES])
-    grid = whole if within == (-inf, inf) else np.linspace(*within, _POINTS)
+    grid = whole if within == EVERYWHERE else np.linspace(*within, _POINTS)
     values = np.array([excess(float(y)) for y in grid])
     roots = [float(y) for y, at in zip(grid, values, strict=True) if at == 0.0]
     for place in np.flatnonzero(values[:-1] * values[1:] < 0.0):

@@ -196,7 +196,8 @@ class StateSpace:
             return self.poles
         with np.errstate(divide="ignore"):
             growth = np.log(np.abs(self.poles))
-        return np.asarray((growth + 1j * np.angle(self.poles)) / self.step, np.complex128)
+        # A complex division would turn minus infinity into NaN.
+        return np.asarray(growth / self.step + 1j * (np.angle(self.poles) / self.step), np.complex128)
 
     @property
     def natural_frequencies(self) -> NDArray[np.float64]:

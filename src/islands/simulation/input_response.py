@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import SettingsError
 from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.linearisation import EVERYWHERE
 from islands.models.protocol import DynamicModel, no_model_error
 from islands.records.compatibility import ColumnReference, match_record
 from islands.records.coupled import AnyRecord
@@ -51,6 +52,7 @@ def input_response(
     y: ArrayLike | None = None,
     scale: float = 0.0,
     states: ArrayLike | None = None,
+    within: tuple[float, float] = EVERYWHERE,
 ) -> InputResponse:
     """Simulate the response of a model to inputs at its rate.
 
@@ -69,6 +71,8 @@ def input_response(
         size, of the inputs, of ``y`` and of 1.
     states : sequence of float, optional
         States of a state space at the first sample, in place of ``y``.
+    within : (float, float), optional
+        Range of the output, as that of the data of a model: the only equilibrium in it is taken of several.
 
     Raises
     ------
@@ -78,7 +82,7 @@ def input_response(
     """
     block = model.block()
     signals = read_inputs(model, u, block.columns[block.computed :])
-    found = Stepper(model, signals[0], y, states).run(signals)
+    found = Stepper(model, signals[0], y, states, within).run(signals)
     offsets, _ = measure_offsets(model)
     given = 0.0 if y is None else float(np.abs(np.asarray(y)).max())
     bound = BOUND * max(1.0, scale, given, float(np.abs(signals).max()))
@@ -93,7 +97,11 @@ def input_response(
 
 
 def simulate_inputs(
-    model: AnyModel, record: AnyRecord, y: ArrayLike | None = None, states: ArrayLike | None = None
+    model: AnyModel,
+    record: AnyRecord,
+    y: ArrayLike | None = None,
+    states: ArrayLike | None = None,
+    within: tuple[float, float] = EVERYWHERE,
 ) -> Simulation:
     """Simulate every segment of a record from its inputs alone, from rest or from a given start.
 
@@ -102,7 +110,7 @@ def simulate_inputs(
     model : DynamicModel or CoupledModel
     record : Dataset or CoupledRecord
         Inputs at the rate of the model; its outputs are only compared.
-    y, states
+    y, states, within
         As for `input_response`: the start of every segment.
 
     Returns
@@ -121,7 +129,7 @@ def simulate_inputs(
     done = data.preprocessing
     u = data.u + (done.input_offsets if done else 0.0)
     measured = record.y.reshape(len(u), output)
-    runs = [input_response(model, u[begin:end], y, 0.0, states) for begin, end in data.bounds]
+    runs = [input_response(model, u[begin:end], y, 0.0, states, within) for begin, end in data.bounds]
     found = np.concatenate([each.y.reshape(-1, output) for each in runs])
     found -= [each.preprocessing.output_offset if each.preprocessing else 0.0 for each in record.records]
     outcome = next((each.outcome for each in runs if not each.outcome), OK)

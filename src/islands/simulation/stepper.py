@@ -14,7 +14,7 @@ from islands.kernels.simulate_block import LANES
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
-from islands.models.linearisation import OperatingPoint, find_rest, read_levels
+from islands.models.linearisation import EVERYWHERE, OperatingPoint, find_rest, read_levels
 from islands.models.measured_signals import measured_block
 from islands.records.dataset import Dataset
 from islands.simulation.blocks import LinkedBlock
@@ -38,6 +38,9 @@ class Stepper:
         States of a state space at the first sample, in the order of its equations. With dead times, the
         inputs before it follow: u(k-1), u(k-2), .. of each input, as measured.
 
+    within : (float, float), optional
+        Range of the output, as that of the data of a model: the only equilibrium in it is taken of several.
+
     Raises
     ------
     ModelError
@@ -53,6 +56,7 @@ class Stepper:
         u: OperatingPoint | None = None,
         y: ArrayLike | None = None,
         states: ArrayLike | None = None,
+        within: tuple[float, float] = EVERYWHERE,
     ) -> None:
         self._block, self._parameters = model.block(), np.array(model.parameters)
         self._linked = LinkedBlock(self._block)
@@ -71,7 +75,7 @@ class Stepper:
                 )
             self._given = self._read_states(states, depth)
         elif y is None:
-            at_rest = np.array(find_rest(measured, inputs.tolist()))
+            at_rest = np.array(find_rest(measured, inputs.tolist(), within))
             at_rest[: block.outputs] -= self._output_offsets
             self._past[: block.computed] = at_rest[:, None]
         else:

@@ -12,6 +12,7 @@ import {
   makeGallery,
   makeSentences,
 } from "./models.js";
+import { makeScenarioUpload } from "./scenario_upload.js";
 import { makeExactValue, makeTermPanel } from "./term_table.js";
 
 /** Make the table of the errors of every output in the common free run. */
@@ -58,6 +59,7 @@ function makeCoupledDetail(job, model, outputs, signal) {
     makeTermPanel(model),
     makeGallery(path, signal),
     makeLinearSystem(path, job.spec, signal),
+    makeScenarioUpload(path, job.spec.output, signal),
   ];
 }
 

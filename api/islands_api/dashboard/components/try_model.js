@@ -6,6 +6,7 @@ import { formatNumber, formatShort, labelQuantity } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
 import { makeExcitationForm } from "./excitation_form.js";
 import { findLimits, makeLoopPlot } from "./loop_plot.js";
+import { makeScenarioUpload, writeTable } from "./scenario_upload.js";
 
 /** Periods of the first input that are shown at first, and limits of the number of samples. */
 const [PERIODS, LEAST_SAMPLES, USUAL_SAMPLES, MOST_SAMPLES] = [5, 200, 10_000, 50_000];
@@ -16,15 +17,6 @@ function findFrequency(values, dt) {
   const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
   const passes = values.filter((value, at) => at && value > mean !== values[at - 1] > mean).length;
   return Math.min(Math.max(passes, 2) / (2 * duration), 0.05 / dt);
-}
-
-/** Write a response as a table for other programs, with every digit. */
-function writeCsv({ time_s: times, inputs, output }, name) {
-  const columns = [times, ...Object.values(inputs), output];
-  const quote = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-  const heading = ["t_s", ...Object.keys(inputs), name].map(quote);
-  const rows = times.map((_, row) => columns.map((column) => column[row] ?? ""));
-  return [heading, ...rows].map((row) => `${row.join(",")}\n`).join("");
 }
 
 /** Make the controls and the plots of a model; `found` is its response to the inputs of the record. */
@@ -112,7 +104,9 @@ function makePanel(path, output, found, signal) {
   }
 
   function saveCsv() {
-    saveBlob(new Blob([writeCsv(answer, output)], { type: "text/csv" }), "response.csv");
+    const headings = ["t_s", ...Object.keys(answer.inputs), output];
+    const table = writeTable(headings, [answer.time_s, ...Object.values(answer.inputs), answer.output]);
+    saveBlob(new Blob([table], { type: "text/csv" }), "response.csv");
   }
 
   update();
@@ -146,7 +140,10 @@ export function makeTryModel(path, { inputs, output }, signal) {
       const found = await postJson(`${path}/simulate`, request, { signal });
       if (!Object.keys(found.ranges).length)
         throw new Error("The result is of an earlier version, without ranges of inputs: identify again.");
-      host.replaceChildren(...makePanel(path, output, found, signal));
+      host.replaceChildren(
+        ...makePanel(path, output, found, signal),
+        makeScenarioUpload(path, [output], signal),
+      );
     } catch (error) {
       const complaint = el("p", { class: "complaint", role: "alert" }, error.message);
       if (!signal.aborted) host.replaceChildren(complaint);

@@ -86,6 +86,7 @@ FILES = {
     "components/result_card.js": _SCRIPT,
     "components/row_ranges.js": _SCRIPT,
     "components/run_form.js": _SCRIPT,
+    "components/scenario_upload.js": _SCRIPT,
     "components/search_run.js": _SCRIPT,
     "components/search_settings.js": _SCRIPT,
     "components/signal_lines.js": _SCRIPT,

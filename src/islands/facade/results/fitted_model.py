@@ -23,6 +23,7 @@ from islands.facade.results.model_simulation import (
 )
 from islands.facade.results.notebook_html import render_html
 from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals, list_models
+from islands.models.linearisation import EVERYWHERE
 from islands.models.narx import Model
 from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
@@ -39,6 +40,7 @@ from islands.simulation.predictors import Simulation
 from islands.simulation.stepper import Stepper
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
+from islands.validation.data_range import DataRange
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
@@ -195,8 +197,7 @@ class FittedModel:
             NARX model of a result the middle of the range of every input in its data; of several equilibria,
             the only one within the range of the output is taken.
         """
-        bands = self.prediction_bands
-        data = bands.data_range if isinstance(bands, PredictionBands) else None
+        bands, data = self.prediction_bands, self._data_range
         if data is not None and isinstance(self.model, Model):
             if operating_point is None:
                 operating_point = [0.5 * (low + high) for low, high in data.inputs]
@@ -205,6 +206,18 @@ class FittedModel:
         found = linearise(self.model, operating_point, y, None if bands is None else bands.ensemble)
         units = zip(self.output_units, found.output_units, strict=True)
         return replace(found, output_units=tuple(own or other for own, other in units))
+
+    @property
+    def _data_range(self) -> DataRange | None:
+        """Range of the data of a model of one output; None if it is not known."""
+        bands = self.prediction_bands
+        return bands.data_range if isinstance(bands, PredictionBands) else None
+
+    @property
+    def _output_range(self) -> tuple[float, float]:
+        """Range of the output in which the model rests, if it rests at several."""
+        data = self._data_range
+        return EVERYWHERE if data is None else data.output
 
     def plot_linear(
         self, kind: str = "bode", operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
@@ -392,7 +405,8 @@ class FittedModel:
         """
         warm_up = self.warm_up if warm_up is None else warm_up
         shooting = self.shooting_interval if shooting is None else shooting
-        return simulate(self.model, record, mode, shooting, warm_up=warm_up, y=y, states=states)
+        start: dict[str, Any] = {"y": y, "states": states, "within": self._output_range}
+        return simulate(self.model, record, mode, shooting, warm_up=warm_up, **start)
 
     def stepper(
         self,
@@ -409,7 +423,7 @@ class FittedModel:
         u, y, states
             Inputs and outputs before the first sample, or states at the first one; see `Stepper`.
         """
-        return Stepper(self.model, u, y, states)
+        return Stepper(self.model, u, y, states, self._output_range)
 
     def bands(self, record: "RecordLike", level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
         """Simulate the model on a record, with a band that contains a measured sample with a probability.

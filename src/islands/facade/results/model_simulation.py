@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import RecordError, SettingsError, lookup
 from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.linearisation import EVERYWHERE
 from islands.models.protocol import DynamicModel
 from islands.records.channel_names import parse_channel_name
 from islands.records.compatibility import ColumnReference
@@ -46,6 +47,7 @@ def simulate(
     warm_up: int | None = None,
     y: "ArrayLike | None" = None,
     states: "ArrayLike | None" = None,
+    within: tuple[float, float] = EVERYWHERE,
 ) -> Simulation:
     """Simulate a record, or inputs alone.
 
@@ -71,6 +73,8 @@ def simulate(
         Outputs of a model before the first sample, in place of those of the record.
     states : sequence of float, optional
         States of a latent model at the first sample.
+    within : (float, float), optional
+        Range of the output, as that of the data of a model: the only equilibrium in it is taken of several.
 
     Raises
     ------
@@ -86,7 +90,7 @@ def simulate(
     if isinstance(model, DynamicModel | CoupledModel):
         data = match_columns(model, record_of_model(model, record))
         if interval is None:
-            return run_freely(model, data, warm_up, y, states)
+            return run_freely(model, data, warm_up, y, states, within)
         if y is not None or states is not None:
             raise SettingsError("a start is that of a free run: leave out the mode")
         return multiple_shooting(model, data, interval, warm_up)
@@ -106,11 +110,12 @@ def run_freely(
     warm_up: int | None = None,
     y: "ArrayLike | None" = None,
     states: "ArrayLike | None" = None,
+    within: tuple[float, float] = EVERYWHERE,
 ) -> Simulation:
     """Return the free run of a model: from the measured output, from a given start, or else from rest."""
     if y is None and states is None and np.isfinite(record.y).any():
         return simulate_freely(model, record, warm_up)
-    return simulate_inputs(model, record, y, states)
+    return simulate_inputs(model, record, y, states, within)
 
 
 def record_of_model(

@@ -151,7 +151,10 @@ def draw_pole_map(system: StateSpace) -> Figure:
     if zeros.size:
         stable = 0.0 if system.is_continuous else 1.0
         is_far = np.abs(zeros) > _FAR * max(stable, float(np.abs(poles).max(initial=0.0)))
-        far = ", ".join(f"{zero:.3g}" if zero.imag else f"{zero.real:.3g}" for zero in zeros[is_far])
+        far = ", ".join(
+            f"{zero.real:.3g}" + (f" \u00b1 {zero.imag:.3g}j" if zero.imag else "")
+            for zero in zeros[is_far & (zeros.imag >= 0.0)]
+        )
         name = f"zeros (outside: {far})" if far else "zeros"
         near = zeros[~is_far]
         axes.plot(near.real, near.imag, "o", mfc="none", color=_COLOURS[2], label=name)

@@ -95,3 +95,14 @@ def test_what_is_given_is_checked():
         Stepper(latent, 0.0, states=[0.0])
     with pytest.raises(islands.SettingsError, match="inputs are finite"):
         Stepper(latent, 0.0).step(np.nan)
+
+
+def test_of_several_rests_that_within_the_range_of_the_output_is_the_start():
+    model = islands.make_model(
+        [(islands.parse("y(k-1)"), 1.1), (islands.parse("y(k-1)^3"), -0.1), (islands.parse("u(k-1)"), 0.1)]
+    )
+    with pytest.raises(islands.ModelError, match="several stable equilibria"):
+        Stepper(model, u=0.0)
+    for rest in (-1.0, 1.0):
+        stepper = Stepper(model, u=0.0, within=(rest - 0.5, rest + 0.5))
+        assert stepper.step(0.0) == pytest.approx(rest)
