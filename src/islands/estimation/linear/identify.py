@@ -12,7 +12,7 @@ from islands.errors import RecordError
 from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
 from islands.estimation.linear.noise import WHITE, fit_noises
 from islands.estimation.linear.regression import Fit, Structure, minimise, project
-from islands.estimation.linear.sections import Signal, Signals, find_poles, pair_poles
+from islands.estimation.linear.sections import INTEGRATORS, Signal, Signals, find_poles, pair_poles
 from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
 
 #: Samples of the part of a record on which starts and dead times are searched.
@@ -261,7 +261,7 @@ class Search:
         improved, rivals = True, list[Fit]()
         while improved:
             improved, rivals = False, []
-            tried = [project(self.signals, each) for each in self._list_neighbours(fit.structure)]
+            tried = [project(self.signals, each) for each in self._list_neighbours(fit)]
             for start in sorted(filter(None, tried), key=attrgetter("criterion"))[:_NEIGHBOURS]:
                 found = minimise(self.signals, start, 15, 0.1)
                 # An order that is too large hides a wrong dead time.
@@ -273,8 +273,11 @@ class Search:
                     break
         return fit, rivals
 
-    def _list_neighbours(self, structure: Structure) -> Iterator[Structure]:
-        """Yield a smaller structure, one with an integrator, and those with other fractions of dead times."""
+    def _list_neighbours(self, fit: Fit) -> Iterator[Structure]:
+        """Yield smaller structures, and others of integrators, dead times and inputs before a recording."""
+        structure = fit.structure
+        for before in self._list_before(fit):
+            yield replace(structure, before=before)
         poles, white = find_poles(structure.sections), (WHITE,) * len(structure.noise)
         if any(noise.size for noise in structure.noise):
             yield replace(structure, noise=white)
@@ -290,10 +293,11 @@ class Search:
             if left:
                 delays = structure.delays + ~structure.leads
                 yield replace(smaller, leads=np.ones_like(structure.leads), delays=delays)
-        real = [pole for pole in poles if pole.imag == 0.0 and pole.real > 0.0]
-        if real and not structure.integrators:
-            left = [pole for pole in poles if pole != max(real, key=abs)]
-            integrating = replace(structure, sections=tuple(pair_poles(left)), integrators=1)
+        slowest = min(modes, key=lambda pole: abs(pole - 1.0), default=0.0)
+        integrators = structure.integrators + (2 if slowest.imag > 0.0 else 1)
+        if modes and integrators < len(INTEGRATORS):
+            left = [pole for pole in poles if pole not in (slowest, slowest.conjugate())]
+            integrating = replace(structure, sections=tuple(pair_poles(left)), integrators=integrators)
             yield from (integrating, replace(integrating, noise=white))
         if structure.order == 0:
             return
@@ -334,12 +338,11 @@ class Search:
 
     def _move_delays(self, fit: Fit) -> Fit:
         """Return the fit with dead times that were moved as long as the error falls."""
-        changes = _CHANGES if fit.structure.order <= 2 else _CHANGES[:2]
         improved = True
         while improved:
             improved = False
             for output, place in np.ndindex(fit.structure.delays.shape):
-                for change in changes:
+                for change in _CHANGES:
                     delay = int(fit.structure.delays[output, place]) + change
                     moved = self._with_delay(fit, output, place, delay)
                     if moved is None:
@@ -352,15 +355,15 @@ class Search:
     def _colour(self, fit: Fit) -> Fit:
         """Return the minimum with the noise of its residual, and with other inputs before the recordings."""
         best = minimise(self.signals, fit, 20, 1e-2)
-        for before in self._list_before(best):
-            start = project(self.signals, replace(best.structure, before=before))
-            if start is not None:
-                best = min(best, minimise(self.signals, start, 8, 0.1), key=attrgetter("criterion"))
         for noise in self._list_noises(best):
             start = project(self.signals, replace(best.structure, noise=noise))
             found = start and minimise(self.signals, start, 8, 0.1)
             if found is not None and found.criterion < best.criterion:
                 best = minimise(self.signals, self._move_delays(found), 20, 1e-2)
+        for before in self._list_before(best):
+            start = project(self.signals, replace(best.structure, before=before))
+            if start is not None:
+                best = min(best, minimise(self.signals, start, 8, 0.1), key=attrgetter("criterion"))
         return best
 
     def _list_before(self, fit: Fit) -> list[Signal | None]:

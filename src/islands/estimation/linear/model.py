@@ -12,6 +12,9 @@ from islands.estimation.linear.sections import Section, Signal, Signals, find_po
 from islands.kernels.state_space import simulate_state_space
 from islands.models.state_space import Quantity, StateSpace, measure_mode
 
+#: Gains of an input to the slope of an output, and to its curvature.
+INTEGRATOR_GAINS = "integrator gain", "double integrator gain"
+
 #: Part of a standard error by which parameters are moved for the derivatives of quantities.
 _STEP = 1e-3
 
@@ -357,7 +360,7 @@ def _realise(
     gain = scales.y_unit[output] / scales.u_unit
     drift = np.zeros(structure.order)
     if structure.integrators:
-        drift[-1] = own[-1] / samples * scales.y_unit[output]
+        drift[-structure.integrators] = own[-1] / samples * scales.y_unit[output]
     level = 0.0 if structure.integrators else float(own[-1] * scales.y_unit[output])
     return b * gain, d * gain, drift, level
 
@@ -388,7 +391,9 @@ def _measure(structure: Structure, own: Signal, output: int, scales: Scales) -> 
             gain += b[row : row + section.size, place].sum() / (1.0 + section.sum())
             row += section.size
         if structure.integrators:
-            found.append(Quantity("integrator gain", float(b[-1, place]) / scales.dt, input=place + 1))
+            name = INTEGRATOR_GAINS[structure.integrators - 1]
+            growth = float(b[-structure.integrators :, place].sum()) / scales.dt**structure.integrators
+            found.append(Quantity(name, growth, input=place + 1))
         else:
             found.append(Quantity("static gain", float(gain), input=place + 1))
         late = structure.delays[output, place] - _find_lead(structure, b[:, place], d[place])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from islands.estimation.linear.noise import limit_zeros
 from islands.estimation.linear.sections import (
-    INTEGRATOR,
+    INTEGRATORS,
     Section,
     Signal,
     Signals,
@@ -28,6 +28,9 @@ from islands.kernels.parallel_sections import factor_sections, solve_rows
 
 #: A column that keeps at most this part of its norm depends on the columns before it.
 _DEPENDENT = 1e-10
+
+#: Noise with poles this near to the unit circle is a random walk, which may begin anywhere.
+_WALK = 1e-6
 
 #: Reduction of the deviance for which no step is taken: it is no reason to prefer a model.
 _NEGLIGIBLE = 1e-3
@@ -45,7 +48,7 @@ class Structure:
     sections : tuple of ndarray
         Denominators without an integrator.
     integrators : int
-        Number of poles at exactly 1: 0 or 1.
+        Number of poles at exactly 1: 0, 1 or 2.
     delays : ndarray of int64, shape (outputs, inputs)
         Whole samples before the response to an input begins: it reads lag ``delay + 1`` first.
     leads : ndarray of bool, shape (outputs, inputs)
@@ -87,8 +90,8 @@ class Structure:
 
     @cached_property
     def parts(self) -> tuple[Section, ...]:
-        """All sections, that of an integrator last."""
-        return self.sections + (INTEGRATOR,) * self.integrators
+        """All sections, that of the integrators last."""
+        return self.sections + INTEGRATORS[self.integrators]
 
     @cached_property
     def order(self) -> int:
@@ -219,7 +222,7 @@ def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> Non
         signals.first if structure.before is None else structure.before,
         structure.skipped,
         *structure.filters,
-        structure.integrators,
+        len(structure.parts) - len(structure.sections),
         structure.delays[output],
         structure.leads[output],
         noise,
@@ -236,7 +239,7 @@ def _weigh_past(noise: Signal) -> Signal:
     states = noise.shape[1]
     a = np.eye(states, k=1)
     a[:, :1] = noise[0][:, None]
-    if np.abs(np.linalg.eigvals(a)).max(initial=0.0) >= 1.0:
+    if np.abs(np.linalg.eigvals(a)).max(initial=0.0) > 1.0 - _WALK:
         return np.zeros((states, states))
     gain = noise.sum(axis=0)
     covariance = np.linalg.solve(np.eye(states**2) - np.kron(a, a), np.outer(gain, gain).ravel())

@@ -21,8 +21,8 @@ Section = Signal
 #: Samples of a block of a long record.
 BLOCK = 8192
 
-#: The section of a pole at exactly 1.
-INTEGRATOR: Section = np.array([-1.0])
+#: The sections of no pole at exactly 1, of one, and of two.
+INTEGRATORS: tuple[tuple[Section, ...], ...] = (), (np.array([-1.0]),), (np.array([-2.0, 1.0]),)
 
 
 @dataclass(frozen=True, eq=False)
