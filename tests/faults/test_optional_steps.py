@@ -125,7 +125,7 @@ def test_the_models_are_stored_before_the_optional_steps(monkeypatch, tmp_path):
     def end(*_arguments):
         raise EndOfProcess
 
-    monkeypatch.setattr(search_result, "assess_linear_model", end)
+    monkeypatch.setattr(search_result, "calibrate_bands", end)
     record, folder = make_record(), tmp_path / "result"
     with pytest.raises(EndOfProcess):
         fit_record(

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import RecordError, SettingsError
+from islands.errors import RecordError, SettingsError, check_type
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset, same_dt
 from islands.records.preprocessing_steps import Preprocessing, PreprocessingSteps, find_decimation_cutoff
@@ -59,11 +59,13 @@ def preprocess(
     Raises
     ------
     SettingsError
-        A value is out of range.
+        A value is out of range, or the record has several outputs.
     RecordError
         The record has been preprocessed before, has segments that are too short for a filter, or several
         segments and a linear trend; or its sampling time differs from that of ``like``.
     """
+    advice = "make one by as_record(data, inputs=..., output=...); of several outputs, take record.map(...)"
+    check_type(record, Dataset, "preprocess", advice)
     if like is not None:
         return record if like.preprocessing is None else apply_preprocessing(record, like.preprocessing)
     steps = PreprocessingSteps(lowpass, decimate, detrend)

@@ -8,6 +8,7 @@ import pytest
 from islands.errors import RecordError, SettingsError
 from islands.records.coupled import CoupledRecord, split_coupled
 from islands.records.dataset import Dataset
+from islands.records.preprocessing import preprocess
 
 U = np.random.default_rng(4).normal(size=40)
 Y = np.random.default_rng(5).normal(size=(2, 40))
@@ -61,3 +62,11 @@ def test_validation_data_are_other_samples_of_the_same_outputs() -> None:
         split_coupled(record, record)
     with pytest.raises(RecordError, match="the same outputs in one order"):
         split_coupled(record, CoupledRecord((TWO, ONE)))
+
+
+def test_functions_of_one_output_refuse_several_and_say_what_to_do():
+    record = CoupledRecord((ONE, TWO))
+    with pytest.raises(SettingsError, match=r"of several outputs, take record\.map"):
+        preprocess(record, detrend="constant")
+    centred = record.map(lambda each: preprocess(each, detrend="constant"))
+    assert np.abs(centred.y.mean(axis=0)).max() < 1e-12
