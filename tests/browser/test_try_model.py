@@ -79,7 +79,7 @@ def test_the_last_value_of_a_moved_slider_wins(tried: Callable[..., Any], expect
     # The request that runs at the first change, and one for all changes meanwhile.
     assert len(asked) == 2
     assert asked[-1]["inputs"]["u_V"]["offset"] == typed
-    expect(page.get_by_text("Before the first sample", exact=False)).to_be_visible()
+    expect(page.get_by_text("Before the first sample y_um is")).to_be_visible()
 
 
 def test_files_of_inputs_alone_are_simulated_from_a_given_output(

@@ -22,7 +22,9 @@ from islands.facade.results.model_simulation import (
     simulate,
 )
 from islands.facade.results.notebook_html import render_html
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals, list_models
+from islands.models.latent import LatentModel
 from islands.models.linearisation import EVERYWHERE
 from islands.models.narx import Model
 from islands.models.operating_point import static_characteristic
@@ -44,7 +46,7 @@ from islands.validation.data_range import DataRange
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
-from islands.validation.prediction_bands import LEVEL, AnyBands, PredictionBand, PredictionBands
+from islands.validation.prediction_bands import LEVEL, AnyBands, PredictionBand
 from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
@@ -198,10 +200,10 @@ class FittedModel:
             the only one within the range of the output is taken.
         """
         bands, data = self.prediction_bands, self._data_range
-        if data is not None and isinstance(self.model, Model):
+        if data is not None and not isinstance(self.model, LatentModel | CoupledLatentModel):
             if operating_point is None:
                 operating_point = [0.5 * (low + high) for low, high in data.inputs]
-            if y is None:
+            if y is None and isinstance(self.model, Model):
                 y = find_rest_of_data(self.model, operating_point, data.output)
         found = linearise(self.model, operating_point, y, None if bands is None else bands.ensemble)
         units = zip(self.output_units, found.output_units, strict=True)
@@ -209,15 +211,14 @@ class FittedModel:
 
     @property
     def _data_range(self) -> DataRange | None:
-        """Range of the data of a model of one output; None if it is not known."""
-        bands = self.prediction_bands
-        return bands.data_range if isinstance(bands, PredictionBands) else None
+        """Range of the inputs and of the first output; None if it is not known."""
+        return self.prediction_bands.outputs[0].data_range if self.prediction_bands else None
 
     @property
     def _output_range(self) -> tuple[float, float]:
         """Range of the output in which the model rests, if it rests at several."""
         data = self._data_range
-        return EVERYWHERE if data is None else data.output
+        return data.output if data and not isinstance(self.model, CoupledModel) else EVERYWHERE
 
     def plot_linear(
         self, kind: str = "bode", operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None

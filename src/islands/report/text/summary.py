@@ -9,13 +9,13 @@ from islands.estimation.latent_models import ORDERS
 from islands.evolution.latent_variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
 from islands.evolution.search_result import SearchResult
 from islands.evolution.settings import LATENT
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals
 from islands.models.equations import named_signals
-from islands.models.latent import STRUCTURE_SUMMARIES
+from islands.models.latent import STRUCTURE_SUMMARIES, LatentModel
 from islands.models.linearisation import find_rest
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
-from islands.models.protocol import DynamicModel
 from islands.persistence.saved_documents import find_recommended
 from islands.report.text.facts import Document, OutputFacts, OutputsFacts, ResultFacts
 from islands.report.text.layout import LEGEND, MARK, term_table, wrap
@@ -63,6 +63,7 @@ def _summarise_outputs(document: Document, model: CoupledModel) -> str:
     """Return the summary of a result of several outputs; their errors are in a table."""
     facts = OutputsFacts(document)
     named = dict(write_named("outputs", "essence", f=facts))
+    linear = _describe_linear_part(document, model)
     head = [text for name, text in named.items() if name != "essence_errors"]
     signals = coupled_signals(model) or f"k counts samples of {document['preprocessing']['dt']:g} s"
     lines = [
@@ -71,6 +72,8 @@ def _summarise_outputs(document: Document, model: CoupledModel) -> str:
         *wrap(write_one("outputs", "equations", f=facts)),
         "",
         *(line for single in model.models for line in [*term_table(single), ""]),
+        *linear,
+        *([""] if linear else []),
         *wrap(f"{signals}."),
         "",
         "Validation data; all outputs are simulated together, from the inputs alone:",
@@ -141,17 +144,21 @@ def number(value: float | None, form: str, bounded: bool) -> str:
     return "-" if value is None else form.format(value)
 
 
-def _describe_linear_part(document: Document, model: DynamicModel) -> list[str]:
+def _describe_linear_part(document: Document, model: AnyModel) -> list[str]:
     """State modes, dead times and gains of a NARX model in the middle of its data, if it rests there.
 
-    The equation of a latent model states those at its operating point.
+    The equation of a latent model states those at its operating point. The outputs of a model have the same
+    inputs.
     """
-    bands = find_recommended(document)["bands"] or {}
-    if not isinstance(model, Model) or bands.get("range") is None:
+    (entry, *_) = document["outputs"] if isinstance(model, CoupledModel) else [find_recommended(document)]
+    bands = entry["bands"] or {}
+    if isinstance(model, LatentModel | CoupledLatentModel) or bands.get("range") is None:
         return []
     point = [0.5 * (low + high) for low, high in bands["range"]["inputs"]]
     with suppress(ModelError):
-        y = find_rest(measured_block(model), point, tuple(bands["range"]["output"]))
+        y = None
+        if isinstance(model, Model):
+            y = find_rest(measured_block(model), point, tuple(bands["range"]["output"]))
         system = model.linearise(point, y)
         return wrap(
             write_one("result", "linear_part", point=system.describe_point(), parts=system.describe())

@@ -69,6 +69,14 @@ def test_a_result_of_several_outputs_takes_frames_and_inputs_alone(found) -> Non
     assert "<math" in found._repr_html_()
 
 
+def test_the_summary_states_the_linear_system_in_the_middle_of_the_data(found) -> None:
+    system = found.linearise()
+    (low, high), *_ = found.best.prediction_bands.outputs[0].data_range.inputs
+    assert system.operating_inputs == (0.5 * (low + high),)
+    text = " ".join(str(found).split())
+    assert f"Linear part about {system.describe_point()}: {'; '.join(system.describe())}." in text
+
+
 @pytest.mark.ci
 def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> None:
     with undrawn_figures():
