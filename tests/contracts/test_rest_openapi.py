@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 import pytest
 from jsonschema import Draft202012Validator
 
+from islands_api.web.routes import figures
 from support.service import (
     columns,
     csv,
@@ -219,7 +220,14 @@ def test_an_unknown_figure_is_not_drawn(service, finished, path):
 
 
 @pytest.mark.nightly
-def test_every_figure_is_drawn_once_and_stored(service, document, finished):
+def test_every_figure_is_drawn_once_and_stored(service, document, finished, monkeypatch):
+    drawn, draw = [], figures.run_figure_worker
+
+    def observe(state, caller, arguments, failure):
+        drawn.append(arguments)
+        return draw(state, caller, arguments, failure)
+
+    monkeypatch.setattr(figures, "run_figure_worker", observe)
     for resource, count in (("", 4), ("/models/1", 3)):
         names = service.client.get(f"/v1/jobs/{finished}{resource}/figures").json()["items"]
         assert len(names) == count
@@ -233,8 +241,8 @@ def test_every_figure_is_drawn_once_and_stored(service, document, finished):
                 document, service.client.get(f"/v1/jobs/{finished}{resource}/figures/{name}.csv")
             )
             assert table.text.startswith("panel,line,x,y\n1: ")
-    drawn = [entry["ms"] for entry in service.logs if entry.get("path", "").endswith(".svg")]
-    assert sum(ms > 300 for ms in drawn) == 2  # all figures of a search or a model are drawn together
+    # A process draws all figures of the search, and another all those of the model.
+    assert drawn == [[finished], [finished, "--rank", "1"]]
     simulation = check_response(
         document, service.client.get(f"/v1/jobs/{finished}/models/1/simulation")
     ).json()

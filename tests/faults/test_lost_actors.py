@@ -199,6 +199,8 @@ def test_a_cluster_with_an_autoscaler_is_asked_for_a_cpu_for_each_island(
         state = get_cluster_resource_state(GcsClient(address=ray_address))
         return sum(each.count for each in state.pending_resource_requests)
 
+    # As on a cluster of several machines; on one machine the actors of each job reserve parts of a CPU.
+    monkeypatch.setattr(actor_pool, "reserved_cpus", lambda: 1.0)
     missing = 3
     islands = count_cpus() + missing
     for autoscaling, expected in ((False, 0), (True, missing)):
