@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from islands.expressions.parsing import parse
 from islands.models.narx import Model, make_model
+from islands.models.protocol import DynamicModel
 from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
@@ -65,13 +66,13 @@ class Law:
         names = ("u",) if len(self.inputs) == 1 else tuple(f"u{i + 1}" for i in range(len(self.inputs)))
         return make_model([(parse(text), value) for text, value in self.terms.items()], names, dt=DT)
 
-    def has_terms_of(self, model: Model, record: Dataset) -> bool:
+    def has_terms_of(self, model: DynamicModel, record: Dataset) -> bool:
         """Return whether a model has exactly the terms of the law.
 
         A regressor equals a term if both are proportional on the record: with positive inputs ``sqrt(u^2)``
         is ``u``.
         """
-        if not self.in_vocabulary or model.size != len(self.terms):
+        if not self.in_vocabulary or not isinstance(model, Model) or model.size != len(self.terms):
             return False
         warm_up = max(model.maximum_lag, self.model.maximum_lag)
         own, other = (regressor_matrix(each.regressors, record, warm_up) for each in (self.model, model))

@@ -49,8 +49,7 @@ class Criterion:
     Attributes
     ----------
     estimator : str
-        An entry of ``ESTIMATORS``; ``output-error`` or ``box-jenkins`` for a linear model of
-        `fit_output_error`.
+        An entry of ``ESTIMATORS``; ``box-jenkins`` for the linear model of `identify_linear`.
     interval : int or None
         Samples of the interval over which predictions are fed back: 1 for the one-step-ahead error, None for
         that of the free run, and else the error of multiple shooting.
@@ -76,10 +75,7 @@ REFITS: Mapping[str, str] = MappingProxyType(
 #: Criterion of least squares.
 LEAST_SQUARES = Criterion("least-squares", 1)
 
-#: Criterion of linear models of the free run with estimated initial states.
-OUTPUT_ERROR = Criterion("output-error", None)
-
-#: Criterion of those that minimise the free-run error after a filter that makes it white.
+#: Criterion of `identify_linear`: the free-run error after a filter that makes it white.
 BOX_JENKINS = Criterion("box-jenkins", None)
 
 

@@ -10,9 +10,7 @@ consistent under white measurement noise, gives the initial A; Gauss-Newton step
 7.5 and 10.2).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +22,6 @@ from islands.expressions.tree import Constant, Expression
 from islands.kernels.linear_filter import divide_rows
 from islands.kernels.qr import orthogonalise
 from islands.kernels.summation import dot
-from islands.records.noise_model import NoiseModel
 
 #: Iterations of Steiglitz and McBride, Gauss-Newton steps, and halvings of a step.
 _INITIAL_ITERATIONS, _MAX_STEPS, _MAX_HALVINGS = 8, 30, 12
@@ -81,29 +78,6 @@ class LinearProblem:
                 divided[segment * self.order + row, begin + row : end] = response[: end - begin - row]
         divided[self.states :] = divide_rows(denominator, series, self.ends)
         return divided
-
-    def take_part(self, rows: int) -> "LinearProblem":
-        """Return the problem of a number of consecutive rows, where the inputs vary most."""
-        first_rows = np.arange(0, self.y.size - rows + 1, rows)
-        with np.errstate(divide="ignore"):
-            spreads = [np.log(self.columns[:, row : row + rows].var(axis=1)).sum() for row in first_rows]
-        first = first_rows[np.argmax(spreads)]
-        return self._keep([(max(begin, first), min(end, first + rows)) for begin, end in self.bounds])
-
-    def whiten(self, noise: NoiseModel) -> "LinearProblem":
-        """Return the problem filtered by the inverse of a noise model.
-
-        The first rows of every segment are left out, because the values before them are unknown.
-        """
-        columns = np.array([noise.whiten(column, self.lengths) for column in self.columns])
-        whitened = replace(self, columns=columns, y=noise.whiten(self.y, self.lengths))
-        return whitened._keep([(begin + noise.order, end) for begin, end in self.bounds])
-
-    def _keep(self, pieces: Sequence[tuple[int, int]]) -> "LinearProblem":
-        """Return the problem of pieces of the segments; those that their initial states take are left out."""
-        kept = [np.arange(begin, end) for begin, end in pieces if end - begin > self.order]
-        rows, ends = np.concatenate(kept), np.cumsum([piece.size for piece in kept])
-        return replace(self, columns=self.columns.take(rows, axis=1), y=self.y[rows], ends=ends)
 
     def with_constant(self) -> "LinearProblem":
         """Return the problem with a constant; the problem itself if it has one."""
@@ -166,21 +140,6 @@ class LinearSimulation:
     coefficients: NDArray[np.float64]
     residual: NDArray[np.float64]
     squares: float
-
-    @property
-    def mean_square(self) -> float:
-        """Mean square of the residual."""
-        return self.squares / self.residual.size
-
-    @property
-    def criterion(self) -> float:
-        """Information criterion of Schwarz."""
-        return measure_criterion(self.squares, self.residual.size, len(self.basis) + self.denominator.size)
-
-
-def measure_criterion(squares: float, rows: int, count: int) -> float:
-    """Return the information criterion of Schwarz."""
-    return rows * log(max(squares / rows, np.finfo(float).tiny)) + count * log(rows)
 
 
 def find_start(problem: LinearProblem) -> LinearSimulation | None:

@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.estimation.linear_simulation import find_start, minimise
-from islands.estimation.output_error import make_problem
+from islands.estimation.linear_simulation import LinearProblem, find_start, minimise
+from islands.expressions.tree import Lagged
 from islands.kernels.state_space import simulate_states
 from islands.models.latent import StateSpaceLayout
 from islands.records.channel_names import parse_channel_name
@@ -20,6 +20,9 @@ from islands.records.dataset import Dataset
 
 #: The steps end when one reduces the squared error by a smaller relative amount.
 _LEAST_GAIN = 1e-6
+
+#: Segments that are used, at most: the longest ones, because each has an initial state.
+_LARGEST_SEGMENTS = 16
 
 #: Largest magnitude of a pole in the Gramians, which an integrator does not have.
 _LARGEST_POLE = 0.9995
@@ -71,7 +74,7 @@ def fit_linear_state_space(record: Dataset, order: int) -> LinearStateSpace | No
     LinearStateSpace or None
         None if the record is too short, or without a stable model.
     """
-    problem = make_problem(record, order, (0,) * record.inputs, order + 1)
+    problem = _make_problem(record, order)
     if problem is None:
         return None
     problem = problem.with_constant()
@@ -93,6 +96,32 @@ def fit_linear_state_space(record: Dataset, order: int) -> LinearStateSpace | No
     level = float(coefficients[at] / gain) if gain else 0.0
     found = _balance(a, b, np.eye(order)[0])
     return _normalise(LinearStateSpace(*found, d, level), record)
+
+
+def _make_problem(record: Dataset, order: int) -> LinearProblem | None:
+    """Return the rows of a model without a constant; None if no segment is long enough.
+
+    It reads ``order`` samples of an input, and one more of an input that is read one sample early.
+    """
+    read = [
+        (place, lag)
+        for place, name in enumerate(record.input_names)
+        for lag in range(1, order + 1 + parse_channel_name(name).at_once)
+    ]
+    first = max([order, *(lag for _, lag in read)])
+    longest = sorted(record.bounds, key=lambda bounds: bounds[0] - bounds[1])[:_LARGEST_SEGMENTS]
+    kept = sorted((begin, end) for begin, end in longest if end - begin > first + order)
+    if not kept:
+        return None
+    ends = np.cumsum([end - begin - first for begin, end in kept], dtype=np.int64)
+    terms = [Lagged(0, lag) for lag in range(1, order + 1)]
+    terms += [Lagged(1 + place, lag) for place, lag in read]
+    columns = [
+        np.concatenate([record.u[begin + first - lag : end - lag, place] for begin, end in kept])
+        for place, lag in read
+    ]
+    y = np.concatenate([record.y[begin + first : end] for begin, end in kept])
+    return LinearProblem(order, tuple(terms), np.array(columns), y, ends)
 
 
 def _balance(

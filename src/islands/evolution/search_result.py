@@ -385,10 +385,10 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
 
 
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
-    """Return the best model of every class and size, best first; see `rank_models`."""
-    best: dict[tuple[str, int], Assessment] = {}
+    """Return the best model of every size, best first; see `rank_models`."""
+    best: dict[int, Assessment] = {}
     for entry in rank_models(models):
-        best.setdefault((entry.model.kind, entry.model.size), entry)
+        best.setdefault(entry.model.size, entry)
     return tuple(best.values())
 
 

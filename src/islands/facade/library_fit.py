@@ -37,6 +37,7 @@ from islands.evolution.search_result import (
     as_candidate,
     keep_best_of_sizes,
     list_linear_models,
+    rank_models,
     state_steps,
     with_average,
     with_bands,
@@ -221,8 +222,6 @@ def fit_library(
     exchange = bool(settings.certificate)
     structures, searches, started, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
     models, outcomes = _estimate(structures, split, settings, swaps, warm_up, steps)
-    if settings.selecting_estimator in _SIMULATING:
-        models += list_linear_models(split, interval, warm_up, library.constraints, steps)
     rows = sum(max(0, length - warm_up) for length in split.estimation.segments)
     count = full_set(library.degree, library.lags, library.lags, record.inputs)
     search = SearchStatistics(
@@ -245,6 +244,10 @@ def fit_library(
         refine_all = partial(refine_models, result, interval, warm_up, library.constraints, steps)
         result, refined = steps.attempt(REFINEMENT, refine_all) or (result, [])
         models += refined
+    if settings.selecting_estimator in _SIMULATING:
+        linear = list_linear_models(split, interval, warm_up, library.constraints, steps)
+        result = replace(result, models=rank_models([*result.models, *linear]))
+        models += linear
     estimates = [as_candidate(entry) for entry in models]
     warm_up = max(warm_up, *(entry.model.maximum_lag for entry in models))
 

@@ -6,10 +6,11 @@ Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984,
 differences. Blocks of the validation data take the correlation of the errors into account. Models with
 different warm-ups are compared over the samples that both predict. Decision 0017 compares rules.
 
-A linear model comes before a nonlinear one. A nonlinear model is compared only if its information criterion
-of the free run on all data is less than that of the linear one: one step or one bump leaves no excitation
-for the validation data, on which all models are then as good. The criterion is that of Schwarz with the
-penalty of a choice among many terms (Chen & Chen, Biometrika 95 (2008) 759-771).
+A linear model comes before a nonlinear one. A nonlinear model is compared only if the information criterion
+of its free run on all data is less than that of the linear one, or if its error on the validation data is
+significantly less. After one step or one bump the validation data have no excitation: a constant is as good
+there as any model, and the criterion alone decides. It is that of Schwarz with the penalty of a choice
+among many terms (Chen & Chen, Biometrika 95 (2008) 759-771).
 
 A model may be good on the validation data by chance. Its error on the estimation data is then large, or no
 smaller than that of a smaller model.
@@ -162,18 +163,19 @@ def recommend(
     """Choose the linear model, or the smallest nonlinear model that is as good as the best one.
 
     Candidates are the models whose free run on the validation data is bounded. Of the linear ones, that
-    with the least information criterion on all data is recommended, unless nonlinear ones have a smaller
-    criterion. Only these are compared then and, if the search constrains models of hysteresis, of them
-    those that have Property 1. Those whose error on the validation data exceeds twice the least are
-    excluded, and of the others those whose free-run error on the estimation data exceeds twice the least of
-    them. Of the rest, the one with the least RMSE is the reference. A model is as good as the reference if
-    its RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it
-    exceeds that of the reference by at most 20 % and the mean squared errors differ by at most three
-    standard errors. The standard error is that of the mean difference over blocks of the validation data. A
-    model is also as good if its RMSE on the estimation data exceeds that of the reference by at most 1 %,
-    and that on the validation data by at most 50 %. Of these models, those whose free-run error on the
-    estimation data exceeds 1.5 times the least of them are excluded, and of the rest those that diverge in
-    holds or excursions. A criterion that no model meets excludes none.
+    with the least information criterion on all data is recommended, unless nonlinear ones are better by
+    their criterion or, significantly, on the validation data. Only these are compared then and, if the
+    search constrains models of hysteresis, of them those that have Property 1. Those whose error on the
+    validation data exceeds twice the least are excluded, and of the others those whose free-run error on
+    the estimation data exceeds twice the least of them. Of the rest, the one with the least RMSE is the
+    reference. A model is as good as the reference if its RMSE exceeds that of the reference by at most 1 %,
+    or is below 1e-6 of the output range, or if it exceeds that of the reference by at most 20 % and the
+    mean squared errors differ by at most three standard errors. The standard error is that of the mean
+    difference over blocks of the validation data. A model is also as good if its RMSE on the estimation
+    data exceeds that of the reference by at most 1 %, and that on the validation data by at most 50 %. Of
+    these models, those whose free-run error on the estimation data exceeds 1.5 times the least of them are
+    excluded, and of the rest those that diverge in holds or excursions. A criterion that no model meets
+    excludes none.
 
     Parameters
     ----------
@@ -217,7 +219,11 @@ def recommend(
 def _keep_informative(
     places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Assessment]
 ) -> list[int]:
-    """Return the nonlinear models with a smaller criterion than every linear one, or the best linear one."""
+    """Return the nonlinear models that are better than the best linear one, or the latter alone.
+
+    Of linear models, the one with the least criterion is the best. A nonlinear one is better if its criterion
+    is less, or if the validation data show a significant difference and more than a constant output.
+    """
     linear = [at for at in places if is_linear(assessments[at].model)]
     if not linear:
         return list(places)
@@ -242,7 +248,14 @@ def _keep_informative(
     best = linear[0]
     for at in linear[1:]:
         best = at if gain(at, best) > 0.0 else best
-    return [at for at in places if at not in linear and gain(at, best) > 0.0] or [best]
+
+    def is_better(at: int) -> bool:
+        one, other = assessments[at], assessments[best]
+        unexplained = 1.0 - one.metrics["validation"]["free_run"].r2
+        shows_motion = unexplained * (1.0 + LARGEST_EXCESS) ** 2 < 1.0
+        return gain(at, best) > 0.0 or (shows_motion and not _is_as_good(other, one))
+
+    return [at for at in places if at not in linear and is_better(at)] or [best]
 
 
 def recommend_fittest(
@@ -299,7 +312,7 @@ def describe_exclusion(exclusion: Exclusion, assessments: Sequence[Assessment]) 
     if exclusion.reason == PROPERTY_1:
         return "without Property 1"
     if exclusion.reason == INFORMATION:
-        return "with a larger information criterion on all data"
+        return "not better by the information criterion on all data"
     if exclusion.reason == CHECKS:
         return _describe_divergence([assessments[rank - 1].physics for rank in exclusion.ranks])
     of_equals = exclusion.reason in _OF_EQUALS
@@ -419,8 +432,8 @@ def _describe_choice(
     error, least = (_write_error(entry.validation_error, unit) for entry in (chosen, best))
     if is_linear(chosen.model) and any(not is_linear(each.model) for each in assessments):
         return (
-            "linear: no nonlinear model has a smaller information criterion of the free run on all data, "
-            f"estimation and validation; RMSE on the validation data {error}"
+            "linear: no nonlinear model is better by the information criterion of the free run on all data, "
+            f"or significantly better on the validation data; RMSE on the validation data {error}"
         )
     rivals = list_rivals(found, sizes, assessments)
     equals, others = (

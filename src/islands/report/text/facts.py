@@ -224,10 +224,27 @@ class RunFacts:
         return self.has_structure and self.residual["predictable_percent"] is not None
 
     @property
+    def explained(self) -> float | None:
+        """Explained part of the variance of the output, of the part of the data in which it moves more.
+
+        R2 of the validation data says nothing of a model if their output rests.
+        """
+        free, before = self.free, self.error(part="estimation")
+        if None in (free["r2"], free["rmse"], before["r2"], before["rmse"]) or before["r2"] == 1.0:
+            return None if free["r2"] is None else float(free["r2"])
+        variance = before["rmse"] ** 2 / (1.0 - before["r2"])
+        return float(max(free["r2"], 1.0 - free["rmse"] ** 2 / variance if variance else free["r2"]))
+
+    @property
     def is_unrelated(self) -> bool:
         """Whether the free run is hardly better than the mean of an output that nothing predicts."""
-        r2 = self.free["r2"]
-        return r2 is not None and r2 < _NO_R2 and self.is_unpredictable
+        return self.explained is not None and self.explained < _NO_R2 and self.is_unpredictable
+
+    @property
+    def rests(self) -> bool:
+        """Whether the output of the validation data hardly moves, and that of the estimation data does."""
+        r2, explained = self.free["r2"], self.explained
+        return r2 is not None and explained is not None and r2 < _NO_R2 and explained >= _GOOD_R2
 
     @property
     def is_poor(self) -> bool:
@@ -257,7 +274,7 @@ class RunFacts:
     @property
     def simulates(self) -> bool:
         """Whether the free run follows the output: R2 is good, or the error is that of the noise."""
-        rmse, r2, noise = self.free["rmse"], self.free["r2"], self.noise
+        rmse, r2, noise = self.free["rmse"], self.explained, self.noise
         if rmse is None or self.is_unrelated:
             return False
         # R2 is undefined for a constant output.

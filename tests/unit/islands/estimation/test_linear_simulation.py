@@ -1,4 +1,4 @@
-"""Problems of linear models: their parts, and their equations behind the filter of a noise model."""
+"""Minimum of the error of a linear difference equation with its initial states."""
 
 from dataclasses import replace
 
@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 
 from islands.estimation.linear_simulation import LinearProblem, find_start, minimise, project, solve
 from islands.expressions.tree import Lagged
-from islands.records.noise_model import NoiseModel
 
 A, B = np.array([-1.5, 0.7]), [0.1, 0.15]
 
@@ -23,22 +22,6 @@ def make_problem(lengths, seed=0):
         y.append(lfilter([0.0, *B], np.append(1.0, A), u)[50:])
     terms = tuple(Lagged(channel, lag) for channel in (0, 1) for lag in (1, 2))
     return LinearProblem(2, terms, np.hstack(columns), np.concatenate(y), np.cumsum(lengths))
-
-
-@pytest.mark.parametrize("coefficients", [[], [0.9], [1.4, -0.6, 0.1]])
-def test_filtered_signals_fulfil_the_same_equation(coefficients):
-    problem = make_problem((80, 60, 90))
-    noise = NoiseModel(np.array(coefficients), 1.0, 1.0)
-    whitened = problem.whiten(noise)
-    assert whitened.lengths == [each - noise.order for each in problem.lengths]
-    assert solve(whitened, A).squares < 1e-20 * problem.y @ problem.y
-
-
-def test_part_has_no_segment_that_its_initial_states_take():
-    problem = make_problem((401, 499))
-    weights = np.where(np.arange(900) // 200 == 2, 1.0, 1e-2)
-    part = replace(problem, columns=problem.columns * weights).take_part(200)
-    assert np.array_equal(part.y, problem.y[401:600])
 
 
 def test_steps_from_the_start_find_the_exact_equation():

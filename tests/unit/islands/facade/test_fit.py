@@ -130,7 +130,7 @@ def test_validation_record_does_not_affect_the_parameters_of_a_structure():
     assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
     assert whole.search_result.split.estimation.samples == 400
     assert whole.search_result.split.validation.samples == 150
-    by_structure = [{m.model.regressors: m for m in made.models} for made in (whole, other)]
+    by_structure = [{m.model.parameter_names: m for m in made.models} for made in (whole, other)]
     common = by_structure[0].keys() & by_structure[1].keys()
     assert common
     for structure in common:

@@ -112,7 +112,15 @@ RESULTS = {
         {"models.0.constraints": [CHECK | {"met": False}, CHECK | {"met": False, "value": None}]}
     ],
     "limit_no_simulation": [LOST],
-    "limit_unrelated": [WHITE | {f"{METRICS}.free_run.r2": -0.01, "data.noise": None}],
+    "limit_unrelated": [
+        WHITE
+        | {
+            f"{METRICS}.free_run.r2": -0.01,
+            "models.0.metrics.estimation.free_run.r2": -0.01,
+            "data.noise": None,
+        }
+    ],
+    "limit_at_rest": [{f"{METRICS}.free_run.r2": -0.01}],
     "limit_poor_simulation": [{f"{METRICS}.free_run.r2": 0.3, f"{METRICS}.free_run.rmse": 1.0}],
     "limit_diverging_excursions": [{"models.0.physics.excursions.0.bounded": False}],
     "limit_missing_checks": [{"models.0.physics.not_computed": "why", f"{RESIDUAL}.not_computed": "why"}],
@@ -183,7 +191,13 @@ COUPLED = {
     "limit_no_simulation": [
         {"metrics.validation.free_run": LOST[f"{METRICS}.free_run"], "residual.verdict": "inadequate"}
     ],
-    "limit_poor_simulation": [{"metrics.validation.free_run.r2": 0.3, "data.noise": None}],
+    "limit_poor_simulation": [
+        {
+            "metrics.validation.free_run.r2": 0.3,
+            "metrics.estimation.free_run.r2": 0.3,
+            "data.noise": None,
+        }
+    ],
     "limit_predictable_residual": [
         {
             "residual.verdict": "inadequate",
