@@ -285,7 +285,8 @@ def _estimate_shared_states(
     fixed, traces = np.full(first.theta.size, -1), np.empty((len(u), order + 2 * units, 1))
     products, none = np.empty((order + 1, order + 1)), np.empty((0, 0))
     best: NDArray[np.float64] = rest.copy()
-    least, step = np.inf, np.zeros(order)
+    step: NDArray[np.float64] = np.zeros(order)
+    least = np.inf
     for _ in range(_SHARED_STEPS):
         states = best + step
         total = np.full_like(products, np.inf)
@@ -298,7 +299,8 @@ def _estimate_shared_states(
         if error < least:
             decrease, best, least = least - error, states, error
             normal = total[:order, :order] + _RIDGE * np.eye(order)
-            step = np.linalg.solve(normal, total[:order, order] - _RIDGE * (states - rest))
+            side = total[:order, order] - _RIDGE * (states - rest)
+            step = np.asarray(np.linalg.solve(normal, side), np.float64)
             if decrease <= _NEGLIGIBLE * least:
                 break
         elif least == np.inf:

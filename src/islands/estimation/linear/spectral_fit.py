@@ -96,7 +96,8 @@ class SharedSystem:
     def size(self) -> int:
         """Number of parameters that have an effect: scales of the states and of the signals have none."""
         # A scale of every state replaces the poles in the count.
-        return sum(getattr(self, each).size for each in self.free) - self.signals**2
+        blocks: list[Matrix] = [getattr(self, each) for each in self.free]
+        return sum(each.size for each in blocks) - self.signals**2
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -249,10 +250,10 @@ class _Factors:
         resolvent = np.exp(1j * response.frequencies)[:, None, None] * np.eye(len(a)) - a
         self.states: Spectrum = np.linalg.solve(resolvent, np.broadcast_to(b + 0j, (lines, *b.shape)))
         self.resolvent, self.c = resolvent, c
-        self.root: Spectrum = np.linalg.cholesky(response.power)
+        self.root: Spectrum = np.asarray(np.linalg.cholesky(response.power), np.complex128)
         self.deviations = np.sqrt(response.variances)[:, None]
-        error = response.values - c @ self.states - d
-        self.error: Spectrum = error @ self.root / self.deviations
+        error = (response.values - c @ self.states - d) @ self.root
+        self.error: Spectrum = np.asarray(error / self.deviations, np.complex128)
 
     def differentiate(self, system: SharedSystem, level: float) -> Spectrum:
         """Return the derivatives of the response, shape (lines * outputs * inputs, parameters)."""
@@ -276,7 +277,7 @@ class _Factors:
             )
         ]
         poles += [_multiply(rows, states, order - 1, order - 1)] if order % 2 else []
-        pairs = {
+        pairs: dict[str, tuple[Spectrum | Matrix, Spectrum]] = {
             "b": (rows, root),
             "c": (direct, states),
             "d": (direct, root),
