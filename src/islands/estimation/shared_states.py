@@ -4,7 +4,7 @@ The effect is a feedback whose gain follows the mean magnitude of the inputs, wh
 
     a(k+1) = r a(k) + (1 - r) mean |u(k)|,    h(k) = a(k) z(k) = ((z + a)^2 - (z - a)^2) / 4,
 
-so that the models have units of one argument, as all latent models. See `islands.estimation.linear.spectral_fit`.
+so that the models have units of one argument, as all latent models (see `linear.spectral_fit`).
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,9 @@ _RIPPLE = 0.05
 _SAMPLES_PER_STATE = 3
 
 
-def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list[tuple[LatentModel, ...]]:
+def search_shared_models(
+    record: CoupledRecord, seed: int, steps: Steps, least_order: int = 0
+) -> list[tuple[LatentModel, ...]]:
     """Search state spaces whose states all outputs share.
 
     Parameters
@@ -54,6 +56,8 @@ def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list
     seed : int
         Of the starts of the effect of the amplitude.
     steps : Steps
+    least_order : int
+        A state space of a smaller order is not returned.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list
     with threadpool_limits(1, user_api="blas"):
         data, amplitudes = _measure_responses(record, u, y)
         system = fit_shared_system(data, _LARGEST_ORDER) if data else None
-        if system is None:
+        if system is None or system.order < least_order:
             return []
         equal = np.mean([each.response.variances for each in data], axis=0)
         alike = [replace(each, response=replace(each.response, variances=equal)) for each in data]

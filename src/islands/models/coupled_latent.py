@@ -1,8 +1,12 @@
-"""Coupled model of latent models: one state space per output, each of which reads the inputs only."""
+"""Coupled model of latent models, which read the inputs only: one state space, or one per output."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import accumulate
 from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from islands.errors import ModelError
 from islands.expressions.tree import Apply, Expression, Lagged, Symbol
@@ -15,8 +19,10 @@ from islands.models.coupled_narx import (
 )
 from islands.models.equations import latex_statement, mathml_statement, signal_names
 from islands.models.latent import LatentModel
+from islands.models.linearisation import OperatingPoint
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import describe_values
+from islands.models.state_space import StateSpace
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 
@@ -25,7 +31,8 @@ from islands.records.dataset import Dataset
 class CoupledLatentModel(CoupledModel):
     """One latent model per output, with the inputs in common.
 
-    The states of an output have no effect on the other outputs. All inputs of all models are read one sample
+    The states of an output have no effect on the other outputs, or all outputs have the same states: models
+    with equal equations of the states are one state space. All inputs of all models are read one sample
     early, or none.
 
     Attributes
@@ -80,13 +87,58 @@ class CoupledLatentModel(CoupledModel):
         return (0,) * len(self.models) + first.leads[1 + first.order :]
 
     @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of the parameters: the output, and the name in its model, ``y2: a1_1``."""
-        return tuple(
-            f"{output}: {name}"
-            for output, model in zip(output_signals(self), self.models, strict=True)
-            for name in model.names
+    def shares_states(self) -> bool:
+        """Whether the equations of the states of all models are equal."""
+        first = self.models[0]
+        return first.order > 0 and all(
+            each.state_equations == first.state_equations for each in self.models[1:]
         )
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters: the output, and the name in its model, ``y2: a1_1``.
+
+        Those of shared states have no output before them.
+        """
+        return tuple(self._name_parameters())
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Parameters of all models; those of shared states once."""
+        return tuple(self._name_parameters().values())
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return len(self._name_parameters())
+
+    @property
+    def standard_errors(self) -> tuple[float, ...] | None:
+        """None: the parameters of latent models have no standard errors."""
+        return None
+
+    def with_parameters(
+        self,
+        theta: Sequence[float],
+        standard_errors: Sequence[float] | None = None,  # noqa: ARG002 - as of other models
+    ) -> "CoupledLatentModel":
+        """Return a copy with the given parameters."""
+        named, shares = dict(zip(self.parameter_names, theta, strict=True)), self.shares_states
+        return replace(
+            self,
+            models=tuple(
+                model.with_parameters([named[_name_parameter(output, name, shares)] for name in model.names])
+                for output, model in zip(output_signals(self), self.models, strict=True)
+            ),
+        )
+
+    def _name_parameters(self) -> dict[str, float]:
+        shares = self.shares_states
+        return {
+            _name_parameter(output, name, shares): value
+            for output, model in zip(output_signals(self), self.models, strict=True)
+            for name, value in zip(model.names, model.parameters, strict=True)
+        }
 
     def block(self) -> Block:
         """Return the difference equations of all models; the states are numbered one after the other."""
@@ -101,10 +153,29 @@ class CoupledLatentModel(CoupledModel):
         # The text of the equations is in deviations, so that it states which.
         return replace(found, texts=(*found.texts, f"where {_describe_symbols(self)}"))
 
+    def linearise(
+        self, operating_point: OperatingPoint | None = None, y: ArrayLike | None = None
+    ) -> StateSpace:
+        """Return the linear system of small deviations; see `DynamicModel.linearise`."""
+        if not self.shares_states:
+            return CoupledModel.linearise(self, operating_point, y)
+        # A kink at rest has the slope zero, as in the model of one output: an amplitude does not respond.
+        systems = [model.linearise(operating_point, y) for model in self.models]
+        return replace(
+            systems[0],
+            C=np.vstack([each.C for each in systems]),
+            D=np.vstack([each.D for each in systems]),
+            output_names=self.output_names,
+            output_units=tuple(each.output_units[0] for each in systems),
+            operating_outputs=tuple(each.operating_outputs[0] for each in systems),
+        )
+
     def equation(self) -> EquationText:
         """Return the equations as text: those of each output, with its states after them."""
         # Common statements about the signals are made once.
-        plain = (replace(each, preprocessing=None, average=1) for each in self._number())
+        plain = [replace(each, preprocessing=None, average=1) for each in self._number()]
+        if self.shares_states:
+            plain = [plain[0], *(replace(each, is_output_only=True) for each in plain[1:])]
         written = [each.equation() for each in plain]
         symbols = _describe_symbols(self)
         rows = [each.latex for each in written] + ([latex_statement(symbols)] if symbols else [])
@@ -121,8 +192,9 @@ class CoupledLatentModel(CoupledModel):
 
     def _number(self) -> list["_NumberedModel"]:
         """Return the models with the names of their signals in the coupled model."""
-        states = accumulate((model.order for model in self.models), initial=0)
-        units = accumulate((len(model.units) for model in self.models), initial=0)
+        own = not self.shares_states
+        states = accumulate((own * model.order for model in self.models), initial=0)
+        units = accumulate((own * len(model.units) for model in self.models), initial=0)
         return [
             _NumberedModel(
                 **{each.name: getattr(model, each.name) for each in fields(model)},
@@ -137,17 +209,22 @@ class CoupledLatentModel(CoupledModel):
 
     def _join(self, blocks: list[Block]) -> Block:
         """Return one block of those of the models, which have different names of outputs and of states."""
-        outputs, states = len(blocks), sum(model.order for model in self.models)
-        moved, parameters, first = [], dict[str, float](), outputs
+        outputs, shares = len(blocks), self.shares_states
+        orders = [0 if shares and place else model.order for place, model in enumerate(self.models)]
+        moved, first = [], outputs
         for place, (output, model, block) in enumerate(
             zip(output_signals(self), self.models, blocks, strict=True)
         ):
-            inputs = range(outputs + states, outputs + states + model.inputs)
-            channels = (place, *range(first, first + model.order), *inputs)
-            moved.append(_Renaming(f"{output}: ", channels).rename(block))
-            parameters |= {f"{output}: {name}": value for name, value in block.parameters.items()}
-            first += model.order
-        names = [name for block in blocks for name in block.signals[1 : block.computed]]
+            inputs = range(outputs + sum(orders), outputs + sum(orders) + model.inputs)
+            own = range(outputs, outputs + model.order) if shares else range(first, first + model.order)
+            found = _Renaming(output, shares, (place, *own, *inputs)).rename(block)
+            if not orders[place] and model.order:
+                found = replace(found, equations=found.equations[:1], starts=())
+            moved.append(found)
+            first += orders[place]
+        names = [
+            name for block, order in zip(blocks, orders, strict=True) for name in block.signals[1 : 1 + order]
+        ]
         return Block(
             equations=(
                 *(each.equations[0] for each in moved),
@@ -156,12 +233,16 @@ class CoupledLatentModel(CoupledModel):
             columns=(*self.output_names, *names, *self.models[0].column_names),
             signals=(*output_signals(self), *names, *input_signals(self)),
             starts=tuple(start for each in moved for start in each.starts),
-            leads=(*self.leads[:outputs], *(0,) * states, *self.leads[outputs:]),
-            parameters=parameters,
+            leads=(*self.leads[:outputs], *(0,) * sum(orders), *self.leads[outputs:]),
+            parameters=self._name_parameters(),
             warm_up=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),
-            texts=tuple(text for block in blocks for text in block.texts),
+            texts=tuple(
+                text
+                for block, each in zip(blocks, moved, strict=True)
+                for text in block.texts[: len(each.equations)]
+            ),
             levels={name: level for block in blocks for name, level in block.levels.items()},
         )
 
@@ -176,11 +257,14 @@ class _NumberedModel(LatentModel):
         Name of the output in the equations.
     states_before, units_before : int
         Numbers of states and units of the outputs before it.
+    is_output_only : bool
+        Whether the text has the equation of the output only: another model states those of the states.
     """
 
     output: str
     states_before: int
     units_before: int
+    is_output_only: bool = False
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -198,21 +282,32 @@ class _NumberedModel(LatentModel):
         _, *inputs = super().signals[len(self.states) :]
         return (self.output, *self.states, *inputs)
 
+    def _display(self) -> tuple[dict[str, str], tuple[str, ...]]:
+        sides, names = super()._display()
+        return ({self.output: sides[self.output]} if self.is_output_only else sides), names
+
+
+def _name_parameter(output: str, name: str, shares: bool) -> str:
+    """Return the name of a parameter of one model in the coupled model."""
+    return name if shares and not LatentModel.is_of_output(name) else f"{output}: {name}"
+
 
 @dataclass(frozen=True, slots=True)
 class _Renaming:
-    """New channels of the signals of a block, and the text before the names of its parameters."""
+    """New channels of the signals of the block of an output, and new names of its parameters."""
 
-    prefix: str
+    output: str
+    shares: bool
     channels: tuple[int, ...]
+
+    def _name(self, name: str) -> str:
+        return _name_parameter(self.output, name, self.shares)
 
     def rename(self, block: Block) -> Block:
         """Return the equations and the starts of a block with the new names."""
         equations = tuple(
             tuple(
-                BlockTerm(
-                    self._replace(term.expression), f"{self.prefix}{term.weight}" if term.weight else ""
-                )
+                BlockTerm(self._replace(term.expression), self._name(term.weight) if term.weight else "")
                 for term in equation
             )
             for equation in block.equations
@@ -225,7 +320,7 @@ class _Renaming:
             case Lagged(channel, lag):
                 return Lagged(self.channels[channel], lag)
             case Symbol(name):
-                return Symbol(f"{self.prefix}{name}")
+                return Symbol(self._name(name))
             case Apply(primitive, arguments):
                 return Apply(primitive, tuple(map(self._replace, arguments)))
         return expression

@@ -291,6 +291,18 @@ class LatentModel(ParametricModel):
             operating_outputs=(y0 + (done.output_offset if done else 0.0),),
         )
 
+    @staticmethod
+    def is_of_output(name: str) -> bool:
+        """Return whether a parameter is one of the equation of the output, not of the states or the units."""
+        return name[0] in "cdfl"
+
+    @property
+    def state_equations(self) -> tuple[object, ...]:
+        """What determines the states: two models with equal ones have the same states."""
+        pairs = zip(self.names, self.parameters, strict=True)
+        values = tuple(pair for pair in pairs if not self.is_of_output(pair[0]))
+        return self.order, self.units, self.input_names, self.delays, self.operating_inputs, values
+
     @property
     def reads_at_once(self) -> bool:
         """Whether the output reads an input at sample k, itself or through a unit."""

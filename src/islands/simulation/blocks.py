@@ -21,7 +21,7 @@ from islands.program.term_pool import link
 from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.dataset import Dataset
 from islands.records.signal_map import map_signals
-from islands.simulation.initial_states import estimate_initial_states
+from islands.simulation.initial_states import estimate_coupled_states, estimate_initial_states
 from islands.simulation.layout import check_warm_up, find_intervals
 
 
@@ -221,10 +221,7 @@ def make_simulator(model: AnyModel, record: AnyRecord, interval: int | None, war
         made.states = estimate_initial_states(model, record, made.start, warm_up)
     elif isinstance(model, CoupledLatentModel):
         assert isinstance(record, CoupledRecord), "the record matches the model"
-        pairs = zip(model.models, record.records, strict=True)
-        made.states = np.hstack(
-            [estimate_initial_states(single, each, made.start, warm_up) for single, each in pairs]
-        )
+        made.states = estimate_coupled_states(model, record.records, made.start, warm_up)
     return made
 
 

@@ -4,13 +4,15 @@ The states are not measured. They are those with which the simulation of the war
 error; states that the warm-up does not show remain near rest, since all states have the same magnitude.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.kernels.state_estimation import find_nearest, minimise_error
-from islands.kernels.state_space import simulate_state_space
+from islands.kernels.state_space import simulate_state_space, trace_states
+from islands.kernels.state_space_products import accumulate_products
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
@@ -23,6 +25,9 @@ _RIDGE = 1e-3
 
 #: Distance from rest at which an estimation also starts; the states have the magnitude 1.
 _DISTANCE = 2.0
+
+#: Steps of an estimation from several outputs, and the relative decrease of the error that ends it.
+_SHARED_STEPS, _NEGLIGIBLE = 30, 1e-10
 
 #: Rows from which each state is first estimated if the model diverges in the whole of them.
 _FIRST_ROWS = 3
@@ -227,6 +232,84 @@ def estimate_initial_states(
     return np.array(found)
 
 
+def estimate_coupled_states(
+    model: CoupledLatentModel, records: Sequence[Dataset], start: NDArray[np.int64], warm_up: int
+) -> NDArray[np.float64]:
+    """Estimate the states of a model of several outputs before the first prediction of every interval.
+
+    Parameters
+    ----------
+    model : CoupledLatentModel
+    records : sequence of Dataset
+        Signals of the model of every output.
+    start, warm_up
+        As for `estimate_initial_states`.
+
+    Returns
+    -------
+    ndarray, shape (intervals, states)
+        As of `estimate_initial_states`, in the order of the block.
+    """
+    pairs = [*zip(model.models, records, strict=True)]
+    if not model.shares_states:
+        return np.hstack([estimate_initial_states(*pair, start, warm_up) for pair in pairs])
+    theta, codes, found = model.models[0].theta, model.models[0].codes, []
+    for first in start.tolist():
+        x, u = _estimate_shared_states(model, records, first - warm_up, first)
+        rows = len(u) - 1
+        bounded = simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) == rows
+        found.append(x if bounded else np.full(len(x), np.nan))
+    return np.array(found)
+
+
+def _estimate_shared_states(
+    model: CoupledLatentModel, records: Sequence[Dataset], begin: int, end: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Estimate the states that all outputs share; see `estimate_first_states`.
+
+    Every output weighs as much as its states do: the sum of the squared errors, each relative to the variance
+    of its output for states of the magnitude 1, has the least sum with the squared distance from rest.
+    """
+    first = model.models[0]
+    u, late = read_inputs(records[0], first, begin, end)
+    rest, order, units = first.rest, first.order, len(first.units)
+    outputs = [
+        (
+            each.theta,
+            record.y[begin + late : end],
+            each.limits.range,
+            float(each.matrices["C"] @ each.matrices["C"]),
+        )
+        for each, record in zip(model.models, records, strict=True)
+    ]
+    fixed, traces = np.full(first.theta.size, -1), np.empty((len(u), order + 2 * units, 1))
+    products, none = np.empty((order + 1, order + 1)), np.empty((0, 0))
+    best: NDArray[np.float64] = rest.copy()
+    step: NDArray[np.float64] = np.zeros(order)
+    least = np.inf
+    for _ in range(_SHARED_STEPS):
+        states = best + step
+        total = np.full_like(products, np.inf)
+        if trace_states(first.theta, first.codes, u, states.copy(), traces) == len(u):
+            total[...] = 0.0
+            for theta, y, limits, variance in outputs:
+                accumulate_products(theta, fixed, units, traces, 0, u, y, *limits, 0, products, none)
+                total += products / max(variance, 1e-300)
+        error = total[order, order] + _RIDGE * float(np.sum((states - rest) ** 2))
+        if error < least:
+            decrease, best, least = least - error, states, error
+            normal = total[:order, :order] + _RIDGE * np.eye(order)
+            side = total[:order, order] - _RIDGE * (states - rest)
+            step = np.asarray(np.linalg.solve(normal, side), np.float64)
+            if decrease <= _NEGLIGIBLE * least:
+                break
+        elif least == np.inf:
+            break
+        else:
+            step = 0.5 * step
+    return best.copy(), u
+
+
 def find_first_states(
     model: AnyModel, record: AnyRecord, warm_up: int
 ) -> tuple[int, dict[str, float]] | None:
@@ -255,8 +338,12 @@ def find_first_states(
     begin = next(begin for begin, end in record.bounds if end - begin > warm_up)
     late = max(max(single.input_lags) for single, _ in pairs)
     states: list[float] = []
-    for single, signals in pairs:
-        x, u = estimate_first_states(single, signals, begin, begin + warm_up)
+    shares = isinstance(model, CoupledLatentModel) and model.shares_states
+    for single, signals in pairs[:1] if shares else pairs:
+        if isinstance(model, CoupledLatentModel) and shares:
+            x, u = _estimate_shared_states(model, [each for _, each in pairs], begin, begin + warm_up)
+        else:
+            x, u = estimate_first_states(single, signals, begin, begin + warm_up)
         rows = late - max(single.input_lags)
         simulate_state_space(single.theta, single.codes, u[:rows], x, np.empty(rows))
         states += x.tolist()

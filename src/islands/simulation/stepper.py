@@ -18,7 +18,7 @@ from islands.models.linearisation import EVERYWHERE, OperatingPoint, find_rest, 
 from islands.models.measured_signals import measured_block
 from islands.records.dataset import Dataset
 from islands.simulation.blocks import LinkedBlock
-from islands.simulation.initial_states import estimate_initial_states
+from islands.simulation.initial_states import estimate_coupled_states, estimate_initial_states
 
 
 class Stepper:
@@ -90,15 +90,20 @@ class Stepper:
             named = dict(zip(block.parameters, self._parameters.tolist(), strict=True))
             starts = (value(each, lambda channel, _lag: now[channel], named) for each in block.starts)
             return np.array(list(starts))
-        found = []
-        for single, y in zip(
-            model.models if isinstance(model, CoupledModel) else (model,), outputs, strict=True
-        ):
-            samples = single.maximum_lag
-            u = np.tile(now[block.computed :], (samples + 1, 1))
-            record = Dataset(u, np.full(samples + 1, y), single.dt or 1.0, single.input_names)
-            found.append(estimate_initial_states(single, record, np.array([samples]), samples)[0])
-        return np.concatenate(found)
+        singles: Sequence[LatentModel] = model.models if isinstance(model, CoupledLatentModel) else (model,)
+        samples = max(single.maximum_lag for single in singles)
+        u, first = np.tile(now[block.computed :], (samples + 1, 1)), np.array([samples])
+        records = [
+            Dataset(u, np.full(samples + 1, y), single.dt or 1.0, single.input_names)
+            for single, y in zip(singles, outputs, strict=True)
+        ]
+        found = (
+            estimate_coupled_states(model, records, first, samples)
+            if isinstance(model, CoupledLatentModel)
+            else estimate_initial_states(model, records[0], first, samples)
+        )
+        states: NDArray[np.float64] = found[0]
+        return states
 
     @property
     def states(self) -> NDArray[np.float64]:

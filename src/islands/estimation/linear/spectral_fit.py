@@ -11,6 +11,8 @@ actuator has its own, or none in a linear system.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import log
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +96,8 @@ class SharedSystem:
     def size(self) -> int:
         """Number of parameters that have an effect: scales of the states and of the signals have none."""
         # A scale of every state replaces the poles in the count.
-        return sum(getattr(self, each).size for each in self.free) - self.signals**2
+        blocks: list[Matrix] = [getattr(self, each) for each in self.free]
+        return sum(each.size for each in blocks) - self.signals**2
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -109,7 +112,7 @@ class SharedSystem:
     def is_stable(self, amplitudes: Sequence[float]) -> bool:
         """Return whether all poles are stable at all amplitudes."""
         return all(
-            np.abs(np.linalg.eigvals(self.at_amplitude(each)[0])).max(initial=0.0) < 1.0
+            float(np.abs(np.linalg.eigvals(self.at_amplitude(each)[0])).max(initial=0.0)) < 1.0
             for each in amplitudes
         )
 
@@ -178,7 +181,7 @@ def schedule(system: SharedSystem, data: Sequence[ResponseAtAmplitude], seed: in
 def find_criterion(system: SharedSystem, data: Sequence[ResponseAtAmplitude]) -> float:
     """Return the information criterion of Schwarz."""
     count = sum(2 * each.response.values.size for each in data)
-    return system.deviance + np.log(max(count, 2)) * system.size
+    return system.deviance + log(max(count, 2)) * system.size
 
 
 def _start(response: FrequencyResponse, a: Matrix, c: Matrix) -> SharedSystem:
@@ -242,25 +245,26 @@ class _Factors:
 
     def __init__(self, system: SharedSystem, data: ResponseAtAmplitude) -> None:
         response, level = data.response, data.amplitude
-        lines, outputs, inputs = response.values.shape
+        lines = len(response.values)
         a, b, c, d = system.at_amplitude(level)
         resolvent = np.exp(1j * response.frequencies)[:, None, None] * np.eye(len(a)) - a
         self.states: Spectrum = np.linalg.solve(resolvent, np.broadcast_to(b + 0j, (lines, *b.shape)))
         self.resolvent, self.c = resolvent, c
-        self.root: Spectrum = np.linalg.cholesky(response.power)
+        self.root: Spectrum = np.asarray(np.linalg.cholesky(response.power), np.complex128)
         self.deviations = np.sqrt(response.variances)[:, None]
-        error = response.values - c @ self.states - d
-        self.error: Spectrum = error @ self.root / self.deviations
+        error = (response.values - c @ self.states - d) @ self.root
+        self.error: Spectrum = np.asarray(error / self.deviations, np.complex128)
 
     def differentiate(self, system: SharedSystem, level: float) -> Spectrum:
         """Return the derivatives of the response, shape (lines * outputs * inputs, parameters)."""
         lines, outputs, inputs = self.error.shape
         order = system.order
-        rows = np.linalg.solve(
+        rows: Spectrum = np.linalg.solve(
             self.resolvent.swapaxes(1, 2), np.broadcast_to(self.c.T + 0j, (lines, order, outputs))
         ).swapaxes(1, 2)
         rows = rows / self.deviations
-        states, root = self.states @ self.root, self.root
+        root = self.root
+        states: Spectrum = self.states @ root
         direct = np.broadcast_to(np.eye(outputs) / self.deviations, (lines, outputs, outputs))
         fed_back = level * (system.w @ states + system.v @ root)
         effects = level * (rows @ system.e + direct @ system.f)
@@ -273,7 +277,7 @@ class _Factors:
             )
         ]
         poles += [_multiply(rows, states, order - 1, order - 1)] if order % 2 else []
-        pairs = {
+        pairs: dict[str, tuple[Spectrum | Matrix, Spectrum]] = {
             "b": (rows, root),
             "c": (direct, states),
             "d": (direct, root),
@@ -283,16 +287,18 @@ class _Factors:
             "v": (effects, root),
         }
         blocks = [np.stack(poles, axis=-1), *(_combine(*pairs[name]) for name in system.free)]
-        return np.concatenate(blocks, axis=-1).reshape(lines * outputs * inputs, -1)
+        slopes: Spectrum = np.concatenate(blocks, axis=-1).reshape(lines * outputs * inputs, -1)
+        return slopes
 
 
 def _multiply(rows: Spectrum, states: Spectrum, row: int, state: int) -> Spectrum:
-    return rows[:, :, row, None] * states[:, None, state, :]
+    found: Spectrum = rows[:, :, row, None] * states[:, None, state, :]
+    return found
 
 
 def _combine(left: Spectrum | Matrix, right: Spectrum) -> Spectrum:
     """Return the derivatives with respect to the matrix between two factors, row by row."""
-    found = np.einsum("foi,fjk->fokij", left, right)
+    found: Spectrum = np.einsum("foi,fjk->fokij", left, right)
     return found.reshape(*found.shape[:3], -1)
 
 
@@ -348,7 +354,7 @@ def _move(system: SharedSystem, step: Matrix) -> SharedSystem:
     if system.order % 2:
         a[-1, -1] += step[at]
         at += 1
-    moved = {"a": a}  # type: dict[str, Matrix]
+    moved: dict[str, Any] = {"a": a}
     for name in system.free:
         block = getattr(system, name)
         moved[name] = block + step[at : at + block.size].reshape(block.shape)

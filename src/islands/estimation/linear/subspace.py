@@ -36,7 +36,8 @@ class ObservedSubspace:
     def find_states(self, order: int) -> tuple[Matrix, Matrix]:
         """Return A, with unstable poles mirrored into the unit circle, and C of an order."""
         observed = self.vectors[:, :order]
-        a = np.linalg.lstsq(observed[: -self.outputs], observed[self.outputs :], rcond=None)[0]
+        found = np.linalg.lstsq(observed[: -self.outputs], observed[self.outputs :], rcond=None)[0]
+        a = np.asarray(found, np.float64)
         poles, vectors = np.linalg.eig(a)
         size = np.abs(poles)
         if (size >= 1.0).any():
@@ -64,8 +65,8 @@ def find_subspace(response: FrequencyResponse, max_order: int) -> ObservedSubspa
     of_outputs = np.einsum("rf,foi->rofi", powers, weighted).reshape(rows * outputs, -1)
     of_inputs = np.einsum("rf,fki->rkfi", powers, root).reshape(rows * inputs, -1)
     stacked = np.vstack([of_inputs, of_outputs])
-    triangle = np.linalg.qr(np.hstack([stacked.real, stacked.imag]).T, mode="r").T
-    free = triangle[rows * inputs :, rows * inputs :]
+    triangle = np.asarray(np.linalg.qr(np.hstack([stacked.real, stacked.imag]).T, mode="r"))
+    free = triangle[rows * inputs :, rows * inputs :].T
     vectors, values, _ = np.linalg.svd(free)
     order = min(max_order, (rows - 1) * outputs)
     scaled = vectors[:, :order].reshape(rows, outputs, order) * deviations

@@ -1,6 +1,7 @@
 """Searches of several outputs: one equation per output, chosen and refined for a common free run.
 
-Latent models of several outputs read the inputs only, so that each is searched on its own.
+Latent models of several outputs read the inputs only, so that each is searched on its own. A search of the
+states that all outputs share comes before.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +26,11 @@ from islands.evolution.settings import LATENT, NARX, Settings
 from islands.facade.coupled.bands import make_bands
 from islands.facade.coupled.joined_results import join_latent_results, join_results
 from islands.facade.coupled.selection import choose_equations, measure_error
+from islands.facade.coupled.shared_states import (
+    measure_results,
+    search_large_system,
+    search_shared_states,
+)
 from islands.facade.evolution_run import SearchCallback
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
@@ -112,7 +118,11 @@ def fit_outputs(
     if chosen.get("delays"):
         raise SettingsError("delays are for one output: leave them out")
     if chosen.get("model", NARX) == LATENT:
-        return _couple_latent(data, chosen, seed, steps, find)
+        return _couple_latent(data, {"method": "fit"}, chosen, seed, steps, find)
+    if "library" not in chosen and (
+        large := search_large_system(data, {"method": "fit"}, chosen, seed, steps)
+    ):
+        return join_latent_results(data, large, seed, steps)
     chosen = {"library": "polynomial", "feedthrough": "no", **chosen}
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
@@ -158,8 +168,11 @@ def identify_outputs(
     settings = resolve_coupled_settings(preset, chosen)
     name = COUPLED_PRESET if preset == AUTO_PRESET else preset
     searches = _Searches(partial(find, preset=name), start, on_epoch)
+    described = {"method": "identify", "preset": preset}
     if settings.model_class == LATENT:
-        return _couple_latent(data, chosen, seed, steps, searches)
+        return _couple_latent(data, described, chosen, seed, steps, searches)
+    if preset == AUTO_PRESET and (large := search_large_system(data, described, chosen, seed, steps)):
+        return join_latent_results(data, large, seed, steps)
     chosen.setdefault("average", settings.average)
     trial = make_trial_library(settings)
     return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, steps, searches)
@@ -238,11 +251,21 @@ def _take_equations(result: Result) -> Result:
 
 
 def _couple_latent(
-    data: CoupledSplit, options: dict[str, Any], seed: int, steps: Steps, find: FindOutput
+    data: CoupledSplit,
+    described: Mapping[str, Any],
+    options: dict[str, Any],
+    seed: int,
+    steps: Steps,
+    find: FindOutput,
 ) -> Result:
-    """Search a latent model of every output, and join them."""
+    """Search latent models, of all outputs together and of each; return those of the smaller error."""
+    if large := search_large_system(data, described, options, seed, steps):
+        return join_latent_results(data, large, seed, steps)
+    shared = search_shared_states(data, described, options, seed, steps)
     splits = [Split(*pair) for pair in zip(data.estimation.records, data.validation.records, strict=True)]
     results = _search_outputs(data.estimation.output_names, splits, options, steps, find)
+    if shared and measure_results(shared) <= measure_results(results):
+        results = shared
     return join_latent_results(data, results, seed, steps)
 
 
