@@ -26,7 +26,7 @@ from islands.kernels.simd import (
 #: Samples of a block; its rows fit into the cache of a processor.
 BLOCK = 256
 
-#: Variance of the noise before a recording, at least, and from which it is a random walk, in units of white noise.
+#: Least variance of the noise before a recording, and that of a random walk, where white noise has 1.
 _LEAST_VARIANCE, _LARGEST_VARIANCE = 1e-10, 1e12
 
 #: Part of this variance that is left out, and doublings of the number of samples that it is summed over.
@@ -143,7 +143,8 @@ def factor_sections(
 def weigh_past(noise):
     """Return equations whose squares are the deviance of the noise before a recording.
 
-    They are zero for a random walk, which may begin anywhere. Without them, noise could follow the response of the system as a decay from its own states.
+    They are zero for a random walk, which may begin anywhere. Without equations, noise could follow the
+    response of the system as a decay from its own states.
     """
     count = noise.shape[1]
     prior, sums, largest = np.zeros((count, count)), np.empty((count, count)), 0.0
